@@ -1,0 +1,257 @@
+"""The values at the reasoner's door: what is read out of the knowledge graph and planned with.
+
+Nothing here knows RDF, search or physics. Every name is a string, unique within one scene (`cup1`, `B1_MOVE`, `LOCATION`);
+the reasoner keeps the IRI behind it. A term that starts with ``?`` is a parameter or variable of a behaviour, any other term
+is an individual.
+
+============================  =========================================  =====================
+the paper                     the field                                  here
+============================  =========================================  =====================
+situated object symbol        state variable (SAS+)                      `Symbol`
+situated object instance      fact                                       `Fact`
+situation type                the variable's property, and its domain    `SituationType`
+behaviour                     action schema                              `Behavior`
+quantified behaviour          ground action                              `GroundBehavior`
+============================  =========================================  =====================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+TRUE = "true"
+FALSE = "false"
+
+
+@dataclass(frozen=True, order=True)
+class Symbol:
+    """A situated object symbol ``<o, S>``: a situation type with its arguments, the first of them the object."""
+
+    situation: str
+    arguments: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return the symbol as people write it, e.g. ``<cup1, LOCATION>``."""
+        return f"<{', '.join((*self.arguments, self.situation))}>"
+
+
+@dataclass(frozen=True, order=True)
+class Fact:
+    """A situated object instance ``<o, s>``: a symbol with one of its values."""
+
+    symbol: Symbol
+    value: str
+
+    def __str__(self) -> str:
+        """Return the fact in goal notation, e.g. ``cup1 LOCATION location7``."""
+        return " ".join((*self.symbol.arguments[:1], self.symbol.situation, *self.symbol.arguments[1:], self.value))
+
+
+State: TypeAlias = Mapping[Symbol, str]
+"""One value for every symbol of the scene."""
+
+
+@dataclass(frozen=True)
+class SituationType:
+    """A property of an object type that is at once the class of its values.
+
+    `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
+    value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
+    `level` on; `rest` is the value that a refinement must restore; `default` is assumed where a scene says nothing.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    range: str
+    level: int = 1
+    rest: str | None = None
+    default: str | None = None
+    boolean: bool = False
+
+
+# ---------------------------------------------------------------------------------------------------------- conditions
+
+
+@dataclass(frozen=True)
+class ValueCondition:
+    """``situation(arguments) = value``; with an unbound variable as value it determines that variable.
+
+    A symbol that doesn't exist has no value: the condition is then false, and its negation true.
+    """
+
+    situation: str
+    arguments: tuple[str, ...]
+    value: str
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class RelationCondition:
+    """A static relation holds between the arguments."""
+
+    relation: str
+    arguments: tuple[str, ...]
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class ClassCondition:
+    """The term is an individual of the class."""
+
+    term: str
+    kind: str
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class EqualityCondition:
+    """Both terms are the same individual."""
+
+    left: str
+    right: str
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Some individual of class `kind`, put in for `variable`, satisfies all `conditions`; negated: none does.
+
+    "The location is free" is ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
+    """
+
+    variable: str
+    kind: str
+    conditions: tuple[Condition, ...]
+    negated: bool = False
+
+
+@dataclass(frozen=True)
+class AnyOf:
+    """At least one alternative holds, each a conjunction; negated: none does. Binds nothing outside itself."""
+
+    alternatives: tuple[tuple[Condition, ...], ...]
+    negated: bool = False
+
+
+Condition: TypeAlias = "ValueCondition | RelationCondition | ClassCondition | EqualityCondition | Witness | AnyOf"
+
+
+@dataclass(frozen=True)
+class ValueEffect:
+    """``situation(arguments)`` becomes `value`, if all of `when` held before; variables in `when` are determined there."""
+
+    situation: str
+    arguments: tuple[str, ...]
+    value: str
+    when: tuple[Condition, ...] = ()
+
+
+# ---------------------------------------------------------------------------------------------------------- behaviours
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter (enumerated by quantification) or variable (determined by the state) with the class of its values.
+
+    `role` is the name under which a skill of `sim/` receives it, if it does.
+    """
+
+    name: str
+    kind: str
+    role: str | None = None
+
+
+@dataclass(frozen=True)
+class Behavior:
+    """A lifted behaviour. `skill` names what executes it, on the primitive level."""
+
+    name: str
+    level: int
+    parameters: tuple[Parameter, ...]
+    variables: tuple[Parameter, ...] = ()
+    preconditions: tuple[Condition, ...] = ()
+    effects: tuple[ValueEffect, ...] = ()
+    cost: float = 1.0
+    skill: str | None = None
+
+
+@dataclass(frozen=True, order=True)
+class GroundBehavior:
+    """A quantified behaviour with the ID that its level's numbering gives it."""
+
+    id: int
+    behavior: str
+    arguments: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return it as the paper's figures print it, e.g. ``22 B1_MOVE cup1 location7``."""
+        return " ".join((str(self.id), self.behavior, *self.arguments))
+
+
+@dataclass(frozen=True)
+class Domain:
+    """What can be the case and what can be done: situation types and behaviours, in declared order."""
+
+    situations: Mapping[str, SituationType]
+    behaviors: Mapping[str, Behavior]
+    first_ids: Mapping[int, int] = field(default_factory=dict)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """The levels that have behaviours, the most abstract first."""
+        return tuple(sorted({b.level for b in self.behaviors.values()}))
+
+    def at_level(self, level: int) -> tuple[Behavior, ...]:
+        """Return the behaviours of one level in declared order."""
+        return tuple(b for b in self.behaviors.values() if b.level == level)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene ready to be planned in.
+
+    Parameters
+    ----------
+    scene : str
+        IRI of the scene.
+    domain : Domain
+    classes : mapping of class to individuals
+        In declared order; superclasses include their subclasses' individuals.
+    relations : mapping of relation to set of tuples
+        Static facts.
+    initial : State
+        One value for every symbol.
+    goal : State
+        Values wanted of some symbols.
+    parents : mapping of class to its direct superclasses
+        For statistics that back off; the planner's search doesn't use it.
+    """
+
+    scene: str
+    domain: Domain
+    classes: Mapping[str, tuple[str, ...]]
+    relations: Mapping[str, frozenset[tuple[str, ...]]]
+    initial: State
+    goal: State
+    parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def id_of(self, behavior: str, arguments: tuple[str, ...]) -> int:
+        """Return the ID of a quantified behaviour without enumerating the others.
+
+        Behaviours count in declared order, then parameters in theirs, then individuals in theirs (PAPER.md section 4).
+        """
+        level = self.domain.behaviors[behavior].level
+        number = self.domain.first_ids.get(level, 0)
+        for other in self.domain.at_level(level):
+            rank, size = 0, 1
+            for position, parameter in enumerate(other.parameters):
+                members = self.classes.get(parameter.kind, ())
+                size *= len(members)
+                if other.name == behavior:
+                    rank = rank * len(members) + members.index(arguments[position])
+            if other.name == behavior:
+                return number + rank
+            number += size
+        raise KeyError(behavior)
