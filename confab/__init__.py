@@ -1,0 +1,1 @@
+"""Front desk: what a notebook imports, the command line, displays and reports."""

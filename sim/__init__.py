@@ -1,0 +1,1 @@
+"""Plan in, physical verdict out: the PyBullet world, robot, skills, perception and verification."""
