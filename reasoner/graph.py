@@ -1,0 +1,206 @@
+"""The knowledge graph: ontology files with all that they import, in one SPARQL store.
+
+Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read, never written here. Nothing is
+fetched from the network: an import is looked up in the catalog beside the file, then in the shipped one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import pyoxigraph as ox
+
+import ontology
+
+CORE = "https://w3id.org/confab/core#"
+BASE = "urn:confab:graph:"
+GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
+FORMATS = {
+    ".ttl": ox.RdfFormat.TURTLE,
+    ".nt": ox.RdfFormat.N_TRIPLES,
+    ".owl": ox.RdfFormat.RDF_XML,
+    ".rdf": ox.RdfFormat.RDF_XML,
+}
+PREFIXES = {
+    "": CORE,
+    "owl": "http://www.w3.org/2002/07/owl#",
+    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "skos": "http://www.w3.org/2004/02/skos/core#",
+    "xsd": "http://www.w3.org/2001/XMLSchema#",
+}
+
+Row = tuple[ox.NamedNode | ox.BlankNode | ox.Literal | None, ...]
+
+
+class KnowledgeError(ValueError):
+    """The knowledge that was given can't be used; the message says what, where, and what to do."""
+
+
+@dataclass
+class KnowledgeGraph:
+    """One scene with everything that it imports.
+
+    Attributes
+    ----------
+    scene : str
+        IRI of the scene's ontology.
+    store : pyoxigraph.Store
+        Named graphs as in `GRAPHS`.
+    files : mapping of ontology IRI to file
+        What was read into the graph `asserted`, the scene first.
+    prefixes : mapping of prefix to namespace
+        Those of SPARQL queries: the files' own, and `PREFIXES`.
+    """
+
+    scene: str
+    store: ox.Store = field(default_factory=ox.Store)
+    files: dict[str, Path] = field(default_factory=dict)
+    prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
+
+    def select(self, query: str, **bindings: str) -> list[Row]:
+        """Return the rows of a SELECT query; `bindings` put IRIs in for variables.
+
+        Raises
+        ------
+        KnowledgeError
+            The query is no SPARQL; the message has line and column.
+        """
+        answer = self.query(query, **bindings)
+        if not isinstance(answer, ox.QuerySolutions):
+            raise KnowledgeError("wanted a SELECT query with rows as its answer; CONSTRUCT, DESCRIBE and ASK give none")
+        return [tuple(row) for row in answer]
+
+    def query(
+        self, query: str, **bindings: str
+    ) -> ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean:
+        """Return what any SPARQL 1.1 query answers on the union of the graphs."""
+        try:
+            return self.store.query(
+                query,
+                prefixes=self.prefixes,
+                use_default_graph_as_union=True,
+                substitutions={ox.Variable(name): ox.NamedNode(iri) for name, iri in bindings.items()},
+            )
+        except SyntaxError as error:
+            raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
+
+    def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
+        """Add triples of IRIs to one of the named graphs."""
+        name = ox.NamedNode(BASE + graph)
+        self.store.extend(
+            ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples
+        )
+
+    @cached_property
+    def path(self) -> Path | None:
+        """The scene's own file, if it came from one."""
+        return self.files.get(self.scene)
+
+
+def load(source: str | Path) -> KnowledgeGraph:
+    """Load a scene with all that it imports, and its reach file if there is one.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a shipped scene, or a file in Turtle, N-Triples or RDF/XML.
+
+    Raises
+    ------
+    KnowledgeError
+        No such scene or file; syntax error with line and column; an import that no catalog knows.
+    """
+    path = scene_file(source)
+    scene = _ontology_iri(path)
+    graph = KnowledgeGraph(scene)
+    waiting = [(scene, path)]
+    places: dict[Path, dict[str, Path]] = {}
+    while waiting:
+        iri, file = waiting.pop(0)
+        if iri in graph.files:
+            continue
+        graph.files[iri] = file
+        read_into(graph, file, "asserted")
+        for imported in _imports(graph, iri):
+            if imported not in graph.files:
+                waiting.append((imported, _locate(imported, file, places)))
+    reach = path.with_name(f"{path.stem}.reach.ttl")
+    if reach.is_file():
+        read_into(graph, reach, "reach")
+    return graph
+
+
+def scene_file(source: str | Path) -> Path:
+    """Return the file that a scene's name or path stands for."""
+    shipped = ontology.scenes()
+    if str(source) in shipped:
+        return shipped[str(source)]
+    path = Path(source)
+    if path.is_file():
+        return path.resolve()
+    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)})")
+
+
+def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
+    """Read one file into a named graph of the store, and its prefixes into the graph's."""
+    form = FORMATS.get(file.suffix.lower())
+    if form is None:
+        raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
+    target = ox.NamedNode(BASE + name)
+    try:
+        parser = ox.parse(path=str(file), format=form, base_iri=file.as_uri())
+        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in parser)
+    except SyntaxError as error:
+        raise KnowledgeError(f"{file}: {error}") from error
+    except OSError as error:
+        raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
+    for prefix, namespace in parser.prefixes.items():
+        graph.prefixes.setdefault(prefix, namespace)
+
+
+def _ontology_iri(path: Path) -> str:
+    probe = KnowledgeGraph("")
+    read_into(probe, path, "asserted")
+    rows = probe.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
+    if len(rows) != 1 or not isinstance(rows[0][0], ox.NamedNode):
+        raise KnowledgeError(f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it")
+    return rows[0][0].value
+
+
+def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
+    rows = graph.select("SELECT ?import WHERE { ?ontology owl:imports ?import } ORDER BY ?import", ontology=iri)
+    return [row[0].value for row in rows if isinstance(row[0], ox.NamedNode)]
+
+
+def _locate(iri: str, importer: Path, read: dict[Path, dict[str, Path]]) -> Path:
+    """Return the file of an imported ontology: by the catalog beside the importer, by the shipped one, or beside it by name."""
+    beside = importer.with_name(ontology.CATALOG)
+    for catalog in (beside, ontology.ROOT / ontology.CATALOG):
+        if catalog not in read:
+            read[catalog] = _catalog(catalog)
+        if iri in read[catalog]:
+            found = read[catalog][iri]
+            if not found.is_file():
+                raise KnowledgeError(f"{catalog}: <{iri}> shall lie in {found}, which doesn't exist; mend the entry")
+            return found
+    for suffix in ontology.SUFFIXES:
+        path = importer.with_name(iri.rstrip("#/").rsplit("/", 1)[-1] + suffix)
+        if path.is_file():
+            return path
+    raise KnowledgeError(
+        f"{importer}: imports <{iri}>, which neither {beside} nor the shipped catalog knows; "
+        "put its file beside this one or name it in the catalog (nothing is fetched from the network)"
+    )
+
+
+def _catalog(path: Path) -> Mapping[str, Path]:
+    if not path.is_file():
+        return {}
+    try:
+        return ontology.catalog(path)
+    except ValueError as error:
+        raise KnowledgeError(str(error)) from error
