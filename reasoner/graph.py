@@ -18,6 +18,8 @@ import ontology
 CORE = "https://w3id.org/confab/core#"
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
+SCENE = ("asserted", "inferred", "reach")
+"""The graphs that a planning call starts from."""
 FORMATS = {
     ".ttl": ox.RdfFormat.TURTLE,
     ".nt": ox.RdfFormat.N_TRIPLES,
@@ -61,28 +63,28 @@ class KnowledgeGraph:
     files: dict[str, Path] = field(default_factory=dict)
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
 
-    def select(self, query: str, **bindings: str) -> list[Row]:
-        """Return the rows of a SELECT query; `bindings` put IRIs in for variables.
+    def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
+        """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
 
         Raises
         ------
         KnowledgeError
             The query is no SPARQL; the message has line and column.
         """
-        answer = self.query(query, **bindings)
+        answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError("wanted a SELECT query with rows as its answer; CONSTRUCT, DESCRIBE and ASK give none")
         return [tuple(row) for row in answer]
 
     def query(
-        self, query: str, **bindings: str
+        self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str
     ) -> ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean:
-        """Return what any SPARQL 1.1 query answers on the union of the graphs."""
+        """Return what any SPARQL 1.1 query answers on the union of some graphs."""
         try:
             return self.store.query(
                 query,
                 prefixes=self.prefixes,
-                use_default_graph_as_union=True,
+                default_graph=[ox.NamedNode(BASE + name) for name in graphs],
                 substitutions={ox.Variable(name): ox.NamedNode(iri) for name, iri in bindings.items()},
             )
         except SyntaxError as error:
@@ -91,9 +93,7 @@ class KnowledgeGraph:
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
         """Add triples of IRIs to one of the named graphs."""
         name = ox.NamedNode(BASE + graph)
-        self.store.extend(
-            ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples
-        )
+        self.store.extend(ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples)
 
     @cached_property
     def path(self) -> Path | None:
@@ -167,13 +167,17 @@ def _ontology_iri(path: Path) -> str:
     read_into(probe, path, "asserted")
     rows = probe.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
     if len(rows) != 1 or not isinstance(rows[0][0], ox.NamedNode):
-        raise KnowledgeError(f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it")
+        raise KnowledgeError(
+            f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it"
+        )
     return rows[0][0].value
 
 
 def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
-    rows = graph.select("SELECT ?import WHERE { ?ontology owl:imports ?import } ORDER BY ?import", ontology=iri)
-    return [row[0].value for row in rows if isinstance(row[0], ox.NamedNode)]
+    rows = graph.select(
+        "SELECT ?ontology ?import WHERE { ?ontology owl:imports ?import } ORDER BY ?import", ontology=iri
+    )
+    return [row[1].value for row in rows if isinstance(row[1], ox.NamedNode)]
 
 
 def _locate(iri: str, importer: Path, read: dict[Path, dict[str, Path]]) -> Path:

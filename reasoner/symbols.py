@@ -50,7 +50,7 @@ class Fact:
 
 
 State: TypeAlias = Mapping[Symbol, str]
-"""One value for every symbol of the scene."""
+"""One value for every symbol of the scene; a boolean symbol that is left out is `FALSE`."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +227,8 @@ class Problem:
         Values wanted of some symbols.
     parents : mapping of class to its direct superclasses
         For statistics that back off; the planner's search doesn't use it.
+    value_levels : mapping of individual to level
+        The first level on which a value exists, where that isn't 1.
     """
 
     scene: str
@@ -236,6 +238,12 @@ class Problem:
     initial: State
     goal: State
     parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    value_levels: Mapping[str, int] = field(default_factory=dict)
+
+    def values(self, symbol: Symbol, level: int) -> tuple[str, ...]:
+        """Return the values that a symbol can have on a level, in declared order."""
+        members = self.classes.get(self.domain.situations[symbol.situation].range, ())
+        return tuple(value for value in members if self.value_levels.get(value, 1) <= level)
 
     def id_of(self, behavior: str, arguments: tuple[str, ...]) -> int:
         """Return the ID of a quantified behaviour without enumerating the others.

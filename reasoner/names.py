@@ -1,0 +1,59 @@
+"""Short names for IRIs: the last part where that is unique in the scene, else with the ontology's name before it."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class Names:
+    """A one-to-one table of IRIs and short names.
+
+    >>> names = Names(["https://x.org/a#cup1", "https://x.org/b#cup1", "https://x.org/a#plate"])
+    >>> names.short("https://x.org/a#plate"), names.short("https://x.org/b#cup1")
+    ('plate', 'b:cup1')
+    >>> names.iri("a:cup1")
+    'https://x.org/a#cup1'
+    """
+
+    def __init__(self, iris: Iterable[str]) -> None:
+        by_local = defaultdict(list)
+        for iri in sorted(set(iris)):
+            by_local[local_name(iri)].append(iri)
+        self._iris: dict[str, str] = {}
+        for local, group in by_local.items():
+            for iri in group:
+                name = local if len(group) == 1 else f"{_ontology_name(iri)}:{local}"
+                self._iris[name if name not in self._iris else iri] = iri
+        self._names = {iri: name for name, iri in self._iris.items()}
+
+    def short(self, iri: str) -> str:
+        """Return the short name of an IRI; of one that the scene doesn't know, its last part."""
+        return self._names.get(iri) or local_name(iri)
+
+    def iri(self, name: str) -> str:
+        """Return the IRI behind a short name; raises `KeyError` if there is none."""
+        return self._iris[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether some IRI has this short name."""
+        return name in self._iris
+
+
+def local_name(iri: str) -> str:
+    """Return what stands behind the last ``#``, ``/`` or ``:`` of an IRI."""
+    return re.split(r"[#/:]", iri.rstrip("#/:"))[-1]
+
+
+def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
+    """Return ``; did you mean 'x'?`` for the known word that is nearest, or the hint, or nothing."""
+    candidates = sorted(set(known))
+    folded = {name.lower(): name for name in candidates}
+    found = get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+    return f"; did you mean '{folded[found[0]]}'?" if found else (f"; {hint}" if hint else "")
+
+
+def _ontology_name(iri: str) -> str:
+    return local_name(re.split(r"#", iri)[0]) if "#" in iri else local_name(iri.rsplit("/", 1)[0])

@@ -1,0 +1,510 @@
+"""From the knowledge graph to the values of `reasoner.symbols`: what is there, what can be done, what holds, what is wanted.
+
+The graph is read in a few large queries; their rows become nodes (subject → property → values), and the nodes become values:
+
+============================  ==============================================
+in the ontology               in `reasoner.symbols`
+============================  ==============================================
+``:SituationType``            `SituationType`
+``:Behavior``                 `Behavior`, its terms starting with ``?``
+``:AbsenceCondition``         a negated `Witness`
+``x valueProperty v``         the value of `Symbol` in `Problem.initial`
+``:goal`` of the ``:Task``    `Problem.goal`
+============================  ==============================================
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+from reasoner.graph import CORE, SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.names import Names, local_name, nearest
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
+KINDS = (
+    "SituationType",
+    "Behavior",
+    "Term",
+    "Condition",
+    "Effect",
+    "Level",
+    "Task",
+    "Relation",
+)  # of the schema's nodes
+
+SCHEMA = f"""
+SELECT DISTINCT ?node ?property ?value WHERE {{
+  VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
+  ?node a/rdfs:subClassOf* ?kind ; ?property ?value .
+}} ORDER BY ?node ?property ?value"""
+OWNERS = "SELECT ?class ?situation WHERE { ?class :hasSituationType ?situation } ORDER BY ?class ?situation"
+NOT_FUNCTIONAL = """
+SELECT DISTINCT ?situation WHERE {
+  ?situation :valueProperty ?property . FILTER NOT EXISTS { ?property a owl:FunctionalProperty }
+} ORDER BY ?situation"""
+FROM_LEVELS = "SELECT DISTINCT ?value ?level WHERE { ?value :fromLevel ?level } ORDER BY ?value"
+SUBCLASSES = f"""
+SELECT DISTINCT ?sub ?super WHERE {{
+  ?sub rdfs:subClassOf ?super . FILTER(isIRI(?sub) && isIRI(?super))
+  FILTER NOT EXISTS {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }} ?sub rdfs:subClassOf* ?kind }}
+}} ORDER BY ?sub ?super"""
+MEMBERS = """
+SELECT DISTINCT ?individual ?class ?index WHERE {
+  ?individual a owl:NamedIndividual, ?class .
+  FILTER(!STRSTARTS(STR(?class), STR(owl:)))
+  OPTIONAL { ?individual :index ?index }
+} ORDER BY ?individual ?class"""
+FACTS = """
+SELECT DISTINCT ?subject ?property ?object WHERE {
+  { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation }
+  ?subject ?property ?object .
+} ORDER BY ?subject ?property ?object"""
+TUPLES = """
+SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property ?value"""
+
+Node = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A scene as the planner takes it, with the table that leads from its names back to IRIs."""
+
+    problem: Problem
+    names: Names
+
+
+def read(graph: KnowledgeGraph) -> Reading:
+    """Read the planning problem out of a knowledge graph.
+
+    Raises
+    ------
+    KnowledgeError
+        An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
+    """
+    nodes = _nodes(graph.select(SCHEMA, SCENE))
+    tuples = _nodes(graph.select(TUPLES, SCENE))
+    facts = [_iris(row) for row in graph.select(FACTS, SCENE)]
+    supers = _superclasses(_iris(row) for row in graph.select(SUBCLASSES, SCENE))
+    members = [
+        (row[0].value, row[1].value, _number(row[2])) for row in graph.select(MEMBERS, SCENE) if row[0] and row[1]
+    ]  # type: ignore[union-attr]
+    owners = [_iris(row) for row in graph.select(OWNERS, SCENE)]
+    pairs = {row[0].value for row in graph.select(NOT_FUNCTIONAL, SCENE) if row[0]}  # type: ignore[union-attr]
+    from_levels = {row[0].value: _number(row[1]) for row in graph.select(FROM_LEVELS, SCENE) if row[0]}  # type: ignore[union-attr]
+
+    instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
+    terms = {iri for iri, node in nodes.items() if _is(node, "Parameter", "Variable")}
+    named = {iri for iri, node in nodes.items() if _is(node, "SituationType", "Behavior", "Relation", "ReachRelation")}
+    names = Names(
+        named
+        | {i for i, _, _ in instances}
+        | {k for _, k, _ in instances}
+        | {s for pair in supers.items() for s in (pair[0], *pair[1])}
+    )
+    schema = _Schema(nodes, names, terms, pairs)
+
+    classes, parents = _classes(instances, supers, names)
+    situations, properties = _situations(schema, owners, classes)
+    behaviors = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=lambda iri: schema.number(iri, "level"))
+    domain = Domain(
+        situations={s.name: s for s in situations},
+        behaviors={names.short(iri): schema.behavior(iri) for iri in behaviors},
+        first_ids={schema.number(iri, "level"): schema.number(iri, "firstId", 0) for iri in schema.of_kind("Level")},
+    )
+    relations, stated = _facts(facts, tuples, properties, domain, names)
+    initial = _initial(domain, classes, stated, names)
+    levels = {names.short(iri): level for iri, level in from_levels.items() if iri not in nodes}
+    problem = Problem(graph.scene, domain, classes, relations, initial, {}, parents, levels)
+    return Reading(_with_goal(problem, schema), names)
+
+
+def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
+    """Return the problem with some goals replaced, each written like ``cup2 LOCATION location8``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind, or the object doesn't have the situation type.
+    """
+    problem = reading.problem
+    changed = dict(problem.goal)
+    for text in goals:
+        symbol, value = parse_fact(problem, text)
+        changed[symbol] = value
+    return replace(problem, goal=dict(sorted(changed.items())))
+
+
+def parse_fact(problem: Problem, text: str) -> tuple[Symbol, str]:
+    """Return symbol and value of a fact written as ``object SITUATION [argument …] value``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind; the message has the nearest known name.
+    """
+    words = text.split()
+    individuals = {name for members in problem.classes.values() for name in members}
+    if len(words) < 2:
+        raise KnowledgeError(f"'{text}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
+    about, name, *rest = words
+    if about not in individuals:
+        raise KnowledgeError(f"unknown individual '{about}' in '{text}'{nearest(about, individuals)}")
+    if name not in problem.domain.situations:
+        known = problem.domain.situations
+        raise KnowledgeError(
+            f"unknown situation type '{name}' in '{text}'{nearest(name, known)} (known: {', '.join(known)})"
+        )
+    situation = problem.domain.situations[name]
+    if situation.boolean and len(rest) == len(situation.arguments) - 1:
+        rest.append(TRUE)
+    if len(rest) != len(situation.arguments):
+        raise KnowledgeError(f"'{text}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
+    for kind, word in zip((*situation.arguments[1:], situation.range), rest, strict=True):
+        if word not in individuals and word not in (TRUE, FALSE):
+            raise KnowledgeError(
+                f"unknown individual '{word}' in '{text}'{nearest(word, problem.classes.get(kind, ()))}"
+            )
+        if word not in problem.classes.get(kind, ()):
+            raise KnowledgeError(
+                f"'{text}': {word} is no value of {name}; values: {_some(problem.classes.get(kind, ()))}"
+            )
+    symbol = Symbol(name, (about, *rest[:-1]))
+    if about not in problem.classes.get(situation.arguments[0], ()):
+        raise KnowledgeError(f"'{text}': {about} has no {name}, since it is no {situation.arguments[0]}")
+    return symbol, rest[-1]
+
+
+# ------------------------------------------------------------------------------------------------------- from rows to nodes
+
+
+def _nodes(rows: Iterable[Sequence[object]]) -> dict[str, dict[str, list[str]]]:
+    nodes: dict[str, dict[str, list[str]]] = {}
+    for subject, predicate, value in rows:
+        node = nodes.setdefault(subject.value, {})  # type: ignore[attr-defined]
+        node.setdefault(predicate.value, []).append(value.value)  # type: ignore[attr-defined]
+    return nodes
+
+
+def _iris(row: Sequence[object]) -> tuple[str, ...]:
+    return tuple(term.value for term in row)  # type: ignore[attr-defined]
+
+
+def _number(term: object) -> int:
+    return FIRST_INDEX_OF_NONE if term is None else int(term.value)  # type: ignore[attr-defined]
+
+
+def _is(node: Node, *kinds: str) -> bool:
+    types = node["http://www.w3.org/1999/02/22-rdf-syntax-ns#type"]
+    return any(CORE + kind in types for kind in kinds)
+
+
+def _ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> list[str]:
+    """Return nodes by their index, then by name."""
+
+    def key(iri: str) -> tuple[int, str]:
+        index = nodes[iri].get(CORE + "index")
+        return (int(index[0]) if index else FIRST_INDEX_OF_NONE, names.short(iri))
+
+    return sorted(iris, key=key)
+
+
+def _superclasses(pairs: Iterable[tuple[str, ...]]) -> dict[str, list[str]]:
+    supers: dict[str, list[str]] = defaultdict(list)
+    for sub, sup in pairs:
+        if sub != sup:
+            supers[sub].append(sup)
+    return dict(supers)
+
+
+def _classes(
+    instances: Sequence[tuple[str, str, int]], supers: Mapping[str, Sequence[str]], names: Names
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Return the individuals of each class in declared order, superclasses included, and each class's direct superclasses."""
+    above: dict[str, frozenset[str]] = {}
+
+    def closure(kind: str) -> frozenset[str]:
+        if kind not in above:
+            found, waiting = {kind}, [kind]
+            while waiting:
+                for sup in supers.get(waiting.pop(), ()):
+                    if sup not in found:
+                        found.add(sup)
+                        waiting.append(sup)
+            above[kind] = frozenset(found)
+        return above[kind]
+
+    members: dict[str, dict[str, int]] = defaultdict(dict)
+    for individual, kind, index in instances:
+        for sup in closure(kind):
+            members[names.short(sup)][names.short(individual)] = index
+    for kind in {*supers, *(s for group in supers.values() for s in group)}:
+        members.setdefault(names.short(kind), {})
+    classes = {
+        kind: tuple(sorted(group, key=lambda name: (group[name], name))) for kind, group in sorted(members.items())
+    }
+    return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
+
+
+# ------------------------------------------------------------------------------------------------------ from nodes to values
+
+
+@dataclass(frozen=True)
+class _Schema:
+    """The nodes of behaviours, conditions and situation types, read as values."""
+
+    nodes: Mapping[str, Node]
+    names: Names
+    terms: set[str]
+    pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
+
+    def of_kind(self, kind: str) -> list[str]:
+        return [iri for iri, node in self.nodes.items() if _is(node, kind)]
+
+    def values(self, iri: str, name: str) -> Sequence[str]:
+        return self.nodes.get(iri, {}).get(CORE + name, ())
+
+    def one(self, iri: str, name: str) -> str:
+        found = self.values(iri, name)
+        if len(found) != 1:
+            raise KnowledgeError(f"<{iri}>: wanted one :{name}, found {len(found)}; state it in the ontology")
+        return found[0]
+
+    def number(self, iri: str, name: str, default: int | None = None) -> int:
+        found = self.values(iri, name)
+        return default if not found and default is not None else int(self.one(iri, name))
+
+    def flag(self, iri: str, name: str) -> bool:
+        return list(self.values(iri, name)) in (["true"], ["1"])
+
+    def term(self, iri: str) -> str:
+        """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
+        return "?" + local_name(iri).rsplit(".", 1)[-1] if iri in self.terms else self.names.short(iri)
+
+    def parameter(self, iri: str) -> Parameter:
+        return Parameter(self.term(iri), self.names.short(self.one(iri, "termType")))
+
+    def arguments(self, iri: str) -> tuple[str, ...]:
+        names = ("about", *(f"argument{position}" for position in range(2, 10)))
+        return tuple(self.term(value) for name in names for value in self.values(iri, name)[:1])
+
+    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+        situation = self.one(iri, "situationType")
+        arguments = self.arguments(iri)
+        value = [self.term(v) for v in self.values(iri, "value")]
+        if situation in self.pairs:
+            arguments, value = (*arguments, *value), []
+        return self.names.short(situation), arguments, value[0] if value else TRUE
+
+    def condition(self, iri: str) -> Condition:
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
+        node, negated = self.nodes[iri], self.flag(iri, "negated")
+        if _is(node, "ValueCondition"):
+            return ValueCondition(*self.situation_and_value(iri), negated)
+        if _is(node, "RelationCondition"):
+            arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
+            return RelationCondition(self.names.short(self.one(iri, "relation")), arguments, negated)
+        if _is(node, "ClassCondition"):
+            return ClassCondition(
+                self.term(self.one(iri, "about")), self.names.short(self.one(iri, "ofClass")), negated
+            )
+        if _is(node, "EqualityCondition"):
+            return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
+        if _is(node, "AbsenceCondition"):
+            name, _, value = self.situation_and_value(iri)
+            anyone = "?anyone"
+            inner = ValueCondition(name, (anyone,), value)
+            return Witness(anyone, self.names.short(self.one(iri, "ofClass")), (inner,), not negated)
+        if _is(node, "Witness"):
+            variable = self.parameter(self.one(iri, "witness"))
+            return Witness(variable.name, variable.kind, self.conditions(iri, "condition"), negated)
+        if _is(node, "AnyOf"):
+            groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
+            return AnyOf(tuple(groups), negated)
+        raise KnowledgeError(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+
+    def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
+        return tuple(self.condition(value) for value in self.values(iri, name))
+
+    def group(self, iri: str) -> tuple[Condition, ...]:
+        if iri in self.nodes and _is(self.nodes[iri], "AllOf"):
+            return self.conditions(iri, "condition")
+        return (self.condition(iri),)
+
+    def effect(self, iri: str) -> ValueEffect:
+        situation, arguments, value = self.situation_and_value(iri)
+        if self.flag(iri, "negated"):
+            value = FALSE
+        return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
+
+    def behavior(self, iri: str) -> Behavior:
+        parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
+        used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
+        cost = self.values(iri, "cost")
+        return Behavior(
+            name=self.names.short(iri),
+            level=self.number(iri, "level"),
+            parameters=parameters,
+            variables=tuple(map(self.parameter, used)),
+            preconditions=self.conditions(iri, "precondition"),
+            effects=tuple(self.effect(value) for value in self.values(iri, "postcondition")),
+            cost=float(cost[0]) if cost else 1.0,
+        )
+
+    def terms_below(self, iri: str) -> set[str]:
+        """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
+        found, bound, waiting, seen = set(), set(), [iri], {iri}
+        while waiting:
+            node = waiting.pop()
+            bound.update(self.values(node, "witness"))
+            for values in self.nodes.get(node, {}).values():
+                for value in values:
+                    if value in self.terms:
+                        found.add(value)
+                    elif value in self.nodes and value not in seen and _is_part(self.nodes[value]):
+                        seen.add(value)
+                        waiting.append(value)
+        return found - bound
+
+
+def _is_part(node: Node) -> bool:
+    return not _is(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level")
+
+
+def _situations(
+    schema: _Schema, owners: Sequence[tuple[str, ...]], classes: dict[str, tuple[str, ...]]
+) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
+    """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
+    found, properties = [], {}
+    for iri in sorted(schema.of_kind("SituationType"), key=schema.names.short):
+        name = schema.names.short(iri)
+        owning = [schema.names.short(kind) for kind, situation in owners if situation == iri]
+        parameters = [
+            schema.parameter(p) for p in _ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)
+        ]
+        arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
+        value_property = schema.values(iri, "valueProperty")
+        boolean = set(classes.get(name, ())) <= {TRUE, FALSE}
+        if iri in schema.pairs:
+            arguments, boolean = (*arguments, name), True
+        for iri_of_property in value_property:
+            properties[iri_of_property] = (name, iri in schema.pairs)
+        rest = schema.values(iri, "restValue")
+        default = schema.values(iri, "defaultValue") or rest
+        found.append(
+            SituationType(
+                name=name,
+                arguments=arguments,
+                range="Truth" if boolean else name,
+                level=schema.number(iri, "fromLevel", 1),
+                rest=schema.term(rest[0]) if rest else None,
+                default=schema.term(default[0]) if default else (FALSE if boolean else None),
+                boolean=boolean,
+            )
+        )
+    return found, properties
+
+
+def _union(kinds: Sequence[str], classes: dict[str, tuple[str, ...]]) -> str:
+    """Return the class of all individuals of several classes, made if there is more than one."""
+    name = "|".join(kinds)
+    if name not in classes:
+        classes[name] = tuple(dict.fromkeys(member for kind in kinds for member in classes.get(kind, ())))
+    return name
+
+
+def _facts(
+    rows: Iterable[tuple[str, ...]],
+    tuples: Mapping[str, Node],
+    properties: Mapping[str, tuple[str, bool]],
+    domain: Domain,
+    names: Names,
+) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
+    """Return the static relations, and the values that the scene states of each symbol."""
+    relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+    stated: dict[Symbol, set[str]] = defaultdict(set)
+    for subject, predicate, value in rows:
+        pair = (names.short(subject), names.short(value))
+        if predicate not in properties:
+            relations[names.short(predicate)].add(pair)
+            continue
+        situation, boolean = properties[predicate]
+        if boolean:
+            stated[Symbol(situation, pair)].add(TRUE)
+        else:
+            stated[Symbol(situation, pair[:1])].add(pair[1])
+    facts = _Schema(tuples, names, set(), set())
+    for iri, node in tuples.items():
+        if CORE + "relation" in node:
+            tail = [names.short(v) for v in facts.values(iri, "value")]
+            relations[names.short(facts.one(iri, "relation"))].add((*facts.arguments(iri), *tail))
+        else:
+            value = facts.values(iri, "value")
+            symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
+            stated[symbol].add(names.short(value[0]) if value else TRUE)
+    for symbol in stated:
+        if symbol.situation not in domain.situations:
+            raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+    return {name: frozenset(pairs) for name, pairs in sorted(relations.items())}, stated
+
+
+def _initial(
+    domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
+) -> dict[Symbol, str]:
+    initial = {}
+    for situation in domain.situations.values():
+        if situation.boolean:
+            continue
+        for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
+            symbol = Symbol(situation.name, arguments)
+            values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
+            if len(values) != 1:
+                what = f"several values ({', '.join(values)})" if values else "no value"
+                raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
+            initial[symbol] = values[0]
+    initial |= {s: v for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE}
+    return initial
+
+
+def _with_goal(problem: Problem, schema: _Schema) -> Problem:
+    goal: dict[Symbol, str] = {}
+    for task in schema.of_kind("Task"):
+        for iri in schema.values(task, "goal"):
+            wanted = schema.condition(iri)
+            if not isinstance(wanted, ValueCondition):
+                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition")
+            symbol = Symbol(wanted.situation, wanted.arguments)
+            value = FALSE if wanted.negated and wanted.value == TRUE else wanted.value
+            if goal.setdefault(symbol, value) != value:
+                raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
+            if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
+                raise KnowledgeError(
+                    f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
+                )
+    return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _some(names: Sequence[str], most: int = 12) -> str:
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")
