@@ -1,0 +1,105 @@
+"""Tables of small integers and their joins, which is what grounding spends its time on.
+
+A `Table` is append-only, so that "what was known before this round" is a prefix of its rows: semi-naive evaluation needs no
+second table. An index sorts the rows by some columns once per size of the table; a match is then a binary search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+
+class TooLarge(Exception):
+    """A join would have more rows than allowed; the message says how many."""
+
+
+class Table:
+    """Distinct rows of integers in [0, radix), in the order in which they came."""
+
+    def __init__(self, arity: int, radix: int) -> None:
+        self.arity, self.radix = arity, radix
+        self.rows: Ints = np.empty((0, arity), np.int64)
+        self._indices: dict[tuple[int, ...], tuple[int, NDArray[np.generic], Ints]] = {}
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def add(self, rows: Ints) -> None:
+        """Append those of the rows that aren't there yet, each once."""
+        if not len(rows):
+            return
+        keys = pack(rows, self.radix)
+        _, first = np.unique(keys, return_index=True)
+        new = rows[first]
+        if len(self):
+            new = new[self.find(new) < 0]
+        if len(new):
+            self.rows = np.concatenate([self.rows, new])
+
+    def find(self, rows: Ints) -> Ints:
+        """Return the position of each row, -1 where it isn't in the table."""
+        keys, order = self._index(tuple(range(self.arity)))
+        if not len(order):
+            return np.full(len(rows), -1)
+        wanted = pack(rows, self.radix)
+        places = np.minimum(np.searchsorted(keys, wanted), len(order) - 1)
+        return np.where(keys[places] == wanted, order[places], -1)
+
+    def match(self, columns: Sequence[int], values: Ints, most: int) -> tuple[Ints, Ints]:
+        """Return all pairs (row of `values`, row of this table) that agree on `columns`.
+
+        Raises
+        ------
+        TooLarge
+            There are more than `most` pairs.
+        """
+        if not columns:
+            if len(values) * len(self) > most:
+                raise TooLarge(f"{len(values) * len(self)} combinations, more than the {most} allowed")
+            left = np.repeat(np.arange(len(values)), len(self))
+            return left, np.tile(np.arange(len(self)), len(values))
+        keys, order = self._index(tuple(columns))
+        wanted = pack(values, self.radix)
+        low = np.searchsorted(keys, wanted, "left")
+        counts = np.searchsorted(keys, wanted, "right") - low
+        total = int(counts.sum())
+        if total > most:
+            raise TooLarge(f"{total} combinations, more than the {most} allowed")
+        left = np.repeat(np.arange(len(values)), counts)
+        ends = np.cumsum(counts)
+        places = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(low, counts)
+        return left, order[places]
+
+    def _index(self, columns: tuple[int, ...]) -> tuple[NDArray[np.generic], Ints]:
+        """Return the rows' keys on some columns in order, and whose they are."""
+        size, keys, order = self._indices.get(columns, (-1, self.rows[:0, 0], self.rows[:0, 0]))
+        if size != len(self):
+            unsorted = pack(self.rows[:, columns], self.radix)
+            order = np.argsort(unsorted, kind="stable")
+            keys = unsorted[order]
+            self._indices[columns] = (len(self), keys, order)
+        return keys, order
+
+
+def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
+    """Return one key per row, equal where the rows are and in their lexicographic order.
+
+    An integer where the row fits into 63 bits, else its bytes, most significant first.
+
+    >>> pack(np.array([[1, 2], [0, 3]]), 10).tolist()
+    [12, 3]
+    """
+    arity = rows.shape[1]
+    if arity == 0:
+        return np.zeros(len(rows), np.int64)
+    if radix**arity < 2**63:
+        keys = rows[:, 0].astype(np.int64)
+        for column in range(1, arity):
+            keys = keys * radix + rows[:, column]
+        return keys
+    return np.ascontiguousarray(rows.astype(">u4")).view(f"S{4 * arity}").ravel()

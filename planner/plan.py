@@ -1,0 +1,124 @@
+"""The values at the planner's door: a plan as a tree of steps, and the outcome of a planning call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from reasoner.symbols import Fact, State
+
+
+class Status(Enum):
+    """How a planning call ended."""
+
+    SOLVED = "solved"
+    UNSOLVABLE = "unsolvable"  # proved: no plan exists
+    GAVE_UP = "gave-up"  # a limit came first
+
+
+@dataclass(frozen=True)
+class Step:
+    """One behaviour of a plan, with the steps of the next level that refine it.
+
+    `path` is the position in the tree; `bindings` are the individuals that the situation gave to the behaviour's variables
+    (what GRASP grasps); `rank` is the cogency ranking score c_m of eq. (4) with which it was chosen, where one was computed.
+    """
+
+    path: tuple[int, ...]
+    id: int
+    level: int
+    behavior: str
+    arguments: tuple[str, ...]
+    bindings: Mapping[str, str] = field(default_factory=dict)
+    rank: float | None = None
+    steps: tuple[Step, ...] = ()
+
+    def walk(self) -> Iterator[Step]:
+        """Yield this step and all below it, each before its sub-steps."""
+        yield self
+        for step in self.steps:
+            yield from step.walk()
+
+    def __str__(self) -> str:
+        """Return the step as the paper's figures print it, e.g. ``22 B1_MOVE cup1 location7``."""
+        return " ".join((str(self.id), self.behavior, *self.arguments))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A tree of steps that leads from one state to the goal."""
+
+    steps: tuple[Step, ...]
+
+    def walk(self) -> Iterator[Step]:
+        """Yield all steps, each before its sub-steps."""
+        for step in self.steps:
+            yield from step.walk()
+
+    def at_level(self, level: int) -> tuple[Step, ...]:
+        """Return the steps of one level in the order of execution."""
+        return tuple(step for step in self.walk() if step.level == level)
+
+    @property
+    def primitives(self) -> tuple[Step, ...]:
+        """The steps without sub-steps, which is what a robot executes."""
+        return tuple(step for step in self.walk() if not step.steps)
+
+    @property
+    def length(self) -> dict[int, int]:
+        """Number of steps per level."""
+        levels = [step.level for step in self.walk()]
+        return {level: levels.count(level) for level in sorted(set(levels))}
+
+
+@dataclass
+class Counts:
+    """What a search did: nodes generated, evaluated (scored) and expanded."""
+
+    generated: int = 0
+    evaluated: int = 0
+    expanded: int = 0
+
+    def add(self, other: Counts) -> None:
+        """Add the counts of another search."""
+        self.generated += other.generated
+        self.evaluated += other.evaluated
+        self.expanded += other.expanded
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why there is no plan: a sentence, and the facts or terms that it names."""
+
+    text: str
+    terms: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a planning call ended, and with what.
+
+    `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
+    calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it.
+    """
+
+    status: Status
+    plan: Plan | None = None
+    reason: Reason | None = None
+    search: Mapping[int, Counts] = field(default_factory=dict)
+    fallbacks: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where a planning call stops: expansions per search, and seconds for the whole call (None: no limit)."""
+
+    expansions: int = 200_000
+    seconds: float | None = None
+
+
+def changed(before: State, after: State) -> list[Fact]:
+    """Return the facts of `after` that `before` doesn't have, in order."""
+    return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)
