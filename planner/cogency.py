@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from reasoner.links import Conclusion, Links
 from reasoner.symbols import Problem, State, Symbol
-
-Conclusion = tuple[str, tuple[str, ...]]
-"""A quantified behaviour: its name and arguments."""
-
 
 @dataclass(frozen=True)
 class PaperConstants:
@@ -32,47 +29,6 @@ class PaperConstants:
 
 
 PAPER = PaperConstants()
-
-
-@dataclass
-class Links:
-    """The knowledge links p(fact | behaviour) of one memory.
-
-    `tables` has a distribution over values per conclusion and symbol of which something was learned. Only `reinforce`
-    changes it.
-    """
-
-    tables: dict[Conclusion, dict[Symbol, dict[str, float]]] = field(default_factory=dict)
-
-    def probability(self, conclusion: Conclusion, symbol: Symbol, value: str, values: Sequence[str]) -> float:
-        """Return p(<o, s> | b); uniform over `values` if nothing was learned of it."""
-        table = self.tables.get(conclusion, {}).get(symbol)
-        if table is None:
-            return 1.0 / len(values) if values else 1.0
-        return table.get(value, 0.0)
-
-    def reinforce(self, conclusion: Conclusion, state: State, problem: Problem, level: int, learning: float) -> None:
-        """Apply eq. (2): raise p of the facts that hold by λ, then normalise each symbol's distribution.
-
-        Parameters
-        ----------
-        conclusion : Conclusion
-            The behaviour that was planned and executed successfully.
-        state : State
-            The situation in which it was chosen.
-        problem : Problem
-            Gives the values that each symbol can have.
-        level : int
-            Symbols and values of higher levels aren't part of the situation.
-        learning : float
-            λ of eq. (2).
-        """
-        symbols = self.tables.setdefault(conclusion, {})
-        for symbol, value, values in situation(state, problem, level):
-            old = symbols.get(symbol) or dict.fromkeys(values, 1.0 / len(values))
-            raised = {v: p + (learning if v == value else 0.0) for v, p in old.items()}
-            total = sum(raised.values())
-            symbols[symbol] = {v: p / total for v, p in raised.items()}
 
 
 def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, str, tuple[str, ...]]]:

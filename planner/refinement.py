@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from planner.behaviors import Applied, Model, Values, ground
-from planner.cogency import PAPER, Links, PaperConstants, cogencies, ranking
+from planner.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step
 from planner.search import Found, Goal, a_star
+from reasoner.links import Links
 from reasoner.symbols import GroundBehavior, Problem
 
 Forbidden = set[tuple[Values, GroundBehavior]]

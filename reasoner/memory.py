@@ -1,0 +1,141 @@
+"""The confabulation memory on disk: knowledge links as annotated axioms of a Turtle file that imports the scene.
+
+Each link is a triple ``quantified behaviour :associatedWith situated object instance`` and an ``owl:Axiom`` that annotates it with
+``:probability``. Protégé opens the file and shows the number beside the assertion. The file is the memory's own: no file that
+people edit is ever rewritten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph import CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into
+from reasoner.links import Links
+from reasoner.names import Names, local_name
+from reasoner.symbols import FALSE, TRUE, Symbol
+
+ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
+ASSERTED = """
+SELECT DISTINCT ?node ?property ?value WHERE {
+  VALUES ?kind { :GroundBehavior :SituatedObjectInstance } ?node a ?kind ; ?property ?value
+} ORDER BY ?node ?property ?value"""
+ANNOTATED = """
+SELECT ?behavior ?fact ?probability WHERE {
+  ?axiom owl:annotatedProperty :associatedWith ; owl:annotatedSource ?behavior ; owl:annotatedTarget ?fact ;
+    :probability ?probability .
+} ORDER BY ?behavior ?fact"""
+
+
+def load_links(path: Path, names: Names) -> Links:
+    """Read the links of a memory file.
+
+    Parameters
+    ----------
+    path : Path
+    names : Names
+        The scene's names; links about terms that it doesn't have are kept under their last part.
+
+    Raises
+    ------
+    KnowledgeError
+        The file isn't Turtle, or a link lacks its behaviour or fact; the message says which.
+    """
+    graph = KnowledgeGraph("")
+    if not path.is_file():
+        raise KnowledgeError(f"{path}: no such memory file")
+    read_into(graph, path, "memory")
+    nodes: dict[str, dict[str, str]] = {}
+    for subject, predicate, value in graph.select(ASSERTED):
+        nodes.setdefault(_text(subject), {})[_text(predicate).removeprefix(CORE)] = _text(value)
+    links = Links()
+    for behavior, fact, probability in graph.select(ANNOTATED):
+        try:
+            source, target = nodes[_text(behavior)], nodes[_text(fact)]
+            conclusion = (names.short(source["behavior"]), _arguments(source, names))
+            symbol = Symbol(names.short(target["situationType"]), _arguments(target, names))
+            value, p = names.short(target["value"]), float(_text(probability))
+        except (KeyError, ValueError) as error:
+            raise KnowledgeError(f"{path}: the link {_text(behavior)} → {_text(fact)} isn't whole: {error}") from error
+        links.tables.setdefault(conclusion, {}).setdefault(symbol, {})[value] = p
+    return links
+
+
+def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
+    """Write the links to a memory file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    links : Links
+    names : Names
+        The scene's names, to lead back to IRIs.
+    scene : str
+        IRI of the scene, which the file imports.
+    """
+    iri = f"{scene.rstrip('#/')}.memory"
+    prefixes = {**{p: PREFIXES[p] for p in ("owl", "rdfs", "xsd")}, "": CORE, "m": iri + "#"}
+    triples = list(_triples(links, names, scene, iri))
+    write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
+
+
+def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Triple]:
+    owl, rdf = PREFIXES["owl"], PREFIXES["rdf"]
+
+    def node(name: str) -> ox.NamedNode:
+        return ox.NamedNode(name)
+
+    def of(name: str) -> ox.NamedNode:
+        return node(CORE + name) if name in (TRUE, FALSE) else node(names.iri(name) if name in names else CORE + name)
+
+    def described(subject: ox.NamedNode, kind: str, parts: dict[str, ox.NamedNode]) -> Iterator[ox.Triple]:
+        yield ox.Triple(subject, node(rdf + "type"), node(owl + "NamedIndividual"))
+        yield ox.Triple(subject, node(rdf + "type"), node(CORE + kind))
+        for name, value in parts.items():
+            yield ox.Triple(subject, node(CORE + name), value)
+
+    yield ox.Triple(node(iri), node(rdf + "type"), node(owl + "Ontology"))
+    yield ox.Triple(node(iri), node(owl + "imports"), node(scene))
+    facts: dict[ox.NamedNode, tuple[Symbol, str]] = {}
+    axioms = []
+    for conclusion, symbols in sorted(links.tables.items()):
+        behavior, arguments = conclusion
+        source = node(f"{iri}#{_readable(behavior, *arguments)}")
+        parts = {"behavior": of(behavior), **dict(zip(ARGUMENTS, map(of, arguments), strict=False))}
+        yield from described(source, "GroundBehavior", parts)
+        for symbol, table in sorted(symbols.items()):
+            for value, probability in sorted(table.items()):
+                fact = node(f"{iri}#{_readable(symbol.situation, *symbol.arguments, value)}")
+                facts[fact] = (symbol, value)
+                yield ox.Triple(source, node(CORE + "associatedWith"), fact)
+                axioms.append((source, fact, probability))
+    for fact, (symbol, value) in facts.items():
+        parts = {
+            "situationType": of(symbol.situation),
+            **dict(zip(ARGUMENTS, map(of, symbol.arguments), strict=False)),
+            "value": of(value),
+        }
+        yield from described(fact, "SituatedObjectInstance", parts)
+    for number, (source, fact, probability) in enumerate(axioms):
+        axiom = ox.BlankNode(f"link{number}")
+        yield ox.Triple(axiom, node(rdf + "type"), node(owl + "Axiom"))
+        yield ox.Triple(axiom, node(owl + "annotatedSource"), source)
+        yield ox.Triple(axiom, node(owl + "annotatedProperty"), node(CORE + "associatedWith"))
+        yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
+        yield ox.Triple(axiom, node(CORE + "probability"), ox.Literal(probability))
+
+
+def _readable(*words: str) -> str:
+    return ".".join(word.replace(":", "-") for word in words)
+
+
+def _arguments(node: dict[str, str], names: Names) -> tuple[str, ...]:
+    return tuple(names.short(node[name]) for name in ARGUMENTS if name in node)
+
+
+def _text(term: object) -> str:
+    value = getattr(term, "value", None)
+    return str(value) if value is not None else local_name(str(term))
