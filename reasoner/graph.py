@@ -26,6 +26,7 @@ FORMATS = {
     ".owl": ox.RdfFormat.RDF_XML,
     ".rdf": ox.RdfFormat.RDF_XML,
 }
+NO_ROWS = "wanted a SELECT query, whose answer is rows; CONSTRUCT, DESCRIBE and ASK give none"
 PREFIXES = {
     "": CORE,
     "owl": "http://www.w3.org/2002/07/owl#",
@@ -73,8 +74,20 @@ class KnowledgeGraph:
         """
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
-            raise KnowledgeError("wanted a SELECT query with rows as its answer; CONSTRUCT, DESCRIBE and ASK give none")
+            raise KnowledgeError(NO_ROWS)
         return [tuple(row) for row in answer]
+
+    def table(self, query: str) -> tuple[tuple[str, ...], list[Row]]:
+        """Return columns and rows of a SELECT query on the union of the graphs; errors as in `select`."""
+        answer = self.query(query)
+        if not isinstance(answer, ox.QuerySolutions):
+            raise KnowledgeError(NO_ROWS)
+        return tuple(variable.value for variable in answer.variables), [tuple(row) for row in answer]
+
+    def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
+        """Return the triples of some graphs as N-Triples."""
+        triples = {q.triple for name in graphs for q in self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name))}
+        return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
 
     def query(
         self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str

@@ -44,10 +44,7 @@ def load_links(path: Path, names: Names) -> Links:
     KnowledgeError
         The file isn't Turtle, or a link lacks its behaviour or fact; the message says which.
     """
-    graph = KnowledgeGraph("")
-    if not path.is_file():
-        raise KnowledgeError(f"{path}: no such memory file")
-    read_into(graph, path, "memory")
+    graph = _graph(path)
     nodes: dict[str, dict[str, str]] = {}
     for subject, predicate, value in graph.select(ASSERTED):
         nodes.setdefault(_text(subject), {})[_text(predicate).removeprefix(CORE)] = _text(value)
@@ -62,6 +59,22 @@ def load_links(path: Path, names: Names) -> Links:
             raise KnowledgeError(f"{path}: the link {_text(behavior)} → {_text(fact)} isn't whole: {error}") from error
         links.tables.setdefault(conclusion, {}).setdefault(symbol, {})[value] = p
     return links
+
+
+def memory_names(path: Path) -> tuple[str, Names]:
+    """Return the scene that a memory file imports, and short names for the terms that it speaks of.
+
+    Raises
+    ------
+    KnowledgeError
+        The file is missing, isn't Turtle, or imports no scene.
+    """
+    graph = _graph(path)
+    scenes = [_text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")]
+    if not scenes:
+        raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
+    terms = [_text(row[2]) for row in graph.select(ASSERTED) if isinstance(row[2], ox.NamedNode)]
+    return scenes[0], Names(terms)
 
 
 def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
@@ -80,6 +93,14 @@ def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
     prefixes = {**{p: PREFIXES[p] for p in ("owl", "rdfs", "xsd")}, "": CORE, "m": iri + "#"}
     triples = list(_triples(links, names, scene, iri))
     write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
+
+
+def _graph(path: Path) -> KnowledgeGraph:
+    if not path.is_file():
+        raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
+    graph = KnowledgeGraph("")
+    read_into(graph, path, "memory")
+    return graph
 
 
 def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Triple]:

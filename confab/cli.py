@@ -1,0 +1,167 @@
+"""The command line: one function per command, each a few calls to the rooms behind it.
+
+Results go to stdout, progress and errors to stderr. Exit 0: yes; 1: the answer is no; 2: misuse or unreadable input; 3: gave up
+at a limit. Heavy imports wait inside the commands that need them.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from reasoner.graph import KnowledgeError
+
+if TYPE_CHECKING:
+    from confab.memory import Memory
+    from confab.scene import Result, Scene
+
+YES, NO, MISUSE, GAVE_UP = 0, 1, 2, 3
+EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
+
+app = typer.Typer(
+    name="confab",
+    help="A robot planner whose knowledge lives in an ontology.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a file.")]
+Goals = Annotated[
+    list[str] | None,
+    typer.Option("--goal", metavar="FACT", help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable."),
+]
+MemoryFile = Annotated[
+    Path | None, typer.Option("--memory", metavar="FILE", help="The only place where memory is read or written.")
+]
+NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory, in so many words.")]
+Mode = Annotated[str, typer.Option("--mode", help="How to plan: paper.")]
+TimeLimit = Annotated[
+    float | None, typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3).")
+]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where files are written.")]
+
+
+@app.command()
+def plan(
+    scene: SceneName,
+    goal: Goals = None,
+    memory: MemoryFile = None,
+    no_memory: NoMemory = False,
+    mode: Mode = "paper",
+    time_limit: TimeLimit = None,
+    as_json: AsJson = False,
+) -> None:
+    """Plan in a scene: a tree of behaviours down to primitives."""
+    from confab.scene import load
+
+    loaded = load(scene)
+    remembered = _memory(memory, no_memory, loaded)
+    result = loaded.plan(goal or (), remembered.links if remembered else None, mode, time_limit)
+    _print(result.json() if as_json else result)
+    raise typer.Exit(EXIT[result.outcome.status.value])
+
+
+@app.command()
+def query(
+    scene: SceneName,
+    sparql: Annotated[str | None, typer.Argument(metavar="QUERY", help="SPARQL text, or a .rq file.")] = None,
+    show: Annotated[str | None, typer.Option(metavar="BEHAVIOR", help="Print the query that quantifies it.")] = None,
+    form: Annotated[str, typer.Option("--format", help="table, csv or json.")] = "table",
+    as_json: AsJson = False,
+) -> None:
+    """Ask a scene in SPARQL, or show the query that quantifies a behaviour."""
+    from confab.scene import load
+
+    loaded = load(scene)
+    if show is not None:
+        from reasoner.quantify import behavior_named, query_for
+
+        print(query_for(loaded.reading, behavior_named(loaded.reading, show)))
+        return
+    if sparql is None:
+        raise KnowledgeError("no query; give SPARQL text, a .rq file, or --show BEHAVIOR")
+    text = Path(sparql).read_text(encoding="utf-8") if sparql.endswith(".rq") and Path(sparql).is_file() else sparql
+    table = loaded.query(text)
+    form = "json" if as_json else form
+    if form == "csv":
+        print(table.csv(), end="")
+    elif form in ("table", "json"):
+        _print(table.records() if form == "json" else table)
+    else:
+        raise KnowledgeError(f"unknown format '{form}'; wanted table, csv or json")
+
+
+@app.command()
+def learn(
+    scenes: Annotated[list[str], typer.Argument(metavar="SCENE…", help="Scenes to gather experience in.")],
+    memory: Annotated[Path, typer.Option("--memory", metavar="FILE", help="Memory file to learn into; made if missing.")],
+    demonstration: Annotated[
+        Path | None, typer.Option("--plan", metavar="PLAN.json", help="Learn from this plan instead of an own one.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Learn from a demonstration, or from own plans, over one or more scenes."""
+    from confab.interchange import read_plan
+    from confab.memory import Memory
+    from confab.scene import load
+
+    remembered: Memory | None = None
+    for name in scenes:
+        loaded = load(name)
+        if remembered is None:
+            remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+        shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered.links).plan
+        remembered.learn(loaded, shown)
+    assert remembered is not None  # noqa: S101 - at least one scene is asked for
+    remembered.save(memory)
+    data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
+    _print(data if as_json else f"{memory}: {remembered!r}")
+
+
+def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
+    """Return the memory to plan with, if one was asked for."""
+    from confab.memory import Memory
+
+    if path is not None and none:
+        raise KnowledgeError("--memory and --no-memory exclude each other; give one")
+    return Memory.load(path, scene) if path is not None else None
+
+
+def _print(what: Any) -> None:
+    """Print JSON data, a line of text, or what rich can show, to stdout."""
+    if isinstance(what, dict | list):
+        print(json.dumps(what, indent=1, ensure_ascii=False))
+    elif isinstance(what, str):
+        print(what)
+    else:
+        from rich.console import Console
+
+        console = Console(width=None if sys.stdout.isatty() else 120)
+        console.print(what, soft_wrap=True)
+
+
+def main() -> NoReturn:
+    """Run the command line; turn errors into one clear line and an exit code."""
+    from planner.behaviors import DomainError
+
+    try:
+        app()
+    except (KnowledgeError, DomainError) as error:
+        _complain(str(error))
+    except OSError as error:
+        _complain(f"{error.filename or 'file'}: {error.strerror or error}")
+    sys.exit(YES)  # what no command decides otherwise
+
+
+def _complain(text: str) -> NoReturn:
+    print(f"confab: {text}", file=sys.stderr)
+    sys.exit(MISUSE)

@@ -1,0 +1,93 @@
+"""Plans as JSON, the form in which they leave and enter the command line (docs/command-line.md)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from planner.plan import Outcome, Plan, Status, Step
+from reasoner.graph import KnowledgeError
+from reasoner.names import nearest
+from reasoner.symbols import Problem
+
+
+def step_json(step: Step) -> dict[str, Any]:
+    """Return a step with all below it as JSON data."""
+    data: dict[str, Any] = {
+        "path": list(step.path),
+        "id": step.id,
+        "level": step.level,
+        "behavior": step.behavior,
+        "arguments": list(step.arguments),
+        "bindings": dict(step.bindings),
+    }
+    if step.rank is not None:
+        data["rank"] = round(step.rank, 6)
+    return {**data, "steps": [step_json(below) for below in step.steps]}
+
+
+def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Return the outcome of a planning call as JSON data; `seconds` are those before the search."""
+    data: dict[str, Any] = {"scene": scene, "status": outcome.status.value}
+    if outcome.plan is not None:
+        data["length"] = {str(level): count for level, count in outcome.plan.length.items()}
+        data["steps"] = [step_json(step) for step in outcome.plan.steps]
+    if outcome.reason is not None:
+        data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
+    data["search"] = {
+        str(level): {"generated": c.generated, "evaluated": c.evaluated, "expanded": c.expanded}
+        for level, c in outcome.search.items()
+    }
+    data["fallbacks"] = outcome.fallbacks
+    data["seconds"] = {**{k: round(v, 6) for k, v in seconds.items()}, "search": round(outcome.seconds, 6)}
+    return data
+
+
+def read_plan(path: Path, problem: Problem) -> Plan:
+    """Read a plan from a JSON file: what `confab plan --json` prints, or any object with such ``steps``.
+
+    Raises
+    ------
+    KnowledgeError
+        The file isn't JSON of that form, or a step names what the scene doesn't have; the message says where.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise KnowledgeError(f"{path}: not JSON: {error}") from error
+    status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
+    if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
+        what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no list of 'steps'"
+        raise KnowledgeError(f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene")
+    return Plan(tuple(_step(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
+
+
+def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
+    where = f"{path}: step {'.'.join(map(str, position))}"
+    if not isinstance(data, dict) or not isinstance(data.get("behavior"), str):
+        raise KnowledgeError(f"{where}: wanted an object with 'behavior' and 'arguments'")
+    behavior = problem.domain.behaviors.get(data["behavior"])
+    if behavior is None:
+        hint = nearest(data["behavior"], problem.domain.behaviors)
+        raise KnowledgeError(f"{where}: the scene has no behaviour '{data['behavior']}'{hint}")
+    arguments = tuple(map(str, data.get("arguments", ())))
+    if len(arguments) != len(behavior.parameters):
+        raise KnowledgeError(f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}")
+    for parameter, argument in zip(behavior.parameters, arguments, strict=True):
+        members = problem.classes.get(parameter.kind, ())
+        if argument not in members:
+            raise KnowledgeError(f"{where}: '{argument}' is no {parameter.kind}{nearest(argument, members)}")
+    return Step(
+        path=position,
+        id=problem.id_of(behavior.name, arguments),
+        level=behavior.level,
+        behavior=behavior.name,
+        arguments=arguments,
+        bindings={str(k): str(v) for k, v in dict(data.get("bindings", {})).items()},
+        rank=data.get("rank"),
+        steps=tuple(_step(below, (*position, i), path, problem) for i, below in enumerate(data.get("steps", ()))),
+    )

@@ -1,0 +1,219 @@
+"""A scene at the front desk: query it, plan in it, see what came of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from confab.interchange import outcome_json
+from confab.table import Table
+from planner.plan import Limits, Outcome, Plan, Status
+from reasoner.graph import KnowledgeError, KnowledgeGraph
+from reasoner.graph import load as load_graph
+from reasoner.links import Links
+from reasoner.names import Names
+from reasoner.reading import Reading, read, with_goals
+from reasoner.symbols import Problem
+
+if TYPE_CHECKING:
+    import networkx
+    import rdflib
+    from rich.tree import Tree
+
+MODES = ("paper",)
+DEFAULT_MODE = "paper"
+
+
+@dataclass
+class Scene:
+    """A scene of the ontology, loaded with all that it imports.
+
+    Attributes
+    ----------
+    knowledge : KnowledgeGraph
+        The store behind it.
+    reading : Reading
+        The planning problem, and the table that leads from its names back to IRIs.
+    seconds : mapping of stage to seconds
+        What loading and reading took.
+    """
+
+    knowledge: KnowledgeGraph
+    reading: Reading
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def iri(self) -> str:
+        """The IRI of the scene's ontology."""
+        return self.knowledge.scene
+
+    @property
+    def problem(self) -> Problem:
+        """What is there, what can be done, what holds and what is wanted."""
+        return self.reading.problem
+
+    @property
+    def names(self) -> Names:
+        """Short names and the IRIs behind them."""
+        return self.reading.names
+
+    @cached_property
+    def graph(self) -> rdflib.Graph:
+        """The scene's triples as an rdflib graph (a copy)."""
+        import rdflib
+
+        graph = rdflib.Graph()
+        graph.parse(data=self.knowledge.ntriples(), format="nt")
+        for prefix, namespace in self.knowledge.prefixes.items():
+            graph.bind(prefix, namespace)
+        return graph
+
+    def query(self, sparql: str) -> Table:
+        """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
+
+        Raises
+        ------
+        KnowledgeError
+            The query isn't SPARQL, or has no rows as its answer.
+        """
+        columns, rows = self.knowledge.table(sparql)
+        return Table(columns, tuple(tuple(self._cell(term) for term in row) for row in rows))
+
+    def _cell(self, term: Any) -> str | None:
+        if term is None:
+            return None
+        value = str(term.value)
+        return self.names.short(value) if type(term).__name__ == "NamedNode" else value
+
+    def plan(
+        self,
+        goals: Iterable[str] = (),
+        memory: Links | None = None,
+        mode: str = DEFAULT_MODE,
+        time_limit: float | None = None,
+    ) -> Result:
+        """Plan in this scene.
+
+        Parameters
+        ----------
+        goals : iterable of str
+            Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
+        memory : Links, optional
+            What was learned before; none if left out.
+        mode : str
+            ``paper``: A* with eq. (5) on each level.
+        time_limit : float, optional
+            Seconds after which the call gives up.
+
+        Raises
+        ------
+        KnowledgeError
+            A goal names what the scene doesn't have, or the mode is unknown.
+        """
+        from planner.refinement import plan as paper_plan
+        from reasoner.quantify import quantify
+
+        if mode not in MODES:
+            raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
+        problem = with_goals(self.reading, goals)
+        begin = perf_counter()
+        grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
+        quantified = perf_counter() - begin
+        outcome = paper_plan(problem, memory, limits=Limits(seconds=time_limit), grounds=grounds)
+        return Result(self, problem, outcome, {**self.seconds, "quantify": quantified})
+
+    def __repr__(self) -> str:
+        """Return what the scene is, in one line."""
+        problem = self.problem
+        return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
+
+
+@dataclass
+class Result:
+    """What came of planning: the outcome, and the scene in which it holds."""
+
+    scene: Scene
+    problem: Problem
+    outcome: Outcome
+    seconds: dict[str, float]
+
+    @property
+    def plan(self) -> Plan:
+        """The plan; raises `KnowledgeError` with the reason if there is none."""
+        if self.outcome.plan is None:
+            reason = self.outcome.reason.text if self.outcome.reason else ""
+            raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
+        return self.outcome.plan
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a plan."""
+        return self.outcome.status is Status.SOLVED
+
+    def json(self) -> dict[str, Any]:
+        """Return the result as JSON data (docs/command-line.md)."""
+        return outcome_json(self.scene.iri, self.outcome, self.seconds)
+
+    def graph(self) -> networkx.DiGraph:
+        """Return the plan as a directed graph: a node per step (by path), edges to sub-steps and to what follows."""
+        import networkx
+
+        graph = networkx.DiGraph()
+        for step in self.plan.walk():
+            graph.add_node(step.path, label=str(step), level=step.level, id=step.id)
+            graph.add_edges_from(((step.path, below.path) for below in step.steps), kind="refines")
+            graph.add_edges_from(
+                ((a.path, b.path) for a, b in zip(step.steps, step.steps[1:], strict=False)), kind="then"
+            )
+        steps = self.plan.steps
+        graph.add_edges_from(((a.path, b.path) for a, b in zip(steps, steps[1:], strict=False)), kind="then")
+        return graph
+
+    def save(self, path: str | Path) -> Path:
+        """Write the result as JSON and return where."""
+        from reasoner.files import write_whole
+
+        write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
+        return Path(path)
+
+    def __rich__(self) -> Tree | str:
+        """Return a tree for rich."""
+        from confab.show import plan_tree, summary
+
+        return plan_tree(self.plan, summary(self.outcome)) if self.solved else summary(self.outcome)
+
+    def __repr__(self) -> str:
+        """Return the summary and the steps of the most abstract level."""
+        from confab.show import summary
+
+        steps = self.outcome.plan.steps if self.outcome.plan else ()
+        return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps)])
+
+    def _repr_html_(self) -> str:
+        from confab.show import plan_html, summary
+
+        return f"<p>{summary(self.outcome)}</p>" + (plan_html(self.plan) if self.solved else "")
+
+
+def load(source: str | Path) -> Scene:
+    """Load a scene: a shipped name, or a file in Turtle, N-Triples or RDF/XML.
+
+    Raises
+    ------
+    KnowledgeError
+        No such scene; broken syntax; an import that can't be found; a situated object without a value.
+
+    Examples
+    --------
+    >>> load("beverage-serving").query("SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o")[0]
+    ('bottle1', 'location4')
+    """
+    begin = perf_counter()
+    graph = load_graph(source)
+    reading = read(graph)
+    return Scene(graph, reading, {"load": perf_counter() - begin})

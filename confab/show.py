@@ -1,0 +1,69 @@
+"""How plans look to people: a tree in a terminal, a tree in a notebook."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from planner.plan import Outcome, Plan, Step
+
+if TYPE_CHECKING:
+    from rich.text import Text
+    from rich.tree import Tree
+
+STYLES = ("bold cyan", "green", "default")
+Notes = Mapping[tuple[int, ...], str]
+"""What to say behind a step, by its path: a verdict, for instance."""
+
+
+def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> Tree:
+    """Return the plan as a rich tree: ID, behaviour and arguments of every step."""
+    from rich.tree import Tree
+
+    tree = Tree(title, guide_style="dim")
+    for step in plan.steps:
+        _grow(tree, step, notes or {})
+    return tree
+
+
+def _grow(tree: Tree, step: Step, notes: Notes) -> None:
+    branch = tree.add(_label(step, notes))
+    for below in step.steps:
+        _grow(branch, below, notes)
+
+
+def _label(step: Step, notes: Notes) -> Text:
+    from rich.text import Text
+
+    style = STYLES[min(len(step.path), len(STYLES)) - 1]
+    label = Text.assemble((f"{step.id:>2} ", "dim"), (step.behavior, style), " ", " ".join(step.arguments))
+    if step.bindings:
+        label.append("  " + ", ".join(f"{name}: {value}" for name, value in step.bindings.items()), "dim italic")
+    if step.path in notes:
+        label.append("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green")
+    return label
+
+
+def summary(outcome: Outcome) -> str:
+    """Return one line that says how a planning call ended."""
+    expanded = sum(counts.expanded for counts in outcome.search.values())
+    if outcome.plan is None:
+        reason = outcome.reason.text if outcome.reason else "no reason given"
+        return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
+    lengths = " / ".join(map(str, outcome.plan.length.values()))
+    return f"solved: {lengths} steps per level, {expanded} expansions in all, {outcome.seconds * 1000:.0f} ms of search"
+
+
+def plan_html(plan: Plan, notes: Notes | None = None) -> str:
+    """Return the plan as nested lists that fold."""
+
+    def item(step: Step) -> str:
+        note = html.escape((notes or {}).get(step.path, ""))
+        label = f"<code>{step.id}</code> <b>{html.escape(step.behavior)}</b> {html.escape(' '.join(step.arguments))} {note}"
+        if not step.steps:
+            return f"<li>{label}</li>"
+        below = "".join(map(item, step.steps))
+        return f"<li><details{' open' if len(step.path) == 1 else ''}><summary>{label}</summary><ul>{below}</ul></details></li>"
+
+    return f"<ul class='plan'>{''.join(map(item, plan.steps))}</ul>"
