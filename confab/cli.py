@@ -127,6 +127,22 @@ def learn(
     _print(data if as_json else f"{memory}: {remembered!r}")
 
 
+@app.command()
+def generate(
+    family: Annotated[str, typer.Argument(metavar="FAMILY", help="What kind of scene; an unknown one lists them.")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
+    objects: Annotated[int, typer.Option(help="How many objects are on the table; even.")] = 4,
+    hands: Annotated[int, typer.Option(help="How many hands the robot has.")] = 2,
+    clutter: Annotated[int, typer.Option(help="How many irrelevant objects are in other rooms.")] = 0,
+    seed: Seed = 0,
+) -> None:
+    """Write a scene for trials, without geometry: it asserts what hands reach."""
+    from reasoner.generate import write_scene
+
+    write_scene(out, family, objects, hands, clutter, seed)
+    _print(f"{out}")
+
+
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     """Return the memory to plan with, if one was asked for."""
     from confab.memory import Memory

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file so that a reader, or a crash, sees either the old content or the new: temporary file, fsync, replace.
+def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
+    """Write a file so that a reader, or a crash, sees the old content or the new: temporary file, fsync, replace.
+
+    The content can come in pieces.
 
     Raises
     ------
     OSError
         The folder can't be written to.
     """
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            for piece in pieces:
+                file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
             file.flush()
             os.fsync(file.fileno())
         Path(name).chmod(0o644)

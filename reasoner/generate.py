@@ -1,0 +1,258 @@
+"""Scenes for trials, as ordinary ontology files: a template in Turtle, multiplied and placed.
+
+A family is a Turtle file in ``ontology/families``: a line ``#* SECTION`` heads a block that is repeated for each row of
+that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named here:
+a template speaks of objects of a `first` and a `second` kind.
+
+==============================  ========================================================================
+section                         words
+==============================  ========================================================================
+(the top), ``once``             SCENE, FAMILY, OBJECTS, HANDS, CLUTTER, SEED
+``hand``, ``place``             HAND, PLACE
+``reach``                       HAND and PLACE, for each place that a hand reaches
+``first``, ``second``           ITEM (number within its kind), INDEX, START and GOAL (places), OTHER (an item at random)
+``some first``, ``some second`` the same, for about half of them at random
+``clutter``                     ITEM, ROOM
+==============================  ========================================================================
+
+``#* like NAME`` puts the blocks of ``parts/NAME.ttl`` before the family's own; ``#* placement NAME`` picks one of
+`PLACEMENTS`. The places are a grid of two rows: 1 … n near, n + 1 … 2 n far. The hands' strips of columns overlap by
+two thirds; two hands reach three quarters of the columns each.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+import ontology
+from reasoner.files import write_whole
+from reasoner.graph import KnowledgeError
+from reasoner.names import nearest
+
+FOLDER = ontology.ROOT / "families"
+WORD = re.compile(r"_([A-Z]+)_")
+PER_ROOM = 100  # how many irrelevant objects one room has
+
+Row = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A table before anything is wanted of it.
+
+    `reach` has the places of each hand; `starts` and `goals` a place for each object, those of the first kind first.
+    """
+
+    places: Sequence[int]
+    reach: Sequence[Sequence[int]]
+    starts: Sequence[int]
+    goals: Sequence[int]
+
+
+def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> str:
+    """Return a scene as Turtle text; the same arguments give the same text.
+
+    Parameters
+    ----------
+    family : str
+        One of `families`.
+    objects : int
+        Even; half of them of the first kind (bottles), half of the second (cups).
+    hands : int
+    clutter : int
+        Irrelevant objects in other rooms, where no hand reaches.
+    seed : int
+        Of everything that is random.
+
+    Raises
+    ------
+    KnowledgeError
+        No such family, or no table of it for these numbers.
+
+    Examples
+    --------
+    >>> text = generate("served", objects=4)
+    >>> [line.split(" ; ") for line in text.splitlines() if line.startswith(":cup1 ")]  # doctest: +ELLIPSIS
+    [[':cup1 a owl:NamedIndividual, k:Cup', ..., 'k:location :location2', 'k:beverage k:no_beverage .']]
+    """
+    return "".join(pieces(family, objects, hands, clutter, seed))
+
+
+def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
+    """Write what `generate` returns into a file, whole or not at all, piece by piece."""
+    write_whole(path, pieces(family, objects, hands, clutter, seed))
+
+
+def families() -> tuple[str, ...]:
+    """Return the names of the families, in alphabetical order.
+
+    >>> families()
+    ('blocked', 'full', 'handover', 'random', 'rotate', 'served', 'swap', 'unsolvable')
+    """
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.ttl")))
+
+
+def pieces(family: str, objects: int, hands: int, clutter: int, seed: int) -> Iterator[str]:
+    """Yield the text of `generate` in pieces."""
+    if family not in families():
+        raise KnowledgeError(f"no family '{family}'{nearest(family, families())} (families: {', '.join(families())})")
+    if objects < 2 or objects % 2 or hands < 1 or clutter < 0:
+        raise KnowledgeError(
+            f"wanted an even number of objects from 2 on, a hand at least and no negative clutter; "
+            f"got {objects} objects, {hands} hands, {clutter} clutter"
+        )
+    random = Random(f"{family} {objects} {hands} {seed}")
+    blocks = _blocks(FOLDER / f"{family}.ttl")
+    (placement,) = (name.removeprefix("placement ") for name, _ in blocks if name.startswith("placement "))
+    layout = PLACEMENTS[placement](objects, hands, random)
+    scene = f"{family}-{objects}-{hands}-{clutter}-{seed}"
+    once = {"SCENE": scene, "FAMILY": family, "OBJECTS": objects, "HANDS": hands, "CLUTTER": clutter, "SEED": seed}
+    for section, text in blocks:
+        pattern = WORD.sub(r"%(\1)s", text.replace("%", "%%"))
+        for row in _rows(section, once, layout, clutter, random):
+            yield pattern % row
+
+
+def _blocks(path: Path) -> list[tuple[str, str]]:
+    """Return the sections of a template with their text, those of the template that it is like first."""
+    found: list[tuple[str, str]] = []
+    section, lines = "once", list[str]()
+    for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:
+        if not line.startswith("#* "):
+            lines.append(line)
+            continue
+        if lines or section.startswith("placement "):
+            found.append((section, "".join(lines)))
+        section, lines = line.removeprefix("#* ").strip(), []
+        if section.startswith("like "):
+            found += _blocks(FOLDER / "parts" / f"{section.removeprefix('like ')}.ttl")
+    return found
+
+
+def _rows(section: str, once: Row, layout: Layout, clutter: int, random: Random) -> Iterable[Row]:
+    """Return the rows of a section, each a value for every word."""
+    half = len(layout.starts) // 2
+    if section == "hand":
+        return ({"HAND": hand + 1} for hand in range(len(layout.reach)))
+    if section == "place":
+        return ({"PLACE": place} for place in layout.places)
+    if section == "reach":
+        return ({"HAND": hand + 1, "PLACE": place} for hand, places in enumerate(layout.reach) for place in places)
+    if section == "clutter":
+        return ({"ITEM": item + 1, "ROOM": item // PER_ROOM + 1} for item in range(clutter))
+    if section.removeprefix("some ") in ("first", "second"):
+        first = 0 if section.endswith("first") else half
+        chosen = range(first, first + half)
+        return (
+            {
+                "ITEM": i - first + 1,
+                "INDEX": i + 1,
+                "START": layout.starts[i],
+                "GOAL": layout.goals[i],
+                "OTHER": random.randint(1, half),
+            }
+            for i in (sorted(random.sample(chosen, (half + 1) // 2)) if section.startswith("some ") else chosen)
+        )
+    return [once]  # the section `once`, and what stands below a directive
+
+
+# ----------------------------------------------------------------------------------------------------------- placements
+
+
+def strips(columns: int, hands: int, places: Sequence[int]) -> list[list[int]]:
+    """Return the places of each hand: strips of columns that overlap by two thirds.
+
+    >>> strips(4, 2, range(1, 9))
+    [[1, 2, 3, 5, 6, 7], [2, 3, 4, 6, 7, 8]]
+    """
+    found = []
+    for hand in range(hands):
+        first, last = hand * columns // (hands + 2), -(-(hand + 3) * columns // (hands + 2))
+        found.append([place for place in places if first <= (place - 1) % columns < last])
+    return found
+
+
+def _side_by_side(objects: int, hands: int, random: Random) -> Layout:
+    """Lay all objects out in the near row, the first at its far end; each goal is a far place at random."""
+    places = range(1, 2 * objects + 1)
+    goals = random.sample(places[objects:], objects)
+    return Layout(places, strips(objects, hands, places), places[:objects][::-1], goals)
+
+
+def _exchange(objects: int, hands: int, random: Random) -> Layout:
+    """Pair the objects at random; each goal is the partner's place."""
+    layout = _side_by_side(objects, hands, random)
+    order, goals = random.sample(range(objects), objects), list(layout.starts)
+    for one, other in zip(order[::2], order[1::2], strict=True):
+        goals[one], goals[other] = layout.starts[other], layout.starts[one]
+    return Layout(layout.places, layout.reach, layout.starts, goals)
+
+
+def _rotation(objects: int, hands: int, random: Random) -> Layout:
+    """Let each object go to the place of the next."""
+    layout = _side_by_side(objects, hands, random)
+    return Layout(layout.places, layout.reach, layout.starts, [*layout.starts[1:], layout.starts[0]])
+
+
+def _crowded(objects: int, hands: int, random: Random) -> Layout:
+    """Put the objects on a table with one place more; each goal is a place at random."""
+    places = range(1, objects + 2)
+    reach = strips(-(-len(places) // 2), hands, places)
+    return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
+
+
+def _opposite(objects: int, hands: int, random: Random) -> Layout:
+    """Put objects where only the first or the last hand reaches, to change sides; what finds no room stays between."""
+    places = range(1, 2 * objects + 1)
+    reach = strips(objects, hands, places)
+    of_first = set(reach[0]).difference(*reach[1:]) if hands > 1 else set()
+    if not of_first:
+        raise KnowledgeError(
+            f"{objects} objects and {hands} hands leave no place to one hand alone, so nothing can be handed over; "
+            "take 2 hands or more, and as many objects as hands and 2 more"
+        )
+    sides = sorted(of_first), sorted(set(reach[-1]).difference(*reach[:-1]))
+    between = [place for place in places if place not in {*sides[0], *sides[1]}]
+    across = dict(zip(sides[0] + sides[1], sides[1] + sides[0], strict=True))
+    starts = random.sample([*across], min(objects, len(across)))
+    starts += random.sample(between, objects - len(starts))
+    random.shuffle(starts)
+    return Layout(places, reach, starts, [across.get(place, place) for place in starts])
+
+
+def _occupied(objects: int, hands: int, random: Random) -> Layout:
+    """Put the objects of the first kind where those of the second shall stand."""
+    places, half = range(1, 2 * objects + 1), objects // 2
+    starts = random.sample(places[objects:], half) + random.sample(places[:objects], half)
+    return Layout(places, strips(objects, hands, places), starts, starts[:half] + random.sample(starts[:half], half))
+
+
+def _anywhere(objects: int, hands: int, random: Random) -> Layout:
+    """Put the objects at random places, to go to random places; a hand reaches each place with probability 3/4."""
+    places = range(1, 2 * objects + 1)
+    reach = [[place for place in places if random.random() < 0.75] for _ in range(hands)]
+    return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
+
+
+def _unreachable(objects: int, hands: int, random: Random) -> Layout:
+    """Lay out side by side, but let no hand reach the goal of one object of the second kind."""
+    layout = _side_by_side(objects, hands, random)
+    barred = random.choice(layout.goals[objects // 2 :])
+    reach = [[place for place in places if place != barred] for places in layout.reach]
+    return Layout(layout.places, reach, layout.starts, layout.goals)
+
+
+PLACEMENTS: Mapping[str, Callable[[int, int, Random], Layout]] = {
+    "side-by-side": _side_by_side,
+    "exchange": _exchange,
+    "rotation": _rotation,
+    "crowded": _crowded,
+    "opposite": _opposite,
+    "occupied": _occupied,
+    "anywhere": _anywhere,
+    "unreachable": _unreachable,
+}
