@@ -50,9 +50,7 @@ class Memory:
         KnowledgeError
             The file is missing or no memory.
         """
-        iri, names = memory_names(Path(path))
-        if scene is not None:
-            iri, names = scene.iri, scene.names
+        iri, names = (scene.iri, scene.names) if scene is not None else memory_names(Path(path))
         return cls(load_links(Path(path), names), names, iri)
 
     def learn(self, scene: Scene, plan: Plan) -> None:

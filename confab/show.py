@@ -38,7 +38,7 @@ def _label(step: Step, notes: Notes) -> Text:
 
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
     label = Text.assemble((f"{step.id:>2} ", "dim"), (step.behavior, style), " ", " ".join(step.arguments))
-    if step.bindings:
+    if step.bindings and not step.steps:
         label.append("  " + ", ".join(f"{name}: {value}" for name, value in step.bindings.items()), "dim italic")
     if step.path in notes:
         label.append("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green")

@@ -74,18 +74,31 @@ def plan(
     )
     start = call.model.values(problem.initial)
     goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
-    steps = None
-    for level in levels:
-        steps = solve(call, level, start, goal)
-        if steps is not None or call.gave_up:
+    steps = solve(call, levels[0], start, goal)
+    proof = None if steps is not None or call.gave_up else impossible(problem, call.deadline)
+    for level in levels[1:]:
+        if steps is not None or proof is not None or call.gave_up:
             break
-        call.fallbacks += level != levels[-1]
+        call.fallbacks += 1
+        steps = solve(call, level, start, goal)
     seconds = perf_counter() - begin
     if steps is not None:
         tree = Plan(tuple(_numbered(steps)))
         return Outcome(Status.SOLVED, tree, None, call.counts, call.fallbacks, seconds)
     status = Status.GAVE_UP if call.gave_up else Status.UNSOLVABLE
-    return Outcome(status, None, _reason(status, limits, levels), call.counts, call.fallbacks, seconds)
+    return Outcome(status, None, proof or _reason(status, limits, levels), call.counts, call.fallbacks, seconds)
+
+
+def impossible(problem: Problem, deadline: float | None) -> Reason | None:
+    """Return a proof that there is no plan, if one is cheap: a wanted fact that not even a relaxed world can bring about."""
+    from planner.grounding import OutOfTime, TooLarge
+    from planner.grounding import ground as reach_relaxed  # NumPy, which a solvable problem doesn't need
+
+    try:
+        reached = reach_relaxed(problem, deadline=deadline)
+    except (OutOfTime, TooLarge):
+        return None
+    return reached if isinstance(reached, Reason) else None
 
 
 def solve(call: Call, level: int, start: Values, goal: Goal) -> list[Step] | None:

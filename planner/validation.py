@@ -53,8 +53,8 @@ def _steps(problem: Problem, steps: Sequence[Step], state: dict[Symbol, str]) ->
     """Yield the faults of steps done in order; `state` is changed to what they lead to."""
     for step in steps:
         behavior = problem.domain.behaviors.get(step.behavior)
-        if behavior is None or len(step.arguments) != len(behavior.parameters):
-            yield Fault(step.path, f"{step}: no such behaviour, or not its number of arguments")
+        if behavior is None or not _fits(problem, behavior, step.arguments):
+            yield Fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
             return
         expected_id = problem.id_of(step.behavior, step.arguments)
         if step.id != expected_id:
@@ -81,7 +81,7 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
     """Return the state after a behaviour, or None if its preconditions don't hold."""
     bindings = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
     kinds = {p.name: p.kind for p in (*behavior.parameters, *behavior.variables)}
-    if any(a not in problem.classes.get(p.kind, ()) for p, a in zip(behavior.parameters, arguments, strict=True)):
+    if not _fits(problem, behavior, arguments):
         return None
     satisfied = next(_assignments(problem, list(behavior.preconditions), state, bindings, kinds), None)
     if satisfied is None:
@@ -95,6 +95,13 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
                 after[symbol] = value
             break
     return after
+
+
+def _fits(problem: Problem, behavior: Behavior, arguments: Sequence[str]) -> bool:
+    return len(arguments) == len(behavior.parameters) and all(
+        argument in problem.classes.get(parameter.kind, ())
+        for parameter, argument in zip(behavior.parameters, arguments, strict=True)
+    )
 
 
 def _assignments(

@@ -165,7 +165,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
     target = ox.NamedNode(BASE + name)
     try:
-        parser = ox.parse(path=str(file), format=form, base_iri=file.as_uri())
+        parser = ox.parse(path=str(file), format=form, base_iri=file.resolve().as_uri())
         graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in parser)
     except SyntaxError as error:
         raise KnowledgeError(f"{file}: {error}") from error

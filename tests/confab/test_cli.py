@@ -1,0 +1,88 @@
+"""The command line as a stranger meets it: results on stdout, one clear line for every misuse, exit codes that mean one thing."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def confab(*arguments: str, cwd: Path | None = None, **env: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from confab.cli import main; main()", *arguments]
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "COLUMNS": "200", **env}, timeout=60, check=False
+    )
+
+
+def test_plan_prints_the_tree_with_ids() -> None:
+    done = confab("plan", "beverage-serving")
+    assert done.returncode == 0
+    assert "4 / 10 / 32 steps" in done.stdout
+    assert "22 B1_MOVE cup1 location7" in done.stdout
+
+
+def test_plan_as_json_has_the_documented_keys() -> None:
+    data = json.loads(confab("plan", "beverage-serving", "--json").stdout)
+    assert data["status"] == "solved"
+    assert data["length"] == {"1": 4, "2": 10, "3": 32}
+    assert set(data["search"]["1"]) == {"generated", "evaluated", "expanded"}
+    assert {"load", "quantify", "search"} <= set(data["seconds"])
+    assert set(data["steps"][0]) >= {"path", "id", "level", "behavior", "arguments", "bindings", "steps"}
+    assert data["steps"][0]["steps"][0]["steps"][1]["bindings"] == {"object": "cup1"}
+
+
+def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_line(tmp_path: Path) -> None:
+    data = json.loads(confab("plan", "beverage-serving", "--json", "--mode", "paper").stdout)
+    data["steps"].sort(key=lambda step: [22, 34, 28, 39].index(step["id"]))
+    (tmp_path / "shown.json").write_text(json.dumps(data))
+    learned = confab("learn", "beverage-serving", "--plan", "shown.json", "--memory", "memory.ttl", cwd=tmp_path)
+    assert learned.returncode == 0, learned.stderr
+    again = confab("plan", "beverage-serving", "--mode", "paper", "--memory", "memory.ttl", "--json", cwd=tmp_path)
+    assert [step["id"] for step in json.loads(again.stdout)["steps"]] == [22, 34, 28, 39]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "word"),
+    [
+        (["plan", "no-such-scene"], 2, "no scene 'no-such-scene'"),
+        (["plan", "broken.ttl"], 2, "broken.ttl"),
+        (["plan", "beverage-serving", "--goal", "cup9 LOCATION location8"], 2, "did you mean 'cup"),
+        (["plan", "beverage-serving", "--goal", "bottle1 BEVERAGE no_beverage"], 1, "bottle1"),
+        (["plan", "beverage-serving", "--goal", "cup1 LOCATION location4"], 1, "location4"),
+        (["plan", "beverage-serving", "--mode", "magic"], 2, "unknown mode 'magic'"),
+        (["plan", "beverage-serving", "--memory", "none.ttl"], 2, "no such memory file"),
+        (["query", "beverage-serving", "SELEKT"], 2, "not SPARQL"),
+        (["query", "beverage-serving", "--show", "B2_PIK"], 2, "did you mean 'B2_PICK'"),
+        (["learn", "beverage-serving", "--plan", "none.json", "--memory", "m.ttl"], 2, "none.json"),
+        (["learn", "beverage-serving", "--plan", "broken.ttl", "--memory", "m.ttl"], 2, "not JSON"),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_nothing_is_written(
+    tmp_path: Path, arguments: list[str], code: int, word: str
+) -> None:
+    (tmp_path / "broken.ttl").write_text("@prefix : <x")
+    done = confab(*arguments, cwd=tmp_path)
+    said = done.stderr if code == 2 else done.stdout
+    assert done.returncode == code, done.stderr
+    assert word in said
+    assert said.count("\n") == 1
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.ttl"]
+
+
+def test_a_query_gives_table_csv_and_json() -> None:
+    text = "SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o"
+    assert "bottle1 │ location4" in confab("query", "beverage-serving", text).stdout
+    assert confab("query", "beverage-serving", text, "--format", "csv").stdout.startswith("o,l\nbottle1,location4\n")
+    assert json.loads(confab("query", "beverage-serving", text, "--json").stdout)[0] == {"o": "bottle1", "l": "location4"}
+
+
+def test_plan_needs_neither_rdflib_nor_physics_nor_reasoners() -> None:
+    script = (
+        "import sys; from confab.scene import load; load('beverage-serving').plan(); "
+        "print(sorted({'rdflib','pybullet','owlready2','pyshacl','matplotlib','pandas','networkx'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,59 @@
+"""Loading: shipped names and files, imports offline, and errors that say where and what to do."""
+
+from pathlib import Path
+
+import pytest
+
+import ontology
+from reasoner.graph import KnowledgeError, load
+
+HEADER = """@prefix owl: <http://www.w3.org/2002/07/owl#> .
+<https://example.org/mine> a owl:Ontology ; owl:imports <{}> .
+"""
+
+
+def test_every_shipped_scene_loads_by_its_name() -> None:
+    for name in ontology.scenes():
+        assert load(name).scene.rsplit("/", 1)[-1] == name
+
+
+def test_an_import_is_found_beside_the_file_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "mine.ttl").write_text(HEADER.format("https://example.org/other"))
+    (tmp_path / "other.ttl").write_text("<https://example.org/other> a <http://www.w3.org/2002/07/owl#Ontology> .")
+    assert list(load(tmp_path / "mine.ttl").files) == ["https://example.org/mine", "https://example.org/other"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("@prefix : <x", "mine.ttl"),
+        ("<a> <b> <c> .", "wanted one 'a owl:Ontology'"),
+        (HEADER.format("https://example.org/nowhere"), "nothing is fetched from the network"),
+    ],
+    ids=["syntax", "no-ontology", "unknown-import"],
+)
+def test_a_file_that_cannot_be_used_is_named_with_its_fault(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "mine.ttl"
+    path.write_text(content)
+    with pytest.raises(KnowledgeError, match=message):
+        load(path)
+
+
+def test_an_unknown_scene_is_answered_with_the_known_ones() -> None:
+    with pytest.raises(KnowledgeError, match="beverage-serving"):
+        load("beverage-srving")
+
+
+def test_a_catalog_with_entities_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "catalog-v001.xml").write_text('<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><catalog>&x;</catalog>')
+    (tmp_path / "mine.ttl").write_text(HEADER.format("https://example.org/other"))
+    with pytest.raises(KnowledgeError, match="refused"):
+        load(tmp_path / "mine.ttl")
+
+
+def test_a_query_that_is_no_sparql_is_a_clear_error() -> None:
+    graph = load("beverage-serving")
+    with pytest.raises(KnowledgeError, match="not SPARQL"):
+        graph.select("SELEKT ?x")
+    with pytest.raises(KnowledgeError, match="SELECT"):
+        graph.select("ASK { ?a ?b ?c }")

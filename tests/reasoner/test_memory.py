@@ -1,0 +1,62 @@
+"""The memory file: what was learned survives it, it is annotated axioms, and broken files are clear errors."""
+
+from pathlib import Path
+
+import pytest
+
+from planner.learning import learn
+from planner.refinement import plan
+from reasoner.graph import KnowledgeError, KnowledgeGraph, load, read_into
+from reasoner.links import Links
+from reasoner.memory import load_links, save_links
+from reasoner.reading import Reading, read
+
+
+@pytest.fixture(scope="module")
+def serving() -> Reading:
+    return read(load("beverage-serving"))
+
+
+@pytest.fixture(scope="module")
+def links(serving: Reading) -> Links:
+    found = plan(serving.problem).plan
+    assert found is not None
+    return learn(serving.problem, found, Links())
+
+
+def test_links_survive_the_file(tmp_path: Path, serving: Reading, links: Links) -> None:
+    path = tmp_path / "memory.ttl"
+    save_links(path, links, serving.names, serving.problem.scene)
+    assert load_links(path, serving.names) == links
+
+
+def test_the_same_links_give_the_same_file(tmp_path: Path, serving: Reading, links: Links) -> None:
+    for name in ("a.ttl", "b.ttl"):
+        save_links(tmp_path / name, links, serving.names, serving.problem.scene)
+    assert (tmp_path / "a.ttl").read_bytes() == (tmp_path / "b.ttl").read_bytes()
+
+
+def test_each_link_is_an_annotated_axiom_about_a_triple_that_is_asserted(
+    tmp_path: Path, serving: Reading, links: Links
+) -> None:
+    save_links(tmp_path / "memory.ttl", links, serving.names, serving.problem.scene)
+    graph = KnowledgeGraph("")
+    read_into(graph, tmp_path / "memory.ttl", "memory")
+    rows = graph.select(
+        """SELECT ?b ?f ?p WHERE { ?axiom a owl:Axiom ; owl:annotatedSource ?b ; owl:annotatedProperty :associatedWith ;
+           owl:annotatedTarget ?f ; :probability ?p . ?b a :GroundBehavior ; :associatedWith ?f . ?f a :SituatedObjectInstance }"""
+    )
+    assert len(rows) == len(links) > 0
+
+
+def test_the_file_imports_the_scene(tmp_path: Path, serving: Reading, links: Links) -> None:
+    save_links(tmp_path / "memory.ttl", links, serving.names, serving.problem.scene)
+    assert f"imports <{serving.problem.scene}>" in (tmp_path / "memory.ttl").read_text()
+
+
+def test_a_missing_or_broken_memory_is_a_clear_error(tmp_path: Path, serving: Reading) -> None:
+    with pytest.raises(KnowledgeError, match="no such memory file"):
+        load_links(tmp_path / "none.ttl", serving.names)
+    (tmp_path / "broken.ttl").write_text("<a> <b")
+    with pytest.raises(KnowledgeError, match="broken.ttl"):
+        load_links(tmp_path / "broken.ttl", serving.names)

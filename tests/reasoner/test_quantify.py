@@ -1,0 +1,44 @@
+"""Quantification by SPARQL yields the paper's numbering, and the same set as enumeration."""
+
+import re
+
+import pytest
+
+import ontology
+from planner.behaviors import ground
+from reasoner.graph import load
+from reasoner.quantify import quantify, query_for
+from reasoner.reading import read
+
+
+@pytest.mark.parametrize("scene", ontology.scenes())
+def test_sparql_and_enumeration_give_the_same_behaviours_and_ids(scene: str) -> None:
+    graph = load(scene)
+    reading = read(graph)
+    for level in reading.problem.domain.levels:
+        by_query = quantify(graph, reading, level)
+        assert by_query == ground(reading.problem, level)
+        assert all(reading.problem.id_of(g.behavior, g.arguments) == g.id for g in by_query)
+
+
+@pytest.mark.parametrize(
+    ("level", "number", "text"),
+    [
+        (1, 22, "B1_MOVE cup1 location7"), (1, 34, "B1_POUR bottle1 cup1"), (1, 39, "B1_POUR bottle2 cup2"),
+        (2, 4, "B2_PICK right_hand bottle1"), (2, 14, "B2_POUR right_hand cup1"), (2, 27, "B2_PLACE right_hand location4"),
+        (3, 6, "B3_REACH_HAND_OBJECT left_hand cup1"), (3, 23, "B3_REACH_HAND_LOCATION right_hand location4"),
+        (3, 29, "B3_GRASP right_hand"), (3, 30, "B3_PUT_DOWN left_hand"), (3, 33, "B3_LIFT right_hand"),
+        (3, 35, "B3_TILT right_hand"), (3, 37, "B3_STAND_UPRIGHT right_hand"),
+    ],
+)  # fmt: skip
+def test_ids_are_those_of_the_figures(level: int, number: int, text: str) -> None:
+    graph = load("beverage-serving")
+    assert f"{number} {text}" in [str(g) for g in quantify(graph, read(graph), level)]
+
+
+def test_the_query_can_be_read_and_run() -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    text = query_for(reading, reading.problem.domain.behaviors["B2_PICK"])
+    assert re.search(r"SELECT \?hand \?object", text)
+    assert len(graph.select(text)) == 8

@@ -1,0 +1,82 @@
+"""From graph to values: what the scene says, defaults, goals, and facts that people type."""
+
+from pathlib import Path
+
+import pytest
+
+from reasoner.graph import KnowledgeError, load
+from reasoner.reading import Reading, parse_fact, read, with_goals
+from reasoner.symbols import Symbol, Witness
+
+SCENE = """
+@prefix : <https://example.org/mine#> . @prefix k: <https://w3id.org/confab/tabletop#> .
+@prefix c: <https://w3id.org/confab/core#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+<https://example.org/mine> a owl:Ontology ; owl:imports <https://w3id.org/confab/tabletop> .
+:shelf a owl:NamedIndividual, k:Location . :floor a owl:NamedIndividual, k:Location .
+:mug a owl:NamedIndividual, k:Cup ; k:beverage k:no_beverage ; {}
+"""
+
+
+@pytest.fixture(scope="module")
+def serving() -> Reading:
+    return read(load("beverage-serving"))
+
+
+def test_every_situated_object_has_the_value_that_the_scene_states(serving: Reading) -> None:
+    facts = {str(symbol): value for symbol, value in serving.problem.initial.items()}
+    assert facts["<cup1, LOCATION>"] == "location2"
+    assert facts["<bottle2, BEVERAGE>"] == "beverage2"
+    assert len(facts) == 14  # 4 objects x {location, beverage}, 2 hands x {content, position, tilt}
+
+
+def test_what_a_scene_does_not_say_of_a_hand_is_its_rest_value(serving: Reading) -> None:
+    assert serving.problem.initial[Symbol("HOLDS", ("left_hand",))] == "nothing"
+
+
+def test_values_of_later_levels_are_not_there_on_earlier_ones(serving: Reading) -> None:
+    location = Symbol("LOCATION", ("cup1",))
+    assert len(serving.problem.values(location, 1)) == 8
+    assert "in_hand" in serving.problem.values(location, 2)
+
+
+def test_an_absence_condition_is_a_negated_witness(serving: Reading) -> None:
+    conditions = serving.problem.domain.behaviors["B1_MOVE"].preconditions
+    assert [c.negated for c in conditions if isinstance(c, Witness)] == [True, False]
+
+
+def test_terms_are_short_names_that_lead_back_to_iris(serving: Reading) -> None:
+    assert serving.names.iri("cup1") == "https://w3id.org/confab/beverage-serving#cup1"
+
+
+def test_a_goal_replaces_that_of_its_symbol(serving: Reading) -> None:
+    problem = with_goals(serving, ["cup2 LOCATION location8"])
+    assert problem.goal[Symbol("LOCATION", ("cup2",))] == "location8"
+    assert len(problem.goal) == len(serving.problem.goal)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("cup9 LOCATION location8", "unknown individual 'cup9'.*did you mean 'cup"),
+        ("cup2 LOCATON location8", "unknown situation type 'LOCATON'.*did you mean 'LOCATION'"),
+        ("cup2 LOCATION location99", "unknown individual 'location99'.*did you mean 'location"),
+        ("cup2 LOCATION beverage1", "beverage1 is no value of LOCATION"),
+        ("left_hand LOCATION location1", "left_hand has no LOCATION"),
+        ("cup2 LOCATION", "takes 1 words behind it, got 0"),
+        ("cup2", "is no fact"),
+    ],
+)
+def test_a_fact_that_names_nothing_is_answered_with_the_nearest(serving: Reading, text: str, message: str) -> None:
+    with pytest.raises(KnowledgeError, match=message):
+        parse_fact(serving.problem, text)
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [("k:holds :mug .", "<mug, LOCATION> has no value"), ("k:location :shelf, :floor .", "several values")],
+)
+def test_a_situated_object_needs_exactly_one_value(tmp_path: Path, stated: str, message: str) -> None:
+    path = tmp_path / "mine.ttl"
+    path.write_text(SCENE.format(stated))
+    with pytest.raises(KnowledgeError, match=message):
+        read(load(path))
