@@ -1,7 +1,8 @@
 """Tables of small integers and their joins, which is what grounding spends its time on.
 
-A `Table` is append-only, so that "what was known before this round" is a prefix of its rows: semi-naive evaluation needs no
-second table. An index sorts the rows by some columns once per size of the table; a match is then a binary search.
+A `Table` is append-only, so that "what was known before this round" is a prefix of its rows: semi-naive evaluation
+needs no second table. An index sorts the rows by some columns once per size of the table; a match is then a binary
+search.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 
 
-class TooLarge(Exception):
+class TooLargeError(Exception):
     """A join would have more rows than allowed; the message says how many."""
 
 
@@ -55,12 +56,12 @@ class Table:
 
         Raises
         ------
-        TooLarge
+        TooLargeError
             There are more than `most` pairs.
         """
         if not columns:
             if len(values) * len(self) > most:
-                raise TooLarge(f"{len(values) * len(self)} combinations, more than the {most} allowed")
+                raise TooLargeError(f"{len(values) * len(self)} combinations, more than the {most} allowed")
             left = np.repeat(np.arange(len(values)), len(self))
             return left, np.tile(np.arange(len(self)), len(values))
         keys, order = self._index(tuple(columns))
@@ -69,7 +70,7 @@ class Table:
         counts = np.searchsorted(keys, wanted, "right") - low
         total = int(counts.sum())
         if total > most:
-            raise TooLarge(f"{total} combinations, more than the {most} allowed")
+            raise TooLargeError(f"{total} combinations, more than the {most} allowed")
         left = np.repeat(np.arange(len(values)), counts)
         ends = np.cumsum(counts)
         places = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(low, counts)

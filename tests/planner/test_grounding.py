@@ -1,0 +1,220 @@
+"""Grounding says the same as a naive reading of the behaviours, over random small domains."""
+
+from __future__ import annotations
+
+import itertools
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.behaviors import DomainError
+from planner.flat import plan_level, search
+from planner.grounding import ground
+from planner.plan import Limits, Reason, Status
+from planner.task import Task
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+from tests.planner.naive import Facts, complete, results, wanted
+
+SITUATIONS = {
+    "AT": SituationType("AT", ("Thing",), "Place"),  # functional
+    "LIT": SituationType("LIT", ("Place",), "Truth", boolean=True),
+    "NEAR": SituationType("NEAR", ("Thing", "Place"), "Truth", boolean=True),
+}
+CLASSES = {"Thing": ("a", "b"), "Place": ("p", "q", "r"), "Dark": ("r",)}
+TERMS = {"Thing": ("?x", "?y", "a"), "Place": ("?u", "?v", "p")}
+KINDS = {"?x": "Thing", "?y": "Thing", "?u": "Place", "?v": "Place", "?w": "Place"}
+
+things, places = st.sampled_from(TERMS["Thing"]), st.sampled_from(TERMS["Place"])
+flags = st.booleans()
+simple: st.SearchStrategy[Condition] = st.one_of(
+    st.builds(lambda o, v, n: ValueCondition("AT", (o,), v, n), things, places, flags),
+    st.builds(lambda p, n: ValueCondition("LIT", (p,), TRUE, n), places, flags),
+    st.builds(lambda o, p, t: ValueCondition("NEAR", (o, p), t), things, places, st.sampled_from([TRUE, FALSE])),
+    st.builds(lambda u, v, n: RelationCondition("road", (u, v), n), places, places, flags),
+    st.builds(lambda p, n: ClassCondition(p, "Dark", n), places, flags),
+    st.builds(lambda u, v, n: EqualityCondition(u, v, n), places, places, flags),
+)
+groups = st.lists(simple, min_size=1, max_size=2).map(tuple)
+inner = st.sampled_from(["?u", "?v"])
+conditions = st.one_of(
+    simple,
+    st.builds(lambda g, n: AnyOf(tuple(g), n), st.lists(groups, min_size=2, max_size=3), flags),
+    st.builds(lambda v, g, n: Witness(v, "Place", g, n), inner, groups, flags),
+)
+changes = st.one_of(
+    st.builds(lambda o, v: ("AT", (o,), v), things, places),
+    st.builds(lambda p, t: ("LIT", (p,), t), places, st.sampled_from([TRUE, FALSE])),
+    st.builds(lambda o, p, t: ("NEAR", (o, p), t), things, places, st.sampled_from([TRUE, FALSE])),
+)
+effects = st.builds(
+    lambda change, when: ValueEffect(change[0], change[1], change[2], tuple(when)),
+    changes,
+    st.lists(conditions, max_size=1) | st.just([]),
+)
+behaviors = st.builds(
+    lambda parameters, preconditions, effects: Behavior(
+        "DO",
+        1,
+        tuple(Parameter(name, KINDS[name]) for name in parameters),
+        tuple(Parameter(name, kind) for name, kind in KINDS.items() if name not in parameters),
+        tuple(preconditions),
+        tuple(effects),
+    ),
+    st.sampled_from([("?x", "?y", "?u", "?v"), ("?x", "?y", "?u", "?v"), ("?x", "?y", "?u")]),
+    st.lists(conditions, max_size=2),
+    st.lists(effects, min_size=1, max_size=3),
+)
+
+
+@st.composite
+def problems(draw: st.DrawFn) -> Problem:
+    named = {
+        f"DO{i}": Behavior(f"DO{i}", 1, b.parameters, b.variables, b.preconditions, b.effects)
+        for i, b in enumerate(draw(st.lists(behaviors, min_size=1, max_size=3)))
+    }
+    initial = {Symbol("AT", (o,)): draw(st.sampled_from(CLASSES["Place"])) for o in CLASSES["Thing"]}
+    initial |= {Symbol("LIT", (p,)): TRUE for p in draw(st.sets(st.sampled_from(CLASSES["Place"])))}
+    goals = {Symbol("AT", ("a",)): draw(st.sampled_from(CLASSES["Place"]))}
+    goals |= {Symbol("NEAR", ("b", "q")): draw(st.sampled_from([TRUE, FALSE])), Symbol("LIT", ("q",)): TRUE}
+    goal = {symbol: goals[symbol] for symbol in draw(st.sets(st.sampled_from(sorted(goals)), min_size=1))}
+    road = frozenset(draw(st.sets(st.tuples(st.sampled_from("pqr"), st.sampled_from("pqr")), max_size=4)))
+    return Problem("urn:random", Domain(SITUATIONS, named), CLASSES, {"road": road}, initial, goal)
+
+
+def key(state: Facts) -> frozenset[tuple[Symbol, str]]:
+    return frozenset((symbol, value) for symbol, value in state.items() if value != FALSE)
+
+
+def explore(problem: Problem) -> tuple[set[frozenset[tuple[Symbol, str]]], bool]:
+    """Return all states that a naive search reaches, and whether the goal holds in one of them."""
+    start = complete(problem)
+    seen, waiting, solvable = {key(start)}, [start], False
+    while waiting:
+        state = waiting.pop()
+        solvable = solvable or wanted(problem, state)
+        for behavior in problem.domain.behaviors.values():
+            for _, after in results(problem, behavior, state):
+                if key(after) not in seen:
+                    seen.add(key(after))
+                    waiting.append(after)
+    return seen, solvable
+
+
+def transitions(task: Task) -> set[frozenset[tuple[Symbol, str]]]:
+    seen, waiting = {task.initial}, [task.initial]
+    while waiting:
+        state = waiting.pop()
+        for operator in range(len(task)):
+            after = task.applied(state, operator)
+            if after is not None and after not in seen:
+                seen.add(after)
+                waiting.append(after)
+    return {key(task.values(state)) for state in seen}
+
+
+def grounded(problem: Problem) -> Task | Reason | None:
+    try:
+        return ground(problem)
+    except DomainError:
+        return None
+
+
+@given(problems())
+@settings(max_examples=150)
+def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem) -> None:
+    task = grounded(problem)
+    if task is None:
+        return
+    states, solvable = explore(problem)
+    if isinstance(task, Reason):
+        assert not solvable
+        return
+    assert transitions(task) == states
+    found = search(task)
+    assert found.status is (Status.SOLVED if solvable else Status.UNSOLVABLE)
+    state = task.initial
+    for operator in found.plan:
+        after = task.applied(state, operator)
+        assert after is not None
+        state = after
+    if solvable:
+        assert wanted(problem, complete(problem) | task.values(state))
+
+
+@given(problems())
+@settings(max_examples=60)
+def test_every_operator_is_what_the_behaviour_does(problem: Problem) -> None:
+    task = grounded(problem)
+    if not isinstance(task, Task):
+        return
+    start = complete(problem)
+    naive = {
+        (behavior.name, arguments, key(after))
+        for behavior in problem.domain.behaviors.values()
+        for arguments, after in results(problem, behavior, start)
+    }
+    ours = set()
+    for operator in range(len(task)):
+        after = task.applied(task.initial, operator)
+        if after is not None:
+            name, arguments, _ = task.describe(operator)
+            ours.add((name, arguments, key(task.values(after))))
+    assert ours == naive
+
+
+def test_the_same_budget_gives_the_same_plan() -> None:
+    problem = corridor(30)
+    first, second = (plan_level(problem, limits=Limits(expansions=500)) for _ in range(2))
+    assert first.plan == second.plan
+    assert plan_level(problem, limits=Limits(expansions=3)).status is Status.GAVE_UP
+
+
+def corridor(length: int) -> Problem:
+    """A thing walks along a corridor whose lamps it has to light on its way."""
+    places = tuple(f"p{i:03}" for i in range(length))
+    situations = {
+        "AT": SituationType("AT", ("Thing",), "Place"),
+        "LIT": SituationType("LIT", ("Place",), "Truth", boolean=True),
+    }
+    go = Behavior(
+        "GO",
+        1,
+        (Parameter("?x", "Thing"), Parameter("?v", "Place")),
+        (Parameter("?u", "Place"),),
+        (ValueCondition("AT", ("?x",), "?u"), RelationCondition("road", ("?u", "?v"))),
+        (ValueEffect("AT", ("?x",), "?v"),),
+    )
+    light = Behavior(
+        "LIGHT",
+        1,
+        (Parameter("?x", "Thing"),),
+        (Parameter("?u", "Place"),),
+        (ValueCondition("AT", ("?x",), "?u"),),
+        (ValueEffect("LIT", ("?u",), TRUE),),
+    )
+    road = frozenset(itertools.pairwise(places))
+    return Problem(
+        "urn:corridor",
+        Domain(situations, {"GO": go, "LIGHT": light}),
+        {"Thing": ("x",), "Place": places},
+        {"road": road},
+        {Symbol("AT", ("x",)): places[0]},
+        {Symbol("LIT", (place,)): TRUE for place in places},
+    )
