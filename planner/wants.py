@@ -1,0 +1,211 @@
+"""What would have to change for an unmet condition to hold: from an achiever to the values that it wants.
+
+A want is a symbol with the values of which one would do. Where many would, one of each sort is proposed (`Alike`), so that a
+thousand free places count as one; the values that goals name are proposed besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
+
+from planner.compiling import FEW, Achiever, Program
+from planner.table import Cell, Key, Table, arguments_of, key_of, representatives
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+
+Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
+"""Situation type, key, and the values of which one is wanted."""
+Env: TypeAlias = "Mapping[str, str | None]"
+
+
+class Wants:
+    """Turns unmet conditions into wants, for one table and goal.
+
+    Parameters
+    ----------
+    program : Program
+    table : Table
+    goal : mapping of cell to value
+        Its values are proposed for their symbols, and not handed to others as free ones.
+    """
+
+    def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
+        self.program = program
+        self.table = table
+        self.goal = goal
+        self.wanted: dict[str, dict[str, None]] = {}
+        for (situation, _), value in goal.items():
+            self.wanted.setdefault(situation, {})[value] = None
+
+    def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
+        """Yield alternative wants, any of which may bring an achiever's unmet condition nearer."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                key = self._key(arguments, env)
+                if key is not None and (key in self.table.now[situation] or self._boolean(situation)):
+                    if value.startswith("?") and achiever.determined.get(value) == (situation, arguments):
+                        values = self.candidates(situation, key, achiever.kinds[value])
+                    elif negated:
+                        avoid = env.get(value, value)
+                        values = self._others(situation, key, avoid, level)
+                    else:
+                        wanted = env.get(value, value)
+                        values = () if wanted is None else (wanted,)
+                    if values:
+                        yield situation, key, values
+            case Witness(variable, kind, conditions, negated):
+                if negated:
+                    for individual in self._satisfying(condition, env):
+                        inner = {**env, variable: individual}
+                        for c in conditions:
+                            if isinstance(c, ValueCondition):
+                                yield from self.of(achiever, _negation(c), inner, level)
+                else:
+                    for individual in self._some(kind):
+                        inner = {**env, variable: individual}
+                        if all(self.holds(c, inner) for c in conditions if not _fluent(c)):
+                            for c in conditions:
+                                if _fluent(c) and not self.holds(c, inner):
+                                    yield from self.of(achiever, c, inner, level)
+            case AnyOf(alternatives, negated):
+                for group in alternatives:
+                    for c in group:
+                        if isinstance(c, ValueCondition) and self.holds(c, env) is negated:
+                            yield from self.of(achiever, _negation(c) if negated else c, env, level)
+        yield from self._redetermined(achiever, condition, env)
+
+    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
+        """Yield wants for other values of the symbols that determine a condition's variables."""
+        if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
+            return
+        for term in sorted(_variables(condition)):
+            if term in achiever.determined:
+                situation, arguments = achiever.determined[term]
+                key = self._key(arguments, env)
+                if key is None or key not in self.table.now[situation]:
+                    continue
+                values = tuple(
+                    value
+                    for value in self.candidates(situation, key, achiever.kinds[term])
+                    if value != env[term] and self.holds(condition, {**env, term: value})
+                )
+                if values:
+                    yield situation, key, values
+
+    def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
+        """Return values of a class for a symbol: its goal, and one of each sort, free ones first."""
+        members = self.program.problem.classes.get(kind, ())
+        if len(members) <= FEW:
+            return members
+        groups = self.program.alike.groups(members)
+        found = representatives(groups, self.table.who[situation], self.wanted.get(situation, {}))
+        goal = self.goal.get((situation, key))
+        if goal is not None and goal not in found and goal in self.program.members[kind]:
+            found.insert(0, goal)
+        return tuple(found)
+
+    def _others(self, situation: str, key: Key, avoid: str | None, level: int) -> tuple[str, ...]:
+        if self._boolean(situation):
+            return (FALSE,) if avoid == TRUE else (TRUE,)
+        levels = self.program.problem.value_levels
+        values = self.candidates(situation, key, self.program.domain.situations[situation].range)
+        return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
+
+    def _some(self, kind: str) -> list[str]:
+        members = self.program.problem.classes.get(kind, ())
+        return list(members) if len(members) <= FEW else [group[0] for group in self.program.alike.groups(members)]
+
+    def _boolean(self, situation: str) -> bool:
+        return self.program.domain.situations[situation].boolean
+
+    def _key(self, arguments: tuple[str, ...], env: Env) -> Key | None:
+        found = tuple(env.get(a, a) for a in arguments)
+        return None if None in found else key_of(found)  # type: ignore[arg-type]
+
+    # ----------------------------------------------------------------------------------------------------- interpreter
+
+    def holds(self, condition: Condition, env: Env) -> bool:
+        """Whether a condition holds now, with all its outer variables bound."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                default = FALSE if self._boolean(situation) else None
+                key = self._key(arguments, env)
+                now = None if key is None else self.table.now[situation].get(key, default)
+                return (now is not None and now == env.get(value, value)) is not negated
+            case RelationCondition(relation, arguments, negated):
+                tuples = self.program.problem.relations.get(relation, frozenset())
+                return (tuple(env.get(a, a) for a in arguments) in tuples) is not negated
+            case ClassCondition(term, kind, negated):
+                return (env.get(term, term) in self.program.members.get(kind, ())) is not negated
+            case EqualityCondition(left, right, negated):
+                return (env.get(left, left) == env.get(right, right)) is not negated
+            case Witness(negated=negated):
+                return (next(self._satisfying(condition, env), None) is not None) is not negated
+            case AnyOf(alternatives, negated):
+                return any(self._all(group, env) for group in alternatives) is not negated
+
+    def _all(self, conditions: tuple[Condition, ...], env: Env) -> bool:
+        bound = dict(env)
+        for condition in conditions:
+            if (
+                isinstance(condition, ValueCondition)
+                and condition.value.startswith("?")
+                and condition.value not in bound
+            ):
+                key = self._key(condition.arguments, bound)
+                now = None if key is None else self.table.now[condition.situation].get(key)
+                if now is None:
+                    return False
+                bound[condition.value] = now
+            elif not self.holds(condition, bound):
+                return False
+        return True
+
+    def _satisfying(self, witness: Witness, env: Env) -> Iterator[str]:
+        members = self.program.members.get(witness.kind, frozenset())
+        pool: Iterator[str] = iter(self.program.problem.classes.get(witness.kind, ()))
+        for c in witness.conditions:
+            if isinstance(c, ValueCondition) and c.arguments == (witness.variable,) and not c.negated:
+                value = env.get(c.value, c.value)
+                if value is not None and not value.startswith("?") and value != FALSE:
+                    keys = self.table.who[c.situation].get(value, {})
+                    pool = iter([arguments_of(key)[0] for key in keys if arguments_of(key)[0] in members])
+        for individual in pool:
+            if self._all(witness.conditions, {**env, witness.variable: individual}):
+                yield individual
+
+
+def _fluent(condition: Condition) -> bool:
+    return isinstance(condition, ValueCondition | Witness | AnyOf)
+
+
+def _negation(condition: ValueCondition) -> ValueCondition:
+    return ValueCondition(condition.situation, condition.arguments, condition.value, not condition.negated)
+
+
+def _variables(condition: Condition) -> set[str]:
+    """Return all variables that occur in a condition."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            found = {*arguments, value}
+        case RelationCondition(_, arguments):
+            found = set(arguments)
+        case ClassCondition(term):
+            found = {term}
+        case EqualityCondition(left, right):
+            found = {left, right}
+        case Witness(variable, _, conditions):
+            found = set().union(*map(_variables, conditions)) - {variable}
+        case AnyOf(alternatives):
+            found = set().union(*(_variables(c) for group in alternatives for c in group))
+    return {term for term in found if term.startswith("?")}
