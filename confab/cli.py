@@ -17,7 +17,7 @@ from reasoner.graph import KnowledgeError
 
 if TYPE_CHECKING:
     from confab.memory import Memory
-    from confab.scene import Result, Scene
+    from confab.scene import Scene
 
 YES, NO, MISUSE, GAVE_UP = 0, 1, 2, 3
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
@@ -35,7 +35,9 @@ app = typer.Typer(
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a file.")]
 Goals = Annotated[
     list[str] | None,
-    typer.Option("--goal", metavar="FACT", help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable."),
+    typer.Option(
+        "--goal", metavar="FACT", help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable."
+    ),
 ]
 MemoryFile = Annotated[
     Path | None, typer.Option("--memory", metavar="FILE", help="The only place where memory is read or written.")
@@ -43,7 +45,8 @@ MemoryFile = Annotated[
 NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory, in so many words.")]
 Mode = Annotated[str, typer.Option("--mode", help="How to plan: paper.")]
 TimeLimit = Annotated[
-    float | None, typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3).")
+    float | None,
+    typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3)."),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
@@ -103,7 +106,9 @@ def query(
 @app.command()
 def learn(
     scenes: Annotated[list[str], typer.Argument(metavar="SCENE…", help="Scenes to gather experience in.")],
-    memory: Annotated[Path, typer.Option("--memory", metavar="FILE", help="Memory file to learn into; made if missing.")],
+    memory: Annotated[
+        Path, typer.Option("--memory", metavar="FILE", help="Memory file to learn into; made if missing.")
+    ],
     demonstration: Annotated[
         Path | None, typer.Option("--plan", metavar="PLAN.json", help="Learn from this plan instead of an own one.")
     ] = None,
@@ -121,7 +126,7 @@ def learn(
             remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
         shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered.links).plan
         remembered.learn(loaded, shown)
-    assert remembered is not None  # noqa: S101 - at least one scene is asked for
+    assert remembered is not None
     remembered.save(memory)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
     _print(data if as_json else f"{memory}: {remembered!r}")

@@ -62,7 +62,9 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
     if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
         what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no list of 'steps'"
-        raise KnowledgeError(f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene")
+        raise KnowledgeError(
+            f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene"
+        )
     return Plan(tuple(_step(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
 
 
@@ -76,7 +78,9 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
         raise KnowledgeError(f"{where}: the scene has no behaviour '{data['behavior']}'{hint}")
     arguments = tuple(map(str, data.get("arguments", ())))
     if len(arguments) != len(behavior.parameters):
-        raise KnowledgeError(f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}")
+        raise KnowledgeError(
+            f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}"
+        )
     for parameter, argument in zip(behavior.parameters, arguments, strict=True):
         members = problem.classes.get(parameter.kind, ())
         if argument not in members:

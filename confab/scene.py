@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -159,19 +160,16 @@ class Result:
         """Return the result as JSON data (docs/command-line.md)."""
         return outcome_json(self.scene.iri, self.outcome, self.seconds)
 
-    def graph(self) -> networkx.DiGraph:
+    def graph(self) -> networkx.DiGraph[tuple[int, ...]]:
         """Return the plan as a directed graph: a node per step (by path), edges to sub-steps and to what follows."""
         import networkx
 
-        graph = networkx.DiGraph()
+        graph: networkx.DiGraph[tuple[int, ...]] = networkx.DiGraph()
         for step in self.plan.walk():
             graph.add_node(step.path, label=str(step), level=step.level, id=step.id)
             graph.add_edges_from(((step.path, below.path) for below in step.steps), kind="refines")
-            graph.add_edges_from(
-                ((a.path, b.path) for a, b in zip(step.steps, step.steps[1:], strict=False)), kind="then"
-            )
-        steps = self.plan.steps
-        graph.add_edges_from(((a.path, b.path) for a, b in zip(steps, steps[1:], strict=False)), kind="then")
+            graph.add_edges_from(((a.path, b.path) for a, b in pairwise(step.steps)), kind="then")
+        graph.add_edges_from(((a.path, b.path) for a, b in pairwise(self.plan.steps)), kind="then")
         return graph
 
     def save(self, path: str | Path) -> Path:

@@ -60,7 +60,9 @@ def plan_html(plan: Plan, notes: Notes | None = None) -> str:
 
     def item(step: Step) -> str:
         note = html.escape((notes or {}).get(step.path, ""))
-        label = f"<code>{step.id}</code> <b>{html.escape(step.behavior)}</b> {html.escape(' '.join(step.arguments))} {note}"
+        label = (
+            f"<code>{step.id}</code> <b>{html.escape(step.behavior)}</b> {html.escape(' '.join(step.arguments))} {note}"
+        )
         if not step.steps:
             return f"<li>{label}</li>"
         below = "".join(map(item, step.steps))

@@ -71,4 +71,6 @@ class Table(Sequence[tuple[str | None, ...]]):
         """Return the table as text."""
         widths = [max(len(cell or "") for cell in column) for column in zip(self.columns, *self.rows, strict=True)]
         lines = [self.columns, *self.rows]
-        return "\n".join("  ".join((c or "").ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in lines)
+        return "\n".join(
+            "  ".join((c or "").ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in lines
+        )

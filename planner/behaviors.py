@@ -124,8 +124,8 @@ class Model:
                 tuples = self.problem.relations.get(relation, frozenset())
                 return lambda _, b: (tuple(b.get(a, a) for a in arguments) in tuples) is not negated
             case ClassCondition(term, kind, negated):
-                members = self._members(kind)
-                return lambda _, b: (b.get(term, term) in members) is not negated
+                instances = self._members(kind)
+                return lambda _, b: (b.get(term, term) in instances) is not negated
             case EqualityCondition(left, right, negated):
                 return lambda _, b: (b.get(left, left) == b.get(right, right)) is not negated
             case Witness(variable, kind, conditions, negated):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from reasoner.links import Conclusion, Links
 from reasoner.symbols import Problem, State, Symbol
 
+
 @dataclass(frozen=True)
 class PaperConstants:
     """The constants of eqs. (2) and (5), and what is ranked: all M behaviours or the applicable ones."""

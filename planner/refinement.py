@@ -91,12 +91,12 @@ def plan(
 
 def impossible(problem: Problem, deadline: float | None) -> Reason | None:
     """Return a proof that there is no plan, if one is cheap: a wanted fact that not even a relaxed world can bring about."""
-    from planner.grounding import OutOfTime, TooLarge
+    from planner.grounding import OutOfTimeError, TooLargeError
     from planner.grounding import ground as reach_relaxed  # NumPy, which a solvable problem doesn't need
 
     try:
         reached = reach_relaxed(problem, deadline=deadline)
-    except (OutOfTime, TooLarge):
+    except (OutOfTimeError, TooLargeError):
         return None
     return reached if isinstance(reached, Reason) else None
 
@@ -111,18 +111,19 @@ def solve(call: Call, level: int, start: Values, goal: Goal) -> list[Step] | Non
         if found.status is not Status.SOLVED:
             call.gave_up |= found.status is Status.GAVE_UP
             return None
-        steps: list[Step] | None = []
+        steps: list[Step] = []
         state = start
         for applied, rank in zip(found.path, found.ranks, strict=True):
             step = refine(call, level, state, applied)
             if step is None:
                 call.forbidden.add((state, applied.ground))
-                steps = None
                 break
             steps.append(replace(step, rank=rank))
             state = applied.after
-        if steps is not None or call.gave_up:
+        else:
             return steps
+        if call.gave_up:
+            return None
 
 
 def refine(call: Call, level: int, state: Values, applied: Applied) -> Step | None:
@@ -183,7 +184,9 @@ def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], flo
             return lambda applied: 1.0 / len(conclusions)  # all tie for the first rank
         among = conclusions
         if call.constants.rank_among == "applicable":
-            among = [(a.ground.behavior, a.ground.arguments) for a in call.model.successors(call.grounds[level], values)]
+            among = [
+                (a.ground.behavior, a.ground.arguments) for a in call.model.successors(call.grounds[level], values)
+            ]
         problem = call.model.problem
         ranks = ranking(cogencies(call.links, among, call.model.state(values), problem, level))
         return lambda applied: ranks[applied.ground.behavior, applied.ground.arguments]

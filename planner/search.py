@@ -94,9 +94,7 @@ def a_star(
             c = bonus(c_m, n) if c_m is not None else 0.0
             g[next_state], depth[next_state] = next_g, n
             came_from[next_state] = (state, applied, c_m)
-            heapq.heappush(
-                open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g)
-            )
+            heapq.heappush(open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g))
     return Found(Status.UNSOLVABLE, (), (), counts)
 
 

@@ -66,12 +66,10 @@ def _steps(problem: Problem, steps: Sequence[Step], state: dict[Symbol, str]) ->
         if step.steps:
             yield from _steps(problem, step.steps, state)
             for symbol in sorted(after):
-                if problem.domain.situations[symbol.situation].level <= behavior.level:
-                    if state.get(symbol, FALSE) != after[symbol]:
-                        yield Fault(
-                            step.path,
-                            f"{step}: its refinement leaves {symbol} = {state.get(symbol, FALSE)}, not {after[symbol]}",
-                        )
+                known = problem.domain.situations[symbol.situation].level <= behavior.level
+                got = state.get(symbol, FALSE)
+                if known and got != after[symbol]:
+                    yield Fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {after[symbol]}")
         else:
             state.clear()
             state.update(after)

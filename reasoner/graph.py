@@ -36,11 +36,17 @@ PREFIXES = {
     "xsd": "http://www.w3.org/2001/XMLSchema#",
 }
 
-Row = tuple[ox.NamedNode | ox.BlankNode | ox.Literal | None, ...]
+Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
+Row = tuple[Term, ...]
 
 
 class KnowledgeError(ValueError):
     """The knowledge that was given can't be used; the message says what, where, and what to do."""
+
+
+def text(term: Term) -> str:
+    """Return the IRI or literal of a term as text; nothing for an unbound variable."""
+    return term.value if term is not None else ""
 
 
 @dataclass
@@ -86,7 +92,11 @@ class KnowledgeGraph:
 
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
         """Return the triples of some graphs as N-Triples."""
-        triples = {q.triple for name in graphs for q in self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name))}
+        triples = {
+            q.triple
+            for name in graphs
+            for q in self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name))
+        }
         return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
 
     def query(
@@ -131,7 +141,7 @@ def load(source: str | Path) -> KnowledgeGraph:
     scene = _ontology_iri(path)
     graph = KnowledgeGraph(scene)
     waiting = [(scene, path)]
-    places: dict[Path, dict[str, Path]] = {}
+    places: dict[Path, Mapping[str, Path]] = {}
     while waiting:
         iri, file = waiting.pop(0)
         if iri in graph.files:
@@ -193,7 +203,7 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
     return [row[1].value for row in rows if isinstance(row[1], ox.NamedNode)]
 
 
-def _locate(iri: str, importer: Path, read: dict[Path, dict[str, Path]]) -> Path:
+def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
     """Return the file of an imported ontology: by the catalog beside the importer, by the shipped one, or beside it by name."""
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):

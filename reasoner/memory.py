@@ -13,9 +13,9 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph import CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into
+from reasoner.graph import CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into, text
 from reasoner.links import Links
-from reasoner.names import Names, local_name
+from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE, Symbol
 
 ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
@@ -47,17 +47,17 @@ def load_links(path: Path, names: Names) -> Links:
     graph = _graph(path)
     nodes: dict[str, dict[str, str]] = {}
     for subject, predicate, value in graph.select(ASSERTED):
-        nodes.setdefault(_text(subject), {})[_text(predicate).removeprefix(CORE)] = _text(value)
+        nodes.setdefault(text(subject), {})[text(predicate).removeprefix(CORE)] = text(value)
     links = Links()
     for behavior, fact, probability in graph.select(ANNOTATED):
         try:
-            source, target = nodes[_text(behavior)], nodes[_text(fact)]
+            source, target = nodes[text(behavior)], nodes[text(fact)]
             conclusion = (names.short(source["behavior"]), _arguments(source, names))
             symbol = Symbol(names.short(target["situationType"]), _arguments(target, names))
-            value, p = names.short(target["value"]), float(_text(probability))
+            table = links.tables.setdefault(conclusion, {}).setdefault(symbol, {})
+            table[names.short(target["value"])] = float(text(probability))
         except (KeyError, ValueError) as error:
-            raise KnowledgeError(f"{path}: the link {_text(behavior)} → {_text(fact)} isn't whole: {error}") from error
-        links.tables.setdefault(conclusion, {}).setdefault(symbol, {})[value] = p
+            raise KnowledgeError(f"{path}: the link {text(behavior)} → {text(fact)} isn't whole: {error}") from error
     return links
 
 
@@ -70,10 +70,12 @@ def memory_names(path: Path) -> tuple[str, Names]:
         The file is missing, isn't Turtle, or imports no scene.
     """
     graph = _graph(path)
-    scenes = [_text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")]
+    scenes = [
+        text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")
+    ]
     if not scenes:
         raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
-    terms = [_text(row[2]) for row in graph.select(ASSERTED) if isinstance(row[2], ox.NamedNode)]
+    terms = [text(row[2]) for row in graph.select(ASSERTED) if isinstance(row[2], ox.NamedNode)]
     return scenes[0], Names(terms)
 
 
@@ -155,8 +157,3 @@ def _readable(*words: str) -> str:
 
 def _arguments(node: dict[str, str], names: Names) -> tuple[str, ...]:
     return tuple(names.short(node[name]) for name in ARGUMENTS if name in node)
-
-
-def _text(term: object) -> str:
-    value = getattr(term, "value", None)
-    return str(value) if value is not None else local_name(str(term))

@@ -7,7 +7,7 @@ then individuals in theirs. Whether a quantified behaviour can be done here is n
 
 from __future__ import annotations
 
-from reasoner.graph import SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.graph import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import nearest
 from reasoner.reading import Reading
 from reasoner.symbols import Behavior, GroundBehavior
@@ -25,7 +25,9 @@ def query_for(reading: Reading, behavior: Behavior) -> str:
     selects = []
     for parameter in behavior.parameters:
         if parameter.kind not in reading.names:
-            raise KnowledgeError(f"{behavior.name}: the type {parameter.kind} of {parameter.name} isn't in the ontology")
+            raise KnowledgeError(
+                f"{behavior.name}: the type {parameter.kind} of {parameter.name} isn't in the ontology"
+            )
         kind = reading.names.iri(parameter.kind)
         selects.append(
             f"  {{ SELECT DISTINCT {parameter.name} {parameter.name}_index WHERE {{\n"
@@ -63,8 +65,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     number = domain.first_ids.get(level, 0)
     for behavior in domain.at_level(level):
         for row in graph.select(query_for(reading, behavior), SCENE):
-            arguments = tuple(reading.names.short(term.value) for term in row if hasattr(term, "value"))
-            arguments = arguments[: len(behavior.parameters)]
+            arguments = tuple(reading.names.short(text(term)) for term in row[: len(behavior.parameters)])
             found.append(GroundBehavior(number + len(found), behavior.name, arguments))
     return tuple(found)
 

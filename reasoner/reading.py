@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from reasoner.graph import CORE, SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.graph import CORE, SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
 from reasoner.names import Names, local_name, nearest
 from reasoner.symbols import (
     FALSE,
@@ -81,7 +81,8 @@ SELECT DISTINCT ?subject ?property ?object WHERE {
   ?subject ?property ?object .
 } ORDER BY ?subject ?property ?object"""
 TUPLES = """
-SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property ?value"""
+SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value }
+ORDER BY ?fact ?property ?value"""
 
 Node = Mapping[str, Sequence[str]]
 
@@ -106,12 +107,10 @@ def read(graph: KnowledgeGraph) -> Reading:
     tuples = _nodes(graph.select(TUPLES, SCENE))
     facts = [_iris(row) for row in graph.select(FACTS, SCENE)]
     supers = _superclasses(_iris(row) for row in graph.select(SUBCLASSES, SCENE))
-    members = [
-        (row[0].value, row[1].value, _number(row[2])) for row in graph.select(MEMBERS, SCENE) if row[0] and row[1]
-    ]  # type: ignore[union-attr]
+    members = [(text(row[0]), text(row[1]), _number(row[2])) for row in graph.select(MEMBERS, SCENE)]
     owners = [_iris(row) for row in graph.select(OWNERS, SCENE)]
-    pairs = {row[0].value for row in graph.select(NOT_FUNCTIONAL, SCENE) if row[0]}  # type: ignore[union-attr]
-    from_levels = {row[0].value: _number(row[1]) for row in graph.select(FROM_LEVELS, SCENE) if row[0]}  # type: ignore[union-attr]
+    pairs = {text(row[0]) for row in graph.select(NOT_FUNCTIONAL, SCENE)}
+    from_levels = {text(row[0]): _number(row[1]) for row in graph.select(FROM_LEVELS, SCENE)}
 
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
     terms = {iri for iri, node in nodes.items() if _is(node, "Parameter", "Variable")}
@@ -149,13 +148,13 @@ def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
     """
     problem = reading.problem
     changed = dict(problem.goal)
-    for text in goals:
-        symbol, value = parse_fact(problem, text)
+    for fact in goals:
+        symbol, value = parse_fact(problem, fact)
         changed[symbol] = value
     return replace(problem, goal=dict(sorted(changed.items())))
 
 
-def parse_fact(problem: Problem, text: str) -> tuple[Symbol, str]:
+def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     """Return symbol and value of a fact written as ``object SITUATION [argument …] value``.
 
     Raises
@@ -163,55 +162,54 @@ def parse_fact(problem: Problem, text: str) -> tuple[Symbol, str]:
     KnowledgeError
         A word names nothing of its kind; the message has the nearest known name.
     """
-    words = text.split()
+    words = fact.split()
     individuals = {name for members in problem.classes.values() for name in members}
     if len(words) < 2:
-        raise KnowledgeError(f"'{text}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
+        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
     about, name, *rest = words
     if about not in individuals:
-        raise KnowledgeError(f"unknown individual '{about}' in '{text}'{nearest(about, individuals)}")
+        raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
     if name not in problem.domain.situations:
         known = problem.domain.situations
         raise KnowledgeError(
-            f"unknown situation type '{name}' in '{text}'{nearest(name, known)} (known: {', '.join(known)})"
+            f"unknown situation type '{name}' in '{fact}'{nearest(name, known)} (known: {', '.join(known)})"
         )
     situation = problem.domain.situations[name]
     if situation.boolean and len(rest) == len(situation.arguments) - 1:
         rest.append(TRUE)
     if len(rest) != len(situation.arguments):
-        raise KnowledgeError(f"'{text}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
+        raise KnowledgeError(f"'{fact}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
     for kind, word in zip((*situation.arguments[1:], situation.range), rest, strict=True):
         if word not in individuals and word not in (TRUE, FALSE):
             raise KnowledgeError(
-                f"unknown individual '{word}' in '{text}'{nearest(word, problem.classes.get(kind, ()))}"
+                f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
             )
         if word not in problem.classes.get(kind, ()):
             raise KnowledgeError(
-                f"'{text}': {word} is no value of {name}; values: {_some(problem.classes.get(kind, ()))}"
+                f"'{fact}': {word} is no value of {name}; values: {_some(problem.classes.get(kind, ()))}"
             )
     symbol = Symbol(name, (about, *rest[:-1]))
     if about not in problem.classes.get(situation.arguments[0], ()):
-        raise KnowledgeError(f"'{text}': {about} has no {name}, since it is no {situation.arguments[0]}")
+        raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
     return symbol, rest[-1]
 
 
 # ------------------------------------------------------------------------------------------------------- from rows to nodes
 
 
-def _nodes(rows: Iterable[Sequence[object]]) -> dict[str, dict[str, list[str]]]:
+def _nodes(rows: Iterable[Row]) -> dict[str, dict[str, list[str]]]:
     nodes: dict[str, dict[str, list[str]]] = {}
     for subject, predicate, value in rows:
-        node = nodes.setdefault(subject.value, {})  # type: ignore[attr-defined]
-        node.setdefault(predicate.value, []).append(value.value)  # type: ignore[attr-defined]
+        nodes.setdefault(text(subject), {}).setdefault(text(predicate), []).append(text(value))
     return nodes
 
 
-def _iris(row: Sequence[object]) -> tuple[str, ...]:
-    return tuple(term.value for term in row)  # type: ignore[attr-defined]
+def _iris(row: Row) -> tuple[str, ...]:
+    return tuple(map(text, row))
 
 
-def _number(term: object) -> int:
-    return FIRST_INDEX_OF_NONE if term is None else int(term.value)  # type: ignore[attr-defined]
+def _number(term: Term) -> int:
+    return FIRST_INDEX_OF_NONE if term is None else int(text(term))
 
 
 def _is(node: Node, *kinds: str) -> bool:
@@ -375,7 +373,9 @@ class _Schema:
 
     def terms_below(self, iri: str) -> set[str]:
         """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
-        found, bound, waiting, seen = set(), set(), [iri], {iri}
+        found: set[str] = set()
+        bound: set[str] = set()
+        waiting, seen = [iri], {iri}
         while waiting:
             node = waiting.pop()
             bound.update(self.values(node, "witness"))
@@ -461,9 +461,9 @@ def _facts(
             tail = [names.short(v) for v in facts.values(iri, "value")]
             relations[names.short(facts.one(iri, "relation"))].add((*facts.arguments(iri), *tail))
         else:
-            value = facts.values(iri, "value")
+            values = facts.values(iri, "value")
             symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
-            stated[symbol].add(names.short(value[0]) if value else TRUE)
+            stated[symbol].add(names.short(values[0]) if values else TRUE)
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"{symbol}: a fact of no known situation type")

@@ -12,7 +12,13 @@ import pytest
 def confab(*arguments: str, cwd: Path | None = None, **env: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", "from confab.cli import main; main()", *arguments]
     return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "COLUMNS": "200", **env}, timeout=60, check=False
+        command,
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**os.environ, "COLUMNS": "200", **env},
+        timeout=60,
+        check=False,
     )
 
 
@@ -76,7 +82,10 @@ def test_a_query_gives_table_csv_and_json() -> None:
     text = "SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o"
     assert "bottle1 │ location4" in confab("query", "beverage-serving", text).stdout
     assert confab("query", "beverage-serving", text, "--format", "csv").stdout.startswith("o,l\nbottle1,location4\n")
-    assert json.loads(confab("query", "beverage-serving", text, "--json").stdout)[0] == {"o": "bottle1", "l": "location4"}
+    assert json.loads(confab("query", "beverage-serving", text, "--json").stdout)[0] == {
+        "o": "bottle1",
+        "l": "location4",
+    }
 
 
 def test_plan_needs_neither_rdflib_nor_physics_nor_reasoners() -> None:

@@ -13,7 +13,9 @@ from reasoner.symbols import Domain, Problem, SituationType, Symbol
 
 LOCATION = SituationType("LOCATION", ("Cup",), "LOCATION")
 CUP = Symbol("LOCATION", ("cup",))
-TOY = Problem("toy", Domain({"LOCATION": LOCATION}, {}), {"Cup": ("cup",), "LOCATION": ("a", "b", "c", "d")}, {}, {CUP: "a"}, {})
+TOY = Problem(
+    "toy", Domain({"LOCATION": LOCATION}, {}), {"Cup": ("cup",), "LOCATION": ("a", "b", "c", "d")}, {}, {CUP: "a"}, {}
+)
 GO = ("GO", ("cup",))
 STAY = ("STAY", ("cup",))
 
@@ -48,7 +50,9 @@ def test_what_was_learned_is_more_cogent_where_it_was_learned_and_less_elsewhere
 
 
 def test_rank_one_is_the_most_cogent_and_ties_share_the_lowest_rank() -> None:
-    assert ranking({GO: -1.0, STAY: -1.0, ("OTHER", ()): -2.0}) == pytest.approx({GO: 1 / 3, STAY: 1 / 3, ("OTHER", ()): 1.0})
+    assert ranking({GO: -1.0, STAY: -1.0, ("OTHER", ()): -2.0}) == pytest.approx(
+        {GO: 1 / 3, STAY: 1 / 3, ("OTHER", ()): 1.0}
+    )
 
 
 def test_the_bonus_of_equation_5_fades_with_depth_and_is_never_a_penalty() -> None:

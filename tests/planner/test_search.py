@@ -9,9 +9,13 @@ from planner.search import a_star
 from reasoner.symbols import GroundBehavior
 
 
-def graph(edges: dict[str, dict[str, float]]) -> tuple[Callable[[Values], Iterable[Applied]], Callable[[Applied], float]]:
+def graph(
+    edges: dict[str, dict[str, float]],
+) -> tuple[Callable[[Values], Iterable[Applied]], Callable[[Applied], float]]:
     """Return successors and cost of a graph given as node → {node: cost}."""
-    names = {(a, b): GroundBehavior(i, f"{a}{b}", ()) for i, (a, b) in enumerate((a, b) for a in edges for b in edges[a])}
+    names = {
+        (a, b): GroundBehavior(i, f"{a}{b}", ()) for i, (a, b) in enumerate((a, b) for a in edges for b in edges[a])
+    }
     costs = {names[a, b].behavior: cost for a in edges for b, cost in edges[a].items()}
 
     def successors(state: Values) -> Iterable[Applied]:

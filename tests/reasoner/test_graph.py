@@ -45,7 +45,9 @@ def test_an_unknown_scene_is_answered_with_the_known_ones() -> None:
 
 
 def test_a_catalog_with_entities_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "catalog-v001.xml").write_text('<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><catalog>&x;</catalog>')
+    (tmp_path / "catalog-v001.xml").write_text(
+        '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><catalog>&x;</catalog>'
+    )
     (tmp_path / "mine.ttl").write_text(HEADER.format("https://example.org/other"))
     with pytest.raises(KnowledgeError, match="refused"):
         load(tmp_path / "mine.ttl")

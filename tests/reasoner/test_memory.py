@@ -58,5 +58,5 @@ def test_a_missing_or_broken_memory_is_a_clear_error(tmp_path: Path, serving: Re
     with pytest.raises(KnowledgeError, match="no such memory file"):
         load_links(tmp_path / "none.ttl", serving.names)
     (tmp_path / "broken.ttl").write_text("<a> <b")
-    with pytest.raises(KnowledgeError, match="broken.ttl"):
+    with pytest.raises(KnowledgeError, match=r"broken\.ttl"):
         load_links(tmp_path / "broken.ttl", serving.names)
