@@ -43,7 +43,7 @@ MemoryFile = Annotated[
     Path | None, typer.Option("--memory", metavar="FILE", help="The only place where memory is read or written.")
 ]
 NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory, in so many words.")]
-Mode = Annotated[str, typer.Option("--mode", help="How to plan: paper.")]
+Mode = Annotated[str, typer.Option("--mode", metavar="MODE", help="guarded, strict or paper (A* with eq. 5).")]
 TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3)."),
@@ -59,7 +59,7 @@ def plan(
     goal: Goals = None,
     memory: MemoryFile = None,
     no_memory: NoMemory = False,
-    mode: Mode = "paper",
+    mode: Mode = "guarded",
     time_limit: TimeLimit = None,
     as_json: AsJson = False,
 ) -> None:

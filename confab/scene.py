@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     import rdflib
     from rich.tree import Tree
 
-MODES = ("paper",)
-DEFAULT_MODE = "paper"
+MODES = ("guarded", "strict", "paper")
+DEFAULT_MODE = MODES[0]
 
 
 @dataclass
@@ -107,7 +107,8 @@ class Scene:
         memory : Links, optional
             What was learned before; none if left out.
         mode : str
-            ``paper``: A* with eq. (5) on each level.
+            ``paper``: A* with eq. (5) on each level. ``guarded`` and ``strict``: the fast planner, and how far experience
+            may lead it.
         time_limit : float, optional
             Seconds after which the call gives up.
 
@@ -116,16 +117,25 @@ class Scene:
         KnowledgeError
             A goal names what the scene doesn't have, or the mode is unknown.
         """
-        from planner.refinement import plan as paper_plan
-        from reasoner.quantify import quantify
-
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
         problem = with_goals(self.reading, goals)
+        limits = Limits(seconds=time_limit)
         begin = perf_counter()
-        grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
-        quantified = perf_counter() - begin
-        outcome = paper_plan(problem, memory, limits=Limits(seconds=time_limit), grounds=grounds)
+        if mode == "paper":
+            from planner.refinement import plan as paper_plan
+            from reasoner.quantify import quantify
+
+            grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
+            quantified = perf_counter() - begin
+            outcome = paper_plan(problem, memory, limits=limits, grounds=grounds)
+        else:
+            from planner.fast import compiled
+            from planner.fast import plan as fast_plan
+
+            using = compiled(problem)
+            quantified = perf_counter() - begin
+            outcome = fast_plan(problem, limits=limits, using=using)
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified})
 
     def __repr__(self) -> str:
