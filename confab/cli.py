@@ -133,6 +133,23 @@ def learn(
 
 
 @app.command()
+def validate(
+    files: Annotated[list[str], typer.Argument(metavar="FILE…", help="Ontology files, or names of shipped scenes.")],
+    deep: Annotated[bool, typer.Option("--deep", help="Ask HermiT for contradictions as well; needs Java.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Check ontologies: each finding names file, node, what is wrong, why, and what to do."""
+    from reasoner.validate import validate as check
+
+    findings = check(files, deep=deep)
+    if as_json:
+        _print([finding.as_dict() for finding in findings])
+    else:
+        _print("\n".join(map(str, findings)) or "nothing is wrong")
+    raise typer.Exit(NO if findings else YES)
+
+
+@app.command()
 def generate(
     family: Annotated[str, typer.Argument(metavar="FAMILY", help="What kind of scene; an unknown one lists them.")],
     out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
@@ -146,6 +163,25 @@ def generate(
 
     write_scene(out, family, objects, hands, clutter, seed)
     _print(f"{out}")
+
+
+@app.command()
+def generate(
+    family: Annotated[
+        str,
+        typer.Argument(metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable."),
+    ],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
+    objects: Annotated[int, typer.Option("--objects", metavar="N", help="Objects, half of them cups.")] = 4,
+    hands: Annotated[int, typer.Option("--hands", metavar="H", help="Hands.")] = 2,
+    clutter: Annotated[int, typer.Option("--clutter", metavar="K", help="Irrelevant objects in other rooms.")] = 0,
+    seed: Seed = 0,
+) -> None:
+    """Write a scene for trials as an ordinary ontology file."""
+    from reasoner.generate import write_scene
+
+    write_scene(out, family, objects, hands, clutter, seed)
+    print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
