@@ -210,13 +210,11 @@ class Program:
             tests.append(self._member(term, kinds[term]))
         # Soft: what the state determines, and tests on it.
         emit("unmet = ()")
-        bound, soft = set(hard), []
+        bound = set(hard)
+        soft: list[Condition] = []
         determined: dict[str, tuple[str, tuple[str, ...]]] = {}
         while waiting:
-            condition = _cheapest([c for c in waiting if not needs(c) - bound])
-            if condition is None:
-                unbound = ", ".join(sorted(set().union(*(needs(c) for c in waiting)) - bound))
-                raise DomainError(f"{behavior.name}: nothing determines {unbound}; add a value condition that does")
+            condition = _ready(waiting, bound, behavior.name)
             waiting.remove(condition)
             if (
                 isinstance(condition, ValueCondition)
@@ -320,10 +318,7 @@ class Program:
         """Return the conditions as expressions, in an order that binds before it uses; `bound` grows."""
         waiting, found = list(conditions), []
         while waiting:
-            ready = _cheapest([c for c in waiting if not needs(c) - bound])
-            if ready is None:
-                unbound = ", ".join(sorted(set().union(*(needs(c) for c in waiting)) - bound))
-                raise DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
+            ready = _ready(waiting, bound, where)
             waiting.remove(ready)
             found.append(self.expression(ready, bound, kinds, where))
         return found
@@ -485,8 +480,13 @@ def _terms(condition: Condition) -> set[str]:
 _COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}
 
 
-def _cheapest(conditions: Sequence[Condition]) -> Condition | None:
-    return min(conditions, key=lambda c: _COST[type(c)], default=None)
+def _ready(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
+    """Return the cheapest condition to test of those whose variables are bound."""
+    ready = [condition for condition in waiting if not needs(condition) - bound]
+    if not ready:
+        unbound = ", ".join(sorted(set().union(*map(needs, waiting)) - bound))
+        raise DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
+    return min(ready, key=lambda condition: _COST[type(condition)])
 
 
 def _name(prefix: str, name: str) -> str:

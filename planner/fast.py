@@ -15,13 +15,13 @@ from time import perf_counter
 from planner.compiling import Program
 from planner.lifted import Done, Refiner, Template
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
-from planner.segments import Advice, Effort, OutOfTimeError, Segments
+from planner.segments import Advice, Effort, Forbidden, OutOfTimeError, Segments
 from planner.table import Cell, Table, arguments_of, key_of
 from reasoner.symbols import FALSE, Problem
 
 EASY = Effort(depth=1, expansions=10)
 SHORT = Effort(depth=3, expansions=150)
-LONG = Effort(depth=6, expansions=2500)
+LONG = Effort(depth=6, expansions=400)
 
 
 @dataclass
@@ -113,8 +113,13 @@ class Call:
                         del asleep[cell]
                         active.append(cell)
                 cell = situation, key
-                if cell in self.kept and not self.met(cell):
-                    del self.kept[cell]
+                if cell in self.kept:
+                    asleep.pop(cell, None)
+                    if not self.met(cell):
+                        del self.kept[cell]
+                        active.append(cell)
+                elif cell in asleep:
+                    del asleep[cell]
                     active.append(cell)
 
         while active or asleep:
@@ -136,29 +141,25 @@ class Call:
             if asleep and not self.harder(asleep, before):
                 return False
             wake(mark)
-            asleep_met = [cell for cell in asleep if self.met(cell)]
-            for cell in asleep_met:
-                del asleep[cell]
-                self.kept[cell] = self.goal[cell]
         return True
 
-    def harder(self, asleep: Mapping[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
-        """Achieve one of the sleeping goals by a longer segment, by one on a lower level, or else at another's cost."""
-        cells = [cell for cell in asleep if all(other in self.kept for other in before.get(cell, ()))] or list(asleep)
+    def harder(self, asleep: dict[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
+        """Achieve one of the sleeping goals by a longer segment, by one on a lower level, or else all at once."""
         for level in self.program.levels:
             for effort in (SHORT, LONG):
-                for cell in cells:
-                    if self.achieve(level, cell, effort):
+                for cell in asleep:
+                    if all(other in self.kept for other in before.get(cell, ())) and self.achieve(level, cell, effort):
                         self.fallbacks += level != self.program.levels[0]
                         return True
         return False
 
     def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
         """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
-        forbidden = set()
+        forbidden: set[Forbidden] = set()
         mark = len(self.table.trail)
         while True:
-            found = self.segments.find(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
+            search = self.segments.seek if effort is LONG else self.segments.find
+            found = search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
             if found is None:
                 return False
             done: list[Done] = []

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TypeAlias
 
-from planner.segments import Effort, Ground, Segments
+from planner.segments import Effort, Forbidden, Segments
 from planner.table import Cell, Change
 from reasoner.symbols import FALSE
 
 Done: TypeAlias = "tuple[int, str, tuple[str, ...], tuple[str, ...], tuple[Done, ...]]"
 """A step that was done: level, behaviour, arguments, individuals of its variables, and the steps that refine it."""
 
-REFINING = Effort(depth=10, expansions=3000)
+REFINING = Effort(depth=8, expansions=400)
 TEMPLATES = 8
 """So many templates are kept per behaviour, the last successful first."""
 
@@ -124,7 +124,7 @@ class Refiner:
     def _search(self, level: int, individuals: tuple[str, ...], targets: dict[Cell, str]) -> tuple[Done, ...] | None:
         """Search a refinement; a step of it that can't itself be refined is forbidden there, and the search repeated."""
         segments, table = self.segments, self.table
-        forbidden: set[tuple[Ground, frozenset[tuple[Cell, str]]]] = set()
+        forbidden: set[Forbidden] = set()
         outer = dict(segments.focus)
         mark = len(table.trail)
         while True:
@@ -151,7 +151,7 @@ class Refiner:
 
     def _template(self, steps: Sequence[Done], individuals: tuple[str, ...]) -> Template:
         behaviors = self.segments.program.domain.behaviors
-        places = {}
+        places: dict[str, int] = {}
         for place, individual in enumerate(individuals):
             places.setdefault(individual, place)
         opened: dict[str, str] = {}

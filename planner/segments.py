@@ -1,18 +1,22 @@
-"""A few steps towards a few wants: iterative deepening over relevant behaviours, on a state that is changed in place.
+"""A few steps towards a few wants: search over relevant behaviours, on a state that is changed in place.
 
 targets   the symbols that shall get a value, with it
 kept      what must hold again in the end; `None` means that everything else must (a refinement changes nothing else)
 off       symbols that haven't the value that they must have in the end: the goal of this search, empty when it is reached
 depth     how many steps are left
+changed   the symbols that differ from the start of the segment, with their values: this names a state
 
 Only relevant behaviours are tried: those that give a symbol that is off its value, or that give an unmet precondition of such
 a behaviour its value, and so on. A chain of k of them takes at least k steps, so that longer chains than `depth` aren't looked
-at. The first plan found is a shortest one of those that relevance admits; what it doesn't admit is left to flat search.
+at. `find` deepens iteratively and returns a shortest segment of those that relevance admits; `seek` goes further, best first,
+for segments too long for that. What relevance doesn't admit is left to flat search.
 """
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TypeAlias
@@ -25,6 +29,8 @@ from reasoner.symbols import FALSE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
+Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
+"""A quantified behaviour, and the changes since the segment began after which it is forbidden."""
 Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
 """Orders what could be done, given the level and the state; may leave nothing out."""
 
@@ -79,13 +85,13 @@ class Segments:
         targets: Mapping[Cell, str],
         kept: Mapping[Cell, str] | None,
         effort: Effort,
-        forbidden: set[tuple[Ground, frozenset[tuple[Cell, str]]]] = frozenset(),  # type: ignore[assignment]
+        forbidden: AbstractSet[Forbidden] = frozenset(),
     ) -> list[Ground] | None:
         """Return the shortest relevant steps that bring all targets about and everything kept back, or None.
 
         The table is left as it was found.
         """
-        table, now, forward = self.table, self.table.now, self.forward
+        table, now = self.table, self.table.now
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []
@@ -103,43 +109,19 @@ class Segments:
                 return False
             seen[here] = depth
             left -= 1
-            counts.expanded += 1
-            if counts.expanded % 64 == 0:
-                self.check_time()
+            self.expand(level)
             mark = len(table.trail)
             for ground in self.ordered(level, off, depth):
                 if forbidden and (ground, here) in forbidden:
                     continue
                 counts.generated += 1
-                name, arguments = ground
-                done = forward[name](*arguments)
-                if done is None:
-                    continue
-                still, changes = dict(off), dict(changed)
-                for situation, key, value in done[1]:
-                    old = now[situation].get(key)
-                    if old is None and not self.exists(situation, key):
-                        continue
-                    old = old or FALSE
-                    if old == value:
-                        continue
-                    table.put(situation, key, value)
-                    cell = situation, key
-                    first = origin.setdefault(cell, old)
-                    if value == first:
-                        changes.pop(cell, None)
-                    else:
-                        changes[cell] = value
-                    wanted = targets.get(cell) or (first if kept is None else kept.get(cell))
-                    if wanted is None or wanted == value:
-                        still.pop(cell, None)
-                    else:
-                        still[cell] = wanted
-                steps.append(ground)
-                if deepen(depth - 1, still, changes):
-                    return True
-                steps.pop()
-                table.undo(mark)
+                done = self.step(ground, off, changed, origin, targets, kept)
+                if done is not None:
+                    steps.append(ground)
+                    if deepen(depth - 1, *done):
+                        return True
+                    steps.pop()
+                    table.undo(mark)
             return False
 
         start = len(table.trail)
@@ -152,6 +134,113 @@ class Segments:
             if left <= 0:
                 return None
         return None
+
+    def seek(
+        self,
+        level: int,
+        targets: Mapping[Cell, str],
+        kept: Mapping[Cell, str] | None,
+        effort: Effort,
+        forbidden: AbstractSet[Forbidden] = frozenset(),
+    ) -> list[Ground] | None:
+        """Return relevant steps to the same end as `find`, found best first, or None.
+
+        h is the sum over the symbols that are off of the length of the shortest chain that something applicable starts; a
+        node's successors are queued by its own h (deferred evaluation), so that each state's relevance is worked out once.
+        The table is left as it was found.
+        """
+        table, now = self.table, self.table.now
+        counts = self.counts[level]
+        origin: dict[Cell, str] = {}
+        start = len(table.trail)
+        off = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
+        queue: list[tuple[int, int, dict[Cell, str], dict[Cell, str], tuple[Ground, ...]]] = [(0, 0, off, {}, ())]
+        seen: set[frozenset[tuple[Cell, str]]] = set()
+        left, number = effort.expansions, 0
+        while queue and left > 0:
+            _, _, off, changed, steps = heapq.heappop(queue)
+            here = frozenset(changed.items())
+            if here in seen:
+                continue
+            seen.add(here)
+            left -= 1
+            self.expand(level)
+            table.undo(start)
+            for (situation, key), value in changed.items():
+                table.put(situation, key, value)
+            found: dict[Ground, None] = {}
+            h = 0
+            for (situation, key), value in off.items():
+                h += self.nearest(level, (situation, key, (value,)), effort.depth, found)
+            mark = len(table.trail)
+            for ground in found if self.advice is None else self.advice(level, table, list(found)):
+                if forbidden and (ground, here) in forbidden:
+                    continue
+                counts.generated += 1
+                done = self.step(ground, off, changed, origin, targets, kept)
+                if done is not None:
+                    if not done[0]:
+                        table.undo(start)
+                        return [*steps, ground]
+                    number += 1
+                    rank = 2 * (h + len(done[0]) - len(off)) + len(steps)
+                    heapq.heappush(queue, (rank, number, *done, (*steps, ground)))
+                    table.undo(mark)
+        table.undo(start)
+        return None
+
+    def nearest(self, level: int, want: Want, depth: int, found: dict[Ground, None]) -> int:
+        """Add the behaviours that start the shortest chains towards a want; return the chains' length."""
+        for length in range(1, depth + 1):
+            starts = list(self._towards(level, want, length, {}, set()))
+            if starts:
+                found.update(dict.fromkeys(starts))
+                return length
+        return depth + 1
+
+    def step(
+        self,
+        ground: Ground,
+        off: Mapping[Cell, str],
+        changed: Mapping[Cell, str],
+        origin: dict[Cell, str],
+        targets: Mapping[Cell, str],
+        kept: Mapping[Cell, str] | None,
+    ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
+        """Do a behaviour on the table and return what is off and changed after it, or None if it isn't applicable."""
+        now = self.table.now
+        done = self.forward[ground[0]](*ground[1])
+        if done is None:
+            return None
+        still, changes = dict(off), dict(changed)
+        for situation, key, value in done[1]:
+            old = now[situation].get(key)
+            if old is None:
+                if not self.exists(situation, key):
+                    continue
+                old = FALSE
+            if old == value:
+                continue
+            self.table.put(situation, key, value)
+            cell = situation, key
+            first = origin.setdefault(cell, old)
+            if value == first:
+                changes.pop(cell, None)
+            else:
+                changes[cell] = value
+            wanted = targets.get(cell) or (first if kept is None else kept.get(cell))
+            if wanted is None or wanted == value:
+                still.pop(cell, None)
+            else:
+                still[cell] = wanted
+        return still, changes
+
+    def expand(self, level: int) -> None:
+        """Count an expansion, and look at the clock now and then."""
+        counts = self.counts[level]
+        counts.expanded += 1
+        if counts.expanded % 32 == 0:
+            self.check_time()
 
     def exists(self, situation: str, key: object) -> bool:
         """Whether a boolean symbol exists that the table doesn't list."""
