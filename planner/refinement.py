@@ -63,17 +63,8 @@ def plan(
     """
     begin = perf_counter()
     levels = problem.domain.levels
-    call = Call(
-        model=Model(problem),
-        grounds=grounds or {level: ground(problem, level) for level in levels},
-        links=links or Links(),
-        constants=constants,
-        limits=limits,
-        deadline=None if limits.seconds is None else begin + limits.seconds,
-        counts={level: Counts() for level in levels},
-    )
-    start = call.model.values(problem.initial)
-    goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
+    call = _call(problem, levels, links, constants, limits, grounds)
+    start, goal = call.model.values(problem.initial), _goal(call.model)
     steps = solve(call, levels[0], start, goal)
     proof = None if steps is not None or call.gave_up else impossible(problem, call.deadline)
     for level in levels[1:]:
@@ -87,6 +78,47 @@ def plan(
         return Outcome(Status.SOLVED, tree, None, call.counts, call.fallbacks, seconds)
     status = Status.GAVE_UP if call.gave_up else Status.UNSOLVABLE
     return Outcome(status, None, proof or _reason(status, limits, levels), call.counts, call.fallbacks, seconds)
+
+
+def flat(
+    problem: Problem,
+    level: int,
+    links: Links | None = None,
+    constants: PaperConstants = PAPER,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+) -> Outcome:
+    """Search one level alone with the same f, without the hierarchy: what the hierarchy is measured against."""
+    begin = perf_counter()
+    call = _call(problem, (level,), links, constants, limits, None)
+    steps = solve(call, level, call.model.values(problem.initial), _goal(call.model))
+    seconds = perf_counter() - begin
+    if steps is not None:
+        return Outcome(Status.SOLVED, Plan(tuple(_numbered(steps))), None, call.counts, 0, seconds)
+    status = Status.GAVE_UP if call.gave_up else Status.UNSOLVABLE
+    return Outcome(status, None, _reason(status, limits, (level,)), call.counts, 0, seconds)
+
+
+def _call(
+    problem: Problem,
+    levels: tuple[int, ...],
+    links: Links | None,
+    constants: PaperConstants,
+    limits: Limits,
+    grounds: Mapping[int, tuple[GroundBehavior, ...]] | None,
+) -> Call:
+    return Call(
+        model=Model(problem),
+        grounds=grounds or {level: ground(problem, level) for level in levels},
+        links=links or Links(),
+        constants=constants,
+        limits=limits,
+        deadline=None if limits.seconds is None else perf_counter() + limits.seconds,
+        counts={level: Counts() for level in levels},
+    )
+
+
+def _goal(model: Model) -> Goal:
+    return {i: model.problem.goal[symbol] for i, symbol in enumerate(model.symbols) if symbol in model.problem.goal}
 
 
 def impossible(problem: Problem, deadline: float | None) -> Reason | None:

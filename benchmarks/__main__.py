@@ -1,0 +1,39 @@
+"""Run the measurements that the documentation quotes: all of them, or those named on the command line.
+
+    python -m benchmarks [NAME …]
+
+Each is a module of this folder with a function ``main()`` that prints its tables.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+
+NAMES = tuple(
+    sorted(
+        path.stem
+        for path in Path(__file__).parent.glob("*.py")
+        if not path.stem.startswith("_") and "def main()" in path.read_text(encoding="utf-8")
+    )
+)
+
+
+def run(names: list[str]) -> int:
+    """Run some of the benchmarks; 2 if a name is none of them."""
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        print(f"no benchmark {', '.join(unknown)}; there are: {', '.join(NAMES)}", file=sys.stderr)
+        return 2
+    for name in names or NAMES:
+        begin = perf_counter()
+        print(f"\n## {name}\n", flush=True)
+        import_module(f"benchmarks.{name}").main()
+        print(f"\n({name}: {perf_counter() - begin:.0f} s)", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""The paper's claims on its own task: expansions with and without hierarchy, search time, cold start."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from statistics import median
+from time import perf_counter
+
+from planner.cogency import PAPER
+from planner.fast import plan as fast_plan
+from planner.plan import Limits, Outcome
+from planner.refinement import flat
+from planner.refinement import plan as paper_plan
+from reasoner.graph import load
+from reasoner.reading import read
+
+FLAT_LIMIT = 100_000
+REPEATS = 7
+
+
+def main() -> None:
+    """Print expansions per level, then times."""
+    problem = read(load("beverage-serving")).problem
+    print("| planner | status | expansions per level | in all |\n|---|---|---|---|")
+    _row("paper mode, hierarchical", paper_plan(problem))
+    _row("default mode", fast_plan(problem))
+    lowest = problem.domain.levels[-1]
+    begin = perf_counter()
+    _row(
+        f"flat A* on level {lowest}, same f",
+        flat(problem, lowest, constants=PAPER, limits=Limits(expansions=FLAT_LIMIT)),
+    )
+    print(f"\nThe flat search took {perf_counter() - begin:.0f} s to its limit of {FLAT_LIMIT} expansions.\n")
+
+    print("| time | median of 7 |\n|---|---|")
+    print(f"| paper mode, search in process | {1e3 * _median(lambda: paper_plan(problem)):.1f} ms |")
+    print(
+        f"| default mode, search in process, compiling included | {1e3 * _median(lambda: fast_plan(problem)):.1f} ms |"
+    )
+    for mode in ("guarded", "paper"):
+        print(f"| `confab plan beverage-serving --mode {mode}`, cold process | {_median(_cold(mode)):.2f} s |")
+
+
+def _cold(mode: str) -> Callable[[], object]:
+    command = [sys.executable, "-c", "from confab.cli import main; main()", "plan", "beverage-serving", "--mode", mode]
+    return lambda: subprocess.run(command, check=True, capture_output=True)
+
+
+def _row(name: str, outcome: Outcome) -> None:
+    expanded = {level: counts.expanded for level, counts in outcome.search.items()}
+    print(f"| {name} | {outcome.status.value} | {expanded} | {sum(expanded.values())} |", flush=True)
+
+
+def _median(call: Callable[[], object]) -> float:
+    times = []
+    for _ in range(REPEATS):
+        begin = perf_counter()
+        call()
+        times.append(perf_counter() - begin)
+    return median(times)
