@@ -1,0 +1,87 @@
+"""The front desk in a notebook: a scene, its tables, its plan, its memory."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.interchange import read_plan
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def result(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
+
+
+def test_a_query_gives_rows_a_table_and_a_dataframe(scene: confab.Scene) -> None:
+    table = scene.query("SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o")
+    assert list(table)[:2] == [("bottle1", "location4"), ("bottle2", "location3")]
+    assert table.dataframe().shape == (4, 2)
+    assert "<td>bottle1</td>" in table._repr_html_()
+    assert repr(table).splitlines()[0] == "o        l"
+
+
+def test_the_graph_is_an_rdflib_graph_with_the_scenes_triples(scene: confab.Scene) -> None:
+    rows = scene.graph.query("SELECT ?l WHERE { ?o k:location ?l } ORDER BY ?l")
+    assert len(list(rows)) == 4
+
+
+def test_a_result_shows_as_a_tree_and_is_a_networkx_graph(result: confab.Result) -> None:
+    assert "solved: 4 / 10 / 32" in repr(result)
+    assert "B3_GRASP" in result._repr_html_()
+    graph = result.graph()
+    assert graph.number_of_nodes() == 4 + 10 + 32
+    refines = [edge for edge in graph.edges(data="kind") if edge[2] == "refines"]
+    assert len(refines) == 10 + 32
+
+
+@pytest.mark.parametrize("mode", ["guarded", "strict", "paper"])
+def test_every_mode_refines_as_the_paper_does(scene: confab.Scene, mode: str) -> None:
+    plan = scene.plan(mode=mode).plan
+    by_id = {step.id: [below.id for below in step.steps] for step in plan.steps}
+    assert by_id == {22: [2, 22], 34: [4, 14, 27], 28: [3, 20], 39: [1, 11, 18]}
+
+
+def test_a_saved_plan_is_read_back_as_it_was(tmp_path: Path, scene: confab.Scene, result: confab.Result) -> None:
+    path = result.save(tmp_path / "plan.json")
+    assert read_plan(path, scene.problem) == result.plan
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"steps": []}, "holds no plan"),
+        ({"status": "unsolvable"}, "status is 'unsolvable'"),
+        ({"steps": [{"behavior": "B1_MVOE", "arguments": []}]}, "did you mean 'B1_MOVE'"),
+        ({"steps": [{"behavior": "B1_MOVE", "arguments": ["cup1"]}]}, "takes 2 arguments, got 1"),
+        ({"steps": [{"behavior": "B1_MOVE", "arguments": ["cup1", "location77"]}]}, "'location77' is no Location"),
+        ({"steps": ["B1_MOVE"]}, "wanted an object"),
+        ([], "holds no plan"),
+    ],
+)
+def test_a_plan_that_cannot_be_one_is_named_with_its_fault(
+    tmp_path: Path, scene: confab.Scene, data: object, message: str
+) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(confab.KnowledgeError, match=message):
+        read_plan(path, scene.problem)
+
+
+def test_a_memory_learns_saves_and_loads(tmp_path: Path, scene: confab.Scene, result: confab.Result) -> None:
+    memory = confab.Memory.of(scene)
+    memory.learn(scene, result.plan)
+    path = memory.save(tmp_path / "memory.ttl")
+    assert confab.Memory.load(path).links == memory.links
+    assert "B1_MOVE cup1 location7" in str(list(memory.table()))
+
+
+def test_an_unknown_name_of_the_package_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'plann'"):
+        _ = confab.plann
