@@ -54,25 +54,26 @@ KINDS = (
 )  # of the schema's nodes
 
 SCHEMA = f"""
-SELECT DISTINCT ?node ?property ?value WHERE {{
-  VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
-  ?node a/rdfs:subClassOf* ?kind ; ?property ?value .
-}} ORDER BY ?node ?property ?value"""
-OWNERS = "SELECT ?class ?situation WHERE { ?class :hasSituationType ?situation } ORDER BY ?class ?situation"
-NOT_FUNCTIONAL = """
-SELECT DISTINCT ?situation WHERE {
-  ?situation :valueProperty ?property . FILTER NOT EXISTS { ?property a owl:FunctionalProperty }
-} ORDER BY ?situation"""
-FROM_LEVELS = "SELECT DISTINCT ?value ?level WHERE { ?value :fromLevel ?level } ORDER BY ?value"
-SUBCLASSES = f"""
-SELECT DISTINCT ?sub ?super WHERE {{
-  ?sub rdfs:subClassOf ?super . FILTER(isIRI(?sub) && isIRI(?super))
-  FILTER NOT EXISTS {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }} ?sub rdfs:subClassOf* ?kind }}
-}} ORDER BY ?sub ?super"""
+SELECT DISTINCT ?part ?node ?property ?value WHERE {{
+  {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
+    ?node a/rdfs:subClassOf* ?kind ; ?property ?value . BIND("node" AS ?part) }}
+  UNION {{ ?node rdfs:subClassOf ?value . FILTER(isIRI(?node) && isIRI(?value))
+    FILTER NOT EXISTS {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }} ?node rdfs:subClassOf* ?kind }}
+    BIND("class" AS ?part) BIND(rdfs:subClassOf AS ?property) }}
+  UNION {{ ?node :hasSituationType ?value . BIND("owner" AS ?part) BIND(:hasSituationType AS ?property) }}
+  UNION {{ ?node :valueProperty ?property . FILTER NOT EXISTS {{ ?property a owl:FunctionalProperty }}
+    BIND("pair" AS ?part) BIND(?property AS ?value) }}
+  UNION {{ ?node :fromLevel ?value . BIND("level" AS ?part) BIND(:fromLevel AS ?property) }}
+  UNION {{ ?node a :SituatedObjectInstance ; ?property ?value .
+    FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
+  UNION {{ {{ SELECT ?node WHERE {{ ?node a :SituatedObjectInstance ; :about ?object }} LIMIT 1 }}
+    BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
+}} ORDER BY ?part ?node ?property ?value"""
+"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own."""
 MEMBERS = """
 SELECT DISTINCT ?individual ?class ?index WHERE {
   ?individual a owl:NamedIndividual, ?class .
-  FILTER(!STRSTARTS(STR(?class), STR(owl:)))
+  FILTER(isIRI(?class) && !STRSTARTS(STR(?class), STR(owl:)))
   OPTIONAL { ?individual :index ?index }
 } ORDER BY ?individual ?class"""
 FACTS = """
@@ -81,37 +82,103 @@ SELECT DISTINCT ?subject ?property ?object WHERE {
   ?subject ?property ?object .
 } ORDER BY ?subject ?property ?object"""
 TUPLES = """
-SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value }
-ORDER BY ?fact ?property ?value"""
+SELECT DISTINCT ?fact ?property ?value WHERE {
+  ?fact a :SituatedObjectInstance ; ?property ?value
+} ORDER BY ?fact ?property ?value"""
 
 Node = Mapping[str, Sequence[str]]
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A scene as the planner takes it, with the table that leads from its names back to IRIs."""
+    """A scene as the planner takes it, with the table that leads from its names back to IRIs.
+
+    `whole` tells whether all individuals of the scene are in it, or those only that its task can need
+    (`reasoner.recognition`).
+    """
 
     problem: Problem
     names: Names
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class Schema:
+    """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
+
+    `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
+    property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody.
+    """
+
+    nodes: Mapping[str, Node]
+    supers: Mapping[str, Sequence[str]]
+    owners: Sequence[tuple[str, str]]
+    pairs: frozenset[str]
+    from_levels: Mapping[str, int]
+    facts: Mapping[str, Node]
+    tuples: bool
+
+
+@dataclass(frozen=True)
+class Individuals:
+    """What is said of individuals, as IRIs.
+
+    `members` are individual, class and index; `facts` the triples of value properties and relations; `tuples` the facts that
+    are nodes of their own.
+    """
+
+    members: Sequence[tuple[str, str, int]]
+    facts: Sequence[tuple[str, str, str]]
+    tuples: Mapping[str, Node]
 
 
 def read(graph: KnowledgeGraph) -> Reading:
-    """Read the planning problem out of a knowledge graph.
+    """Read the planning problem out of a knowledge graph, with every individual that it has.
 
     Raises
     ------
     KnowledgeError
         An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
     """
-    nodes = _nodes(graph.select(SCHEMA, SCENE))
-    tuples = _nodes(graph.select(TUPLES, SCENE))
-    facts = [_iris(row) for row in graph.select(FACTS, SCENE)]
-    supers = _superclasses(_iris(row) for row in graph.select(SUBCLASSES, SCENE))
-    members = [(text(row[0]), text(row[1]), _number(row[2])) for row in graph.select(MEMBERS, SCENE)]
-    owners = [_iris(row) for row in graph.select(OWNERS, SCENE)]
-    pairs = {text(row[0]) for row in graph.select(NOT_FUNCTIONAL, SCENE)}
-    from_levels = {text(row[0]): _number(row[1]) for row in graph.select(FROM_LEVELS, SCENE)}
+    members = [(text(who), text(kind), _number(index)) for who, kind, index in graph.select(MEMBERS, SCENE)]
+    facts = [_triple(row) for row in graph.select(FACTS, SCENE)]
+    tuples = _nodes(_triple(row) for row in graph.select(TUPLES, SCENE))
+    return reading_of(graph.scene, read_schema(graph), Individuals(members, facts, tuples))
 
+
+def read_schema(graph: KnowledgeGraph) -> Schema:
+    """Read what doesn't depend on how many individuals there are, in one query."""
+    parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+    for row in graph.select(SCHEMA, SCENE):
+        parts[text(row[0])].append(_triple(row[1:]))
+    return Schema(
+        nodes=_nodes(parts["node"]),
+        supers=_superclasses((sub, sup) for sub, _, sup in parts["class"]),
+        owners=[(kind, situation) for kind, _, situation in parts["owner"]],
+        pairs=frozenset(situation for situation, _, _ in parts["pair"]),
+        from_levels={value: int(level) for value, _, level in parts["level"]},
+        facts=_nodes(parts["fact"]),
+        tuples=bool(parts["tuples"]),
+    )
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A schema as values, for some individuals: everything of a problem but its facts and its goal.
+
+    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values.
+    """
+
+    schema: _Schema
+    domain: Domain
+    classes: dict[str, tuple[str, ...]]
+    parents: dict[str, tuple[str, ...]]
+    properties: dict[str, tuple[str, bool]]
+
+
+def frame(schema: Schema, members: Sequence[tuple[str, str, int]]) -> Frame:
+    """Return the behaviours and situation types as values, and the classes of some individuals."""
+    nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
     terms = {iri for iri, node in nodes.items() if _is(node, "Parameter", "Variable")}
     named = {iri for iri, node in nodes.items() if _is(node, "SituationType", "Behavior", "Relation", "ReachRelation")}
@@ -120,22 +187,30 @@ def read(graph: KnowledgeGraph) -> Reading:
         | {i for i, _, _ in instances}
         | {k for _, k, _ in instances}
         | {s for pair in supers.items() for s in (pair[0], *pair[1])}
+        | {kind for node in nodes.values() for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())}
     )
-    schema = _Schema(nodes, names, terms, pairs)
-
+    parts = _Schema(nodes, names, terms, set(schema.pairs))
     classes, parents = _classes(instances, supers, names)
-    situations, properties = _situations(schema, owners, classes)
-    behaviors = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=lambda iri: schema.number(iri, "level"))
+    situations, properties = _situations(parts, schema.owners, classes)
+    behaviors = sorted(_ordered(parts.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
     domain = Domain(
         situations={s.name: s for s in situations},
-        behaviors={names.short(iri): schema.behavior(iri) for iri in behaviors},
-        first_ids={schema.number(iri, "level"): schema.number(iri, "firstId", 0) for iri in schema.of_kind("Level")},
+        behaviors={names.short(iri): parts.behavior(iri) for iri in behaviors},
+        first_ids={parts.number(iri, "level"): parts.number(iri, "firstId", 0) for iri in parts.of_kind("Level")},
     )
-    relations, stated = _facts(facts, tuples, properties, domain, names)
-    initial = _initial(domain, classes, stated, names)
-    levels = {names.short(iri): level for iri, level in from_levels.items() if iri not in nodes}
-    problem = Problem(graph.scene, domain, classes, relations, initial, {}, parents, levels)
-    return Reading(_with_goal(problem, schema), names)
+    return Frame(parts, domain, classes, parents, properties)
+
+
+def reading_of(scene: str, schema: Schema, individuals: Individuals, whole: bool = True) -> Reading:
+    """Return the planning problem of some individuals."""
+    known = frame(schema, individuals.members)
+    names = known.schema.names
+    tuples = {**individuals.tuples, **schema.facts}
+    relations, stated = _facts(individuals.facts, tuples, known.properties, known.domain, names)
+    initial = _initial(known.domain, known.classes, stated, names)
+    levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
+    problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
+    return Reading(_with_goal(problem, known.schema), names, whole)
 
 
 def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
@@ -197,15 +272,16 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 # ------------------------------------------------------------------------------------------------------- from rows to nodes
 
 
-def _nodes(rows: Iterable[Row]) -> dict[str, dict[str, list[str]]]:
+def _nodes(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
     nodes: dict[str, dict[str, list[str]]] = {}
-    for subject, predicate, value in rows:
-        nodes.setdefault(text(subject), {}).setdefault(text(predicate), []).append(text(value))
+    for subject, predicate, value in triples:
+        nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
     return nodes
 
 
-def _iris(row: Row) -> tuple[str, ...]:
-    return tuple(map(text, row))
+def _triple(row: Row) -> tuple[str, str, str]:
+    subject, predicate, value = map(text, row)
+    return subject, predicate, value
 
 
 def _number(term: Term) -> int:
@@ -227,7 +303,7 @@ def _ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> li
     return sorted(iris, key=key)
 
 
-def _superclasses(pairs: Iterable[tuple[str, ...]]) -> dict[str, list[str]]:
+def _superclasses(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
     supers: dict[str, list[str]] = defaultdict(list)
     for sub, sup in pairs:
         if sub != sup:
@@ -394,7 +470,7 @@ def _is_part(node: Node) -> bool:
 
 
 def _situations(
-    schema: _Schema, owners: Sequence[tuple[str, ...]], classes: dict[str, tuple[str, ...]]
+    schema: _Schema, owners: Sequence[tuple[str, str]], classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
     """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
     found, properties = [], {}
