@@ -1,0 +1,46 @@
+"""What was seen goes back into the graph as facts, and planning can start from it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from reasoner.graph import KnowledgeError, load
+from reasoner.observed import assert_observed, load_observed, save_observed
+from reasoner.reading import read
+from reasoner.symbols import Symbol
+
+CUP2 = Symbol("LOCATION", ("cup2",))
+
+
+def test_what_was_observed_replaces_the_value_of_the_scene(tmp_path: Path) -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    save_observed(tmp_path / "observed.ttl", {CUP2: "location8"}, reading.names, graph.scene)
+    seen = load_observed(tmp_path / "observed.ttl", reading)
+    assert seen.problem.initial[CUP2] == "location8"
+    assert replace(seen.problem, initial={**seen.problem.initial, CUP2: "location1"}) == reading.problem
+
+
+def test_the_graph_says_where_things_were_seen_and_the_scene_keeps_its_own() -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    assert_observed(graph, {CUP2: "location8"}, reading.names)
+    rows = graph.select(
+        "SELECT ?v WHERE { ?f a :SituatedObjectInstance ; :about ?o ; :value ?v . ?o rdfs:label 'cup 2'@en }"
+    )
+    assert [reading.names.short(row[0].value) for row in rows if row[0]] == ["location8"]
+    assert read(graph).problem == reading.problem
+
+
+def test_observations_of_another_scene_are_refused(tmp_path: Path) -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    (tmp_path / "observed.ttl").write_text(
+        "@prefix c: <https://w3id.org/confab/core#> . <urn:f> a c:SituatedObjectInstance ; c:about <urn:x> ;"
+        " c:situationType <urn:y> ; c:value <urn:z> ."
+    )
+    with pytest.raises(KnowledgeError, match="which the scene doesn't have"):
+        load_observed(tmp_path / "observed.ttl", reading)
+    with pytest.raises(KnowledgeError, match="no such file"):
+        load_observed(tmp_path / "none.ttl", reading)
