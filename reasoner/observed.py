@@ -45,7 +45,8 @@ def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
     """Put an observed state into the graph `observed`, in place of what was there."""
     target = ox.NamedNode(BASE + "observed")
     graph.store.clear_graph(target)
-    graph.store.extend(ox.Quad(*triple, target) for triple in _triples(state, names, graph.scene))
+    triples = _triples(state, names, graph.scene)
+    graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:
