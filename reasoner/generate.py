@@ -1,7 +1,7 @@
 """Scenes for trials, as ordinary ontology files: a template in Turtle, multiplied and placed.
 
 A family is a Turtle file in ``ontology/families``: a line ``#* SECTION`` heads a block that is repeated for each row of
-that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named here:
+that section, with ``_WORD_`` replaced by the row's value. No type, situation type or behaviour of a domain is named:
 a template speaks of objects of a `first` and a `second` kind.
 
 ==============================  ========================================================================
