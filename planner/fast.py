@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from time import perf_counter
 
 from planner.compiling import Program
@@ -21,7 +22,8 @@ from reasoner.symbols import FALSE, Problem
 
 EASY = Effort(depth=1, expansions=10)
 SHORT = Effort(depth=3, expansions=150)
-LONG = Effort(depth=6, expansions=400)
+LONG = Effort(depth=4, expansions=200)
+WIDE = Effort(depth=5, expansions=1000, slack=1, breadth=3)
 
 
 @dataclass
@@ -88,6 +90,14 @@ class Call:
         self.kept: dict[Cell, str] = {}
         self.steps: list[Done] = []
         self.fallbacks = 0
+        self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
+        self.moved = False
+        upper, lowest = self.program.levels[:-1] or self.program.levels, self.program.levels[-1:]
+        self.efforts = (
+            *product(upper, (SHORT, LONG)),
+            *product(upper, (WIDE,)),
+            *product(lowest, (SHORT, LONG, WIDE)),
+        )
 
     def serialise(self) -> bool:
         """Achieve the goals one after the other; whether all are."""
@@ -112,6 +122,7 @@ class Call:
                     if cell in asleep:
                         del asleep[cell]
                         active.append(cell)
+                        self.failed.pop(cell, None)
                 cell = situation, key
                 if cell in self.kept:
                     asleep.pop(cell, None)
@@ -144,13 +155,21 @@ class Call:
         return True
 
     def harder(self, asleep: dict[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
-        """Achieve one of the sleeping goals by a longer segment, by one on a lower level, or else all at once."""
-        for level in self.program.levels:
-            for effort in (SHORT, LONG):
-                for cell in asleep:
-                    if all(other in self.kept for other in before.get(cell, ())) and self.achieve(level, cell, effort):
-                        self.fallbacks += level != self.program.levels[0]
-                        return True
+        """Achieve one of the sleeping goals by a longer segment, or by one on a lower level."""
+        for level, effort in self.efforts:
+            for cell in asleep:
+                if (level, effort) in self.failed.get(cell, ()) or any(
+                    other not in self.kept for other in before.get(cell, ())
+                ):
+                    continue
+                if self.achieve(level, cell, effort):
+                    self.fallbacks += level != self.program.levels[0]
+                    return True
+                self.failed.setdefault(cell, []).append((level, effort))
+        if self.moved:  # something was done since some of these attempts failed
+            self.failed.clear()
+            self.moved = False
+            return self.harder(asleep, before)
         return False
 
     def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
@@ -158,7 +177,7 @@ class Call:
         forbidden: set[Forbidden] = set()
         mark = len(self.table.trail)
         while True:
-            search = self.segments.seek if effort is LONG else self.segments.find
+            search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
             found = search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
             if found is None:
                 return False
@@ -171,6 +190,7 @@ class Call:
                 done.append(step)
             if len(done) == len(found):
                 self.steps.extend(done)
+                self.moved = True
                 self.kept[cell] = self.goal[cell]
                 return True
             self.table.undo(mark)

@@ -19,7 +19,9 @@ from reasoner.symbols import FALSE
 Done: TypeAlias = "tuple[int, str, tuple[str, ...], tuple[str, ...], tuple[Done, ...]]"
 """A step that was done: level, behaviour, arguments, individuals of its variables, and the steps that refine it."""
 
-REFINING = Effort(depth=8, expansions=400)
+FIRST = Effort(depth=10, expansions=600)
+AGAIN = Effort(depth=10, expansions=40)
+"""For a behaviour of which no refinement is known yet, and for one of which those that are known fail here."""
 TEMPLATES = 8
 """So many templates are kept per behaviour, the last successful first."""
 
@@ -97,7 +99,7 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         self.misses += 1
-        found = self._search(below, individuals, targets)
+        found = self._search(below, individuals, targets, AGAIN if known else FIRST)
         if found is None:
             self.failures += 1
             return None
@@ -121,7 +123,9 @@ class Refiner:
             return None
         return tuple(steps)
 
-    def _search(self, level: int, individuals: tuple[str, ...], targets: dict[Cell, str]) -> tuple[Done, ...] | None:
+    def _search(
+        self, level: int, individuals: tuple[str, ...], targets: dict[Cell, str], effort: Effort
+    ) -> tuple[Done, ...] | None:
         """Search a refinement; a step of it that can't itself be refined is forbidden there, and the search repeated."""
         segments, table = self.segments, self.table
         forbidden: set[Forbidden] = set()
@@ -130,10 +134,10 @@ class Refiner:
         while True:
             segments.focus.clear()
             segments.focus.update(dict.fromkeys(individuals))
-            found = segments.find(level, targets, None, REFINING, forbidden)
+            found = segments.find(level, targets, None, effort, forbidden)
             if found is None and not forbidden:
                 segments.focus.clear()
-                found = segments.find(level, targets, None, REFINING, forbidden)
+                found = segments.find(level, targets, None, effort, forbidden)
             segments.focus.clear()
             segments.focus.update(outer)
             if found is None:

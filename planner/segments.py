@@ -15,7 +15,7 @@ for segments too long for that. What relevance doesn't admit is left to flat sea
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 from planner.compiling import Program
 from planner.plan import Counts
-from planner.table import Cell, Table, arguments_of
+from planner.table import Cell, Key, Table, arguments_of
 from planner.wants import Want, Wants
 from reasoner.symbols import FALSE
 
@@ -39,12 +39,18 @@ class OutOfTimeError(Exception):
     """The time limit of the planning call has passed."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Effort:
-    """How hard to try: most steps, and most expansions."""
+    """How hard to try.
+
+    `depth` is the most steps of a segment or a chain, `expansions` the most of one search; `slack` is by how much a chain may
+    be longer than the shortest, `breadth` how many taken values of a sort are proposed where none is free.
+    """
 
     depth: int
     expansions: int
+    slack: int = 0
+    breadth: int = 1
 
 
 @dataclass
@@ -92,6 +98,7 @@ class Segments:
         The table is left as it was found.
         """
         table, now = self.table, self.table.now
+        self.wants.breadth = effort.breadth
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []
@@ -150,6 +157,7 @@ class Segments:
         The table is left as it was found.
         """
         table, now = self.table, self.table.now
+        self.wants.breadth = effort.breadth
         counts = self.counts[level]
         origin: dict[Cell, str] = {}
         start = len(table.trail)
@@ -170,8 +178,8 @@ class Segments:
                 table.put(situation, key, value)
             found: dict[Ground, None] = {}
             h = 0
-            for (situation, key), value in off.items():
-                h += self.nearest(level, (situation, key, (value,)), effort.depth, found)
+            for cell, value in off.items():
+                h += self.nearest(level, cell, value, effort, found)
             mark = len(table.trail)
             for ground in found if self.advice is None else self.advice(level, table, list(found)):
                 if forbidden and (ground, here) in forbidden:
@@ -188,15 +196,6 @@ class Segments:
                     table.undo(mark)
         table.undo(start)
         return None
-
-    def nearest(self, level: int, want: Want, depth: int, found: dict[Ground, None]) -> int:
-        """Add the behaviours that start the shortest chains towards a want; return the chains' length."""
-        for length in range(1, depth + 1):
-            starts = list(self._towards(level, want, length, {}, set()))
-            if starts:
-                found.update(dict.fromkeys(starts))
-                return length
-        return depth + 1
 
     def step(
         self,
@@ -257,34 +256,56 @@ class Segments:
 
     def relevant(self, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
         """Yield each applicable behaviour that starts a chain of at most `depth` towards a symbol that is off, once."""
-        asked: dict[tuple[Cell, str], int] = {}
         given: set[Ground] = set()
-        for (situation, key), value in off.items():
-            yield from self._towards(level, (situation, key, (value,)), depth, asked, given)
+        for cell, value in off.items():
+            for length, ground in self.chains(level, cell, value):
+                if length > depth:
+                    break
+                if ground is not None and ground not in given:
+                    given.add(ground)
+                    yield ground
 
-    def _towards(
-        self, level: int, want: Want, depth: int, asked: dict[tuple[Cell, str], int], given: set[Ground]
-    ) -> Iterator[Ground]:
-        situation, key, values = want
-        for value in values:
-            question = (situation, key), value
-            if asked.get(question, 0) >= depth:
-                continue
-            asked[question] = depth
-            for achiever in self.program.achievers.get((level, situation), ()):
-                achieve = self.achieve[achiever.behavior, achiever.effect]
-                deeper = []
-                for arguments, unmet, env in achieve(*arguments_of(key), value):
-                    if unmet:
-                        deeper.append((unmet, env))
-                    elif (ground := (achiever.behavior, arguments)) not in given:
-                        given.add(ground)
-                        yield ground
-                if depth > 1:
-                    for unmet, env in deeper:
-                        for number in unmet:
-                            for further in self.wants.of(achiever, achiever.soft[number], env, level):
-                                yield from self._towards(level, further, depth - 1, asked, given)
+    def nearest(self, level: int, cell: Cell, value: str, effort: Effort, found: dict[Ground, None]) -> int:
+        """Add the behaviours that start the shortest chains to a value, or hardly longer ones; return the shortest length."""
+        shortest = effort.depth + 1
+        for length, ground in self.chains(level, cell, value):
+            if length > min(shortest + effort.slack, effort.depth):
+                break
+            if ground is not None:
+                found[ground] = None
+                shortest = min(shortest, length)
+        return shortest
+
+    def chains(self, level: int, cell: Cell, value: str) -> Iterator[tuple[int, Ground | None]]:
+        """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
+
+        Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer.
+        """
+        asked: set[tuple[str, Key, str]] = set()
+        wants: Iterable[Want] = [(*cell, (value,))]
+        length = 0
+        while wants:
+            length += 1
+            yield length, None
+            blocked = []
+            for situation, key, values in wants:
+                for wanted in values:
+                    if (question := (situation, key, wanted)) in asked:
+                        continue
+                    asked.add(question)
+                    for achiever in self.program.achievers.get((level, situation), ()):
+                        achieve = self.achieve[achiever.behavior, achiever.effect]
+                        for arguments, unmet, env in achieve(*arguments_of(key), wanted):
+                            if unmet:
+                                blocked.append((achiever, unmet, env))
+                            else:
+                                yield length, (achiever.behavior, arguments)
+            wants = [
+                want
+                for achiever, unmet, env in blocked
+                for number in unmet
+                for want in self.wants.of(achiever, achiever.soft[number], env, level)
+            ]
 
     def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
         """Return the symbols whose change could make a value attainable in one step."""

@@ -132,9 +132,14 @@ class Alike:
 
 
 def representatives(
-    groups: Sequence[Sequence[str]], who: Mapping[str, Mapping[Key, None]], wanted: Mapping[str, object]
+    groups: Sequence[Sequence[str]],
+    who: Mapping[str, Mapping[Key, None]],
+    wanted: Mapping[str, object],
+    breadth: int = 1,
 ) -> list[str]:
-    """Return one value per group: the first that nobody has and no goal wants, else one that nobody has, else the first.
+    """Return one value per group: the first that nobody has and no goal wants.
+
+    Where there is none, a few that nobody has; where there are none of these either, the first `breadth`.
 
     >>> representatives([["a", "b", "c"], ["d"]], {"a": {"x": None}}, {"b": True})
     ['c', 'd']
@@ -145,5 +150,5 @@ def representatives(
         if best is not None:
             found.append(best)
         else:
-            found.extend([value for value in group if not who.get(value)][:4] or group[:1])
+            found.extend([value for value in group if not who.get(value)][:4] or group[:breadth])
     return found

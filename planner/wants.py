@@ -43,6 +43,7 @@ class Wants:
         self.program = program
         self.table = table
         self.goal = goal
+        self.breadth = 1
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
             self.wanted.setdefault(situation, {})[value] = None
@@ -108,7 +109,7 @@ class Wants:
         if len(members) <= FEW:
             return members
         groups = self.program.alike.groups(members)
-        found = representatives(groups, self.table.who[situation], self.wanted.get(situation, {}))
+        found = representatives(groups, self.table.who[situation], self.wanted.get(situation, {}), self.breadth)
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
             found.insert(0, goal)
