@@ -20,6 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
+from reasoner.definitions import EXPRESSIONS, Definitions
 from reasoner.graph import CORE, SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
 from reasoner.names import Names, local_name, nearest
 from reasoner.symbols import (
@@ -27,7 +28,6 @@ from reasoner.symbols import (
     TRUE,
     AnyOf,
     Behavior,
-    ClassCondition,
     Condition,
     Domain,
     EqualityCondition,
@@ -68,6 +68,7 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
     FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
   UNION {{ {{ SELECT ?node WHERE {{ ?node a :SituatedObjectInstance ; :about ?object }} LIMIT 1 }}
     BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
+  UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
 }} ORDER BY ?part ?node ?property ?value"""
 """What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own."""
 MEMBERS = """
@@ -107,7 +108,8 @@ class Schema:
     """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
 
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
-    property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody.
+    property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody;
+    `expressions` are the definitions of classes.
     """
 
     nodes: Mapping[str, Node]
@@ -117,6 +119,7 @@ class Schema:
     from_levels: Mapping[str, int]
     facts: Mapping[str, Node]
     tuples: bool
+    expressions: Mapping[str, Node]
 
 
 @dataclass(frozen=True)
@@ -159,6 +162,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         from_levels={value: int(level) for value, _, level in parts["level"]},
         facts=_nodes(parts["fact"]),
         tuples=bool(parts["tuples"]),
+        expressions=_nodes(parts["expression"]),
     )
 
 
@@ -189,7 +193,8 @@ def frame(schema: Schema, members: Sequence[tuple[str, str, int]]) -> Frame:
         | {s for pair in supers.items() for s in (pair[0], *pair[1])}
         | {kind for node in nodes.values() for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())}
     )
-    parts = _Schema(nodes, names, terms, set(schema.pairs))
+    definitions = Definitions(schema.expressions, _value_properties(schema), names)
+    parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
     classes, parents = _classes(instances, supers, names)
     situations, properties = _situations(parts, schema.owners, classes)
     behaviors = sorted(_ordered(parts.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
@@ -351,6 +356,7 @@ class _Schema:
     names: Names
     terms: set[str]
     pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
+    definitions: Definitions
 
     def of_kind(self, kind: str) -> list[str]:
         return [iri for iri, node in self.nodes.items() if _is(node, kind)]
@@ -376,7 +382,11 @@ class _Schema:
         return "?" + local_name(iri).rsplit(".", 1)[-1] if iri in self.terms else self.names.short(iri)
 
     def parameter(self, iri: str) -> Parameter:
-        return Parameter(self.term(iri), self.names.short(self.one(iri, "termType")))
+        return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
+
+    def membership(self, iri: str) -> tuple[Condition, ...]:
+        """Return what the type of a term asks of it, if that is a class defined by situations."""
+        return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
 
     def arguments(self, iri: str) -> tuple[str, ...]:
         names = ("about", *(f"argument{position}" for position in range(2, 10)))
@@ -401,19 +411,18 @@ class _Schema:
             arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
             return RelationCondition(self.names.short(self.one(iri, "relation")), arguments, negated)
         if _is(node, "ClassCondition"):
-            return ClassCondition(
-                self.term(self.one(iri, "about")), self.names.short(self.one(iri, "ofClass")), negated
-            )
+            return self.definitions.condition(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
         if _is(node, "EqualityCondition"):
             return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
         if _is(node, "AbsenceCondition"):
             name, _, value = self.situation_and_value(iri)
-            anyone = "?anyone"
-            inner = ValueCondition(name, (anyone,), value)
-            return Witness(anyone, self.names.short(self.one(iri, "ofClass")), (inner,), not negated)
+            anyone, kind = "?anyone", self.one(iri, "ofClass")
+            inner = (ValueCondition(name, (anyone,), value), *self.definitions.beyond_base(anyone, kind))
+            return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not negated)
         if _is(node, "Witness"):
-            variable = self.parameter(self.one(iri, "witness"))
-            return Witness(variable.name, variable.kind, self.conditions(iri, "condition"), negated)
+            sought = self.one(iri, "witness")
+            variable, inner = self.parameter(sought), (*self.conditions(iri, "condition"), *self.membership(sought))
+            return Witness(variable.name, variable.kind, inner, negated)
         if _is(node, "AnyOf"):
             groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
             return AnyOf(tuple(groups), negated)
@@ -442,7 +451,10 @@ class _Schema:
             level=self.number(iri, "level"),
             parameters=parameters,
             variables=tuple(map(self.parameter, used)),
-            preconditions=self.conditions(iri, "precondition"),
+            preconditions=(
+                *self.conditions(iri, "precondition"),
+                *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
+            ),
             effects=tuple(self.effect(value) for value in self.values(iri, "postcondition")),
             cost=float(cost[0]) if cost else 1.0,
         )
@@ -463,6 +475,15 @@ class _Schema:
                         seen.add(value)
                         waiting.append(value)
         return found - bound
+
+
+def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
+    """Return the situation type of each value property, and whether it is functional."""
+    return {
+        prop: (iri, iri not in schema.pairs)
+        for iri, node in schema.nodes.items()
+        for prop in node.get(CORE + "valueProperty", ())
+    }
 
 
 def _is_part(node: Node) -> bool:
@@ -531,7 +552,7 @@ def _facts(
             stated[Symbol(situation, pair)].add(TRUE)
         else:
             stated[Symbol(situation, pair[:1])].add(pair[1])
-    facts = _Schema(tuples, names, set(), set())
+    facts = _Schema(tuples, names, set(), set(), Definitions({}, {}, names))
     for iri, node in tuples.items():
         if CORE + "relation" in node:
             tail = [names.short(v) for v in facts.values(iri, "value")]
