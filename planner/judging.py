@@ -1,0 +1,240 @@
+"""Cogency of a candidate from counts: how much more its facts speak for choosing it than for passing it over.
+
+c, p    how often such candidates were chosen, and passed over (or chosen in vain)
+L       ln((c + ½) / (p + ½)) + Σ w_f · ln(p(f | chosen) / p(f | passed over)) over the facts f
+w_f     relevance of a fact: Jensen–Shannon divergence of both distributions, less what chance alone gives
+o       σ(L), then for each class level downwards (c + κ o) / (c + p + κ) with the counts of the very same pattern
+
+Equation (1) of the paper drops a factor that all conclusions share, because all see the same facts. Lifted facts differ from one
+candidate to the next; the share of candidates passed over of which they hold, in the denominator, restores the comparison.
+Probabilities back off over classes, from the parameters' types down to the most specific ones: (m p̂ + α p_above) / (m + α), with
+the same m, the lesser of both sums, on both sides.
+
+After R. Hecht-Nielsen, "Cogent confabulation", Neural Networks 18 (2005) 111-115; back-off as in S. Katz, IEEE TASSP 35 (1987),
+with the linear shrinkage of Jelinek and Mercer (1980).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tallies, lineage
+
+ALPHA = 1.0  # how much the class above weighs in a probability
+KAPPA = 2.0  # how much L weighs against counts of the same pattern
+DECAY = 0.9  # per episode, of what was preferred among equals
+LEAST = 1e-3  # a fact of less relevance isn't looked at
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One summand of a cogency: what spoke, and how strongly (natural logarithm; positive speaks for choosing)."""
+
+    fact: str
+    value: str
+    weight: float
+
+
+@dataclass
+class Sums:
+    """The counts of all conclusions of a class level: of facts, and of whole patterns of the relevant facts."""
+
+    chosen: float = 0.0
+    passed: float = 0.0
+    facts: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    patterns: dict[Pattern, list[float]] = field(default_factory=dict)
+    weights: dict[str, float] = field(default_factory=dict)
+
+    def add(self, pattern: Pattern, chosen: float, passed: float) -> None:
+        """Count a pattern and each of its facts."""
+        self.chosen += chosen
+        self.passed += passed
+        for fact, value in pattern:
+            pair = self.facts.setdefault(fact, {}).setdefault(value, [0.0, 0.0])
+            pair[0] += chosen
+            pair[1] += passed
+
+    def relevance(self, fact: str) -> float:
+        """Return w of a fact, in [0, 1]; asked once all is counted."""
+        if fact not in self.weights:
+            self.weights[fact] = relevance([(c, p) for c, p in self.facts.get(fact, {}).values()])
+        return self.weights[fact]
+
+
+def relevance(pairs: Sequence[tuple[float, float]]) -> float:
+    """Return the Jensen–Shannon divergence of two distributions given as counts, less its small-sample bias, in [0, 1].
+
+    >>> relevance([(50, 0), (0, 50)]) > 0.9, relevance([(50, 50), (50, 50)]), relevance([(1, 0), (0, 1)]) < 0.7
+    (True, 0.0, True)
+    """
+    chosen, passed = sum(c for c, _ in pairs), sum(p for _, p in pairs)
+    if not chosen or not passed:
+        return 0.0
+    divergence = 0.0
+    for c, p in pairs:
+        a, b = c / chosen, p / passed
+        middle = (a + b) / 2
+        divergence += (a * math.log(a / middle) if a else 0.0) + (b * math.log(b / middle) if b else 0.0)
+    bias = (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
+    return min(max((divergence / 2 - bias) / math.log(2), 0.0), 1.0)
+
+
+class Judge:
+    """What an experience says of candidates; reads it once, and remembers its verdicts.
+
+    Parameters
+    ----------
+    experience : Experience
+    parents : mapping of class to its superclasses
+    roles : mapping of behaviour to the class of each of its roles
+        Where back-off ends.
+    without : facts that are not looked at
+        For explanations: what would be chosen without them?
+    """
+
+    def __init__(
+        self,
+        experience: Experience,
+        parents: Mapping[str, tuple[str, ...]],
+        roles: Mapping[str, Sequence[str]],
+        without: frozenset[str] = frozenset(),
+    ) -> None:
+        self.parents, self.roles, self._without = parents, roles, without
+        self.tallies: dict[str, Tallies] = {}
+        for conclusion, patterns in experience.totals().items():
+            if len(conclusion.classes) == len(roles.get(conclusion.behavior, ())):
+                self.tallies.setdefault(conclusion.behavior, {})[conclusion] = patterns
+        self.preferred = experience.preferences(DECAY)
+        self._chains: dict[Conclusion, tuple[tuple[str, ...], ...]] = {}
+        self._sums: dict[tuple[str, tuple[str, ...]], Sums] = {}
+        self.facts: dict[str, frozenset[str]] = {}
+        for behavior in self.tallies:
+            top = self._raw(behavior, tuple(roles[behavior]))
+            within = [self._raw(behavior, c.classes) for c in self.tallies[behavior]]
+            self.facts[behavior] = frozenset(
+                fact
+                for fact in top.facts
+                if fact not in without and any(sums.relevance(fact) > LEAST for sums in (top, *within))
+            )
+        self._odds: dict[tuple[Conclusion, Pattern], float] = {}
+
+    def knows(self, behaviors: Iterable[str]) -> bool:
+        """Whether anything was learned of any of these behaviours."""
+        return any(behavior in self.tallies for behavior in behaviors)
+
+    def odds(self, conclusion: Conclusion, pattern: Pattern) -> float:
+        """Return ln(o / (1 - o)): positive if such a candidate is rather chosen than passed over.
+
+        The pattern may have more facts than are looked at.
+        """
+        key = conclusion, pattern
+        found = self._odds.get(key)
+        if found is None:
+            found = self._odds[key] = sum(factor.weight for factor in self.factors(Candidate(conclusion, pattern)))
+        return found
+
+    def cogency(self, candidate: Candidate) -> float:
+        """Return the candidate's odds, and what is preferred among its equals."""
+        return self.odds(candidate.conclusion, candidate.pattern) + self.preference(candidate)
+
+    def preference(self, candidate: Candidate) -> float:
+        """Return how much the individuals themselves are preferred to others in their roles."""
+        return sum(factor.weight for factor in self._preferences(candidate))
+
+    def factors(self, candidate: Candidate) -> list[Factor]:
+        """Return the summands of a candidate's cogency, the facts in their order."""
+        behavior = candidate.conclusion.behavior
+        if behavior not in self.tallies:
+            return []
+        looked = self.facts[behavior]
+        pattern = tuple(pair for pair in candidate.pattern if pair[0] in looked)
+        levels = [self._level(behavior, classes) for classes in self._chain(candidate.conclusion)]
+        prior = 0.0
+        weights = dict.fromkeys((fact for fact, _ in pattern), 0.0)
+        ratios: dict[str, tuple[float, float]] = {}
+        for sums in levels:
+            total = sums.chosen + sums.passed
+            here = math.log((sums.chosen + 0.5) / (sums.passed + 0.5))
+            prior = (total * here + ALPHA * prior) / (total + ALPHA)
+            m = min(sums.chosen, sums.passed)
+            if not m:
+                continue
+            for fact, value in pattern:
+                table = sums.facts.get(fact, {})
+                above = ratios.get(fact) or (1 / (len(table) + 1),) * 2
+                c, p = table.get(value, (0.0, 0.0))
+                ratios[fact] = (
+                    (m * c / sums.chosen + ALPHA * above[0]) / (m + ALPHA),
+                    (m * p / sums.passed + ALPHA * above[1]) / (m + ALPHA),
+                )
+                weights[fact] = (m * sums.relevance(fact) + ALPHA * weights[fact]) / (m + ALPHA)
+        found = [Factor(f"{candidate.conclusion}", "prior", prior)]
+        found += [
+            Factor(fact, value, weights[fact] * math.log(ratios[fact][0] / ratios[fact][1]))
+            for fact, value in pattern
+            if fact in ratios
+        ]
+        before = sum(factor.weight for factor in found)
+        after = before
+        for sums in levels:
+            c, p = sums.patterns.get(pattern, (0.0, 0.0))
+            o = 1 / (1 + math.exp(-max(min(after, 50.0), -50.0)))
+            o = (c + KAPPA * o) / (c + p + KAPPA)
+            if c + p:
+                after = math.log(max(o, 1e-9)) - math.log(max(1 - o, 1e-9))
+        c, p = levels[0].patterns.get(pattern, (0.0, 0.0))
+        found.append(Factor("all of this together", f"chosen {c:g} of {c + p:g}", after - before))
+        return found + self._preferences(candidate)
+
+    def _preferences(self, candidate: Candidate) -> list[Factor]:
+        found = []
+        table = self.preferred.get(candidate.conclusion)
+        for role, individual in candidate.roles if table else ():
+            fact = f"{role} is"
+            rows = {who: pair for (of, who), pair in table.items() if of == fact}  # type: ignore[union-attr]
+            if individual in rows and fact not in self._without:
+                c, p = rows[individual]
+                found.append(Factor(fact, individual, relevance(list(rows.values())) * math.log((c + 0.5) / (p + 0.5))))
+        return found
+
+    def _chain(self, conclusion: Conclusion) -> tuple[tuple[str, ...], ...]:
+        """Return the class levels of a conclusion, the parameters' types first."""
+        found = self._chains.get(conclusion)
+        if found is None:
+            lines = [
+                lineage(kind, top, self.parents)
+                for kind, top in zip(conclusion.classes, self.roles[conclusion.behavior], strict=True)
+            ]
+            depth = max(map(len, lines), default=1)
+            levels = [tuple(line[min(i, len(line) - 1)] for line in lines) for i in range(depth)]
+            found = self._chains[conclusion] = tuple(dict.fromkeys(levels))
+        return found
+
+    def _members(self, behavior: str, classes: tuple[str, ...]) -> Iterable[dict[Pattern, tuple[float, float]]]:
+        """Yield the patterns of each conclusion that passes through a class level."""
+        for conclusion, patterns in self.tallies[behavior].items():
+            if classes in self._chain(conclusion):
+                yield {k: (float(t.chosen), float(t.passed_over + t.failed)) for k, t in patterns.items()}
+
+    def _raw(self, behavior: str, classes: tuple[str, ...]) -> Sums:
+        sums = Sums()
+        for patterns in self._members(behavior, classes):
+            for pattern, (c, p) in patterns.items():
+                sums.add(pattern, c, p)
+        return sums
+
+    def _level(self, behavior: str, classes: tuple[str, ...]) -> Sums:
+        """Return the counts of a class level, with patterns of the relevant facts only."""
+        key = behavior, classes
+        found = self._sums.get(key)
+        if found is None:
+            found = self._sums[key] = self._raw(behavior, classes)
+            looked = self.facts[behavior]
+            for patterns in self._members(behavior, classes):
+                for pattern, (c, p) in patterns.items():
+                    pair = found.patterns.setdefault(tuple(f for f in pattern if f[0] in looked), [0.0, 0.0])
+                    pair[0] += c
+                    pair[1] += p
+        return found

@@ -1,0 +1,258 @@
+"""Search that experience leads: best-first by how often the path departed from the most cogent choice.
+
+d          rank discrepancies along the path: 0 while always the most cogent candidate was done; the least d is expanded next,
+           of equals the deepest
+sure       odds above which a candidate is done without looking for a better one
+focus      for each open goal, the most cogent candidate that works towards it; kept until something near it changes
+
+Every node that isn't exhausted stays on the heap, so that all relevant behaviours are tried in the end. Nothing is shared with
+the search that does without memory.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from planner.deciding import Field, Ground
+from planner.describing import Values
+from planner.judging import Judge
+from planner.table import Cell, Key, arguments_of
+from reasoner.experience import Conclusion
+
+SURE = 0.0  # ln odds: rather chosen than passed over
+NEAR, FAR = (
+    3,
+    6,
+)  # how many steps ahead a candidate may begin to work towards a goal; the second if the first gives none
+
+Here: TypeAlias = "frozenset[tuple[Cell, str]]"
+
+
+@dataclass(eq=False)
+class Node:
+    """A state, by the behaviour that led to it; `quick` until all its candidates were ranked."""
+
+    above: Node | None
+    ground: Ground | None
+    depth: int
+    quick: bool = True
+    tried: set[Ground] = field(default_factory=set)
+
+    def path(self) -> list[Ground]:
+        """Return the behaviours that lead here."""
+        found, node = [], self
+        while node.above is not None and node.ground is not None:
+            found.append(node.ground)
+            node = node.above
+        return found[::-1]
+
+
+class Stream:
+    """A search that can be done expansion by expansion.
+
+    Parameters
+    ----------
+    field : Field
+    judge : Judge
+    """
+
+    def __init__(self, field: Field, judge: Judge) -> None:
+        self.field, self.judge = field, judge
+        schema = field.schema
+        field.view.only = {
+            name: [i for i, q in enumerate(schema.paths(name)[1]) if q.name in judge.facts[name]]
+            for name in judge.facts
+        }
+        self.expanded = self.generated = self.evaluated = 0
+        self.solution: list[Ground] | None = None
+        self.best = len(field.unmet())
+        self.fruitless = 0
+        root = Node(None, None, 0)
+        self.heap: list[tuple[int, int, int, Node, Ground | None]] = [(0, 0, 0, root, None)]
+        self.at, self.start = root, len(field.table.trail)
+        self.seen: set[Here] = set()
+        self.focus: dict[Cell, tuple[float, Ground]] = {}
+        self.stale: set[Cell] = set(field.goal)
+        self.touching: dict[str, list[Cell]] = {}
+        for cell, value in field.goal.items():
+            for individual in {*arguments_of(cell[1]), value}:
+                self.touching.setdefault(individual, []).append(cell)
+        self._known: dict[tuple[str, tuple[str, ...], Values], float] = {}
+        self._conclusions: dict[tuple[str, tuple[str, ...]], Conclusion] = {}
+        if not self.best:
+            self.solution = []
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether nothing is left to be tried."""
+        return not self.heap
+
+    def expand(self) -> bool:
+        """Expand one node; whether the goal was reached."""
+        while self.heap and self.solution is None:
+            d, _, _, node, ground = heapq.heappop(self.heap)
+            if ground is not None:
+                node = self._child(node, ground)  # type: ignore[assignment]
+                if node is None:
+                    continue
+            elif node is not self.at:
+                self._go(node)
+            if not self.field.unmet():
+                self.solution = node.path()
+                return True
+            self._expand(node, d)
+            return self._lucky()
+        return self.solution is not None
+
+    def forbid(self, path: Sequence[Ground]) -> None:
+        """Take back a solution because of its last step, which can't be refined where it stands: search on without it."""
+        self.solution = None
+        self._rank(self._reached(path), 0)
+
+    # ------------------------------------------------------------------------------------------------------- expanding
+
+    def _lucky(self) -> bool:
+        """Go on to the child that was pushed last, if it is next, to see whether it reaches the goal."""
+        d, _, _, node, ground = self.heap[0] if self.heap else (0, 0, 0, None, None)
+        if node is not self.at or ground is None:
+            return False
+        child = self._child(node, ground)
+        heapq.heappop(self.heap)
+        if child is None:
+            return False
+        left = len(self.field.unmet())
+        self.fruitless = 0 if left < self.best else self.fruitless + 1
+        self.best = min(self.best, left)
+        if not left:
+            self.solution = child.path()
+            return True
+        heapq.heappush(self.heap, (d, -child.depth, self._count(), child, None))
+        return False
+
+    def _expand(self, node: Node, d: int) -> None:
+        self.expanded += 1
+        if node.quick:
+            node.quick = False
+            ground = self._most_cogent()
+            if ground is not None:
+                node.tried.add(ground)
+                heapq.heappush(self.heap, (d, -node.depth - 1, self._count(), node, ground))
+                heapq.heappush(self.heap, (d + 1, -node.depth, self._count(), node, None))
+                return
+        self._rank(node, d)
+
+    def _rank(self, node: Node, d: int) -> None:
+        """Push all candidates of a node that weren't tried, the most cogent with the least discrepancy."""
+        scored: dict[Ground, float] = {}
+        for reach in (NEAR, FAR):
+            for cell in self.field.unmet():
+                for ground in self.field.proposals([cell], reach):
+                    if ground not in scored and ground not in node.tried:
+                        scored[ground] = self._odds(ground)
+            if scored:
+                break
+        self.generated += len(scored)
+        ranked = sorted(scored, key=lambda ground: (-scored[ground], ground))
+        for rank, ground in enumerate(ranked):
+            node.tried.add(ground)
+            heapq.heappush(self.heap, (d + rank, -node.depth - 1, self._count(), node, ground))
+
+    def _most_cogent(self) -> Ground | None:
+        """Return the most cogent candidate; a sure one if there is one where something changed."""
+        open_goals = self.field.unmet()
+        self.focus = {cell: self.focus[cell] for cell in open_goals if cell in self.focus}
+        for complete in (False, True):
+            for cell in open_goals:
+                if complete or cell in self.stale:
+                    self._look(cell)
+            self.stale.clear()
+            while self.focus:
+                cell = max(self.focus, key=lambda cell: self.focus[cell][0])
+                odds, ground = self.focus[cell]
+                if odds <= SURE and not complete:
+                    break
+                if complete or (self.field.roles(ground) is not None and self._odds(ground) >= odds - 1e-9):
+                    return ground
+                self._look(cell)
+        return None
+
+    def _look(self, cell: Cell) -> None:
+        """Find the most cogent candidate for one goal."""
+        self.focus.pop(cell, None)
+        found: tuple[float, Ground] | None = None
+        for reach in (NEAR, FAR):
+            for ground in self.field.proposals([cell], reach):
+                self.generated += 1
+                odds = self._odds(ground)
+                if found is None or odds > found[0]:
+                    found = odds, ground
+            if found is not None:
+                self.focus[cell] = found
+                return
+
+    def _odds(self, ground: Ground) -> float:
+        roles = self.field.roles(ground)
+        if roles is None:
+            return float("-inf")
+        self.evaluated += 1
+        name = ground[0]
+        view = self.field.view
+        values = view.values(name, roles) if name in self.judge.facts else ()
+        key = name, tuple([self.field.schema.classes.get(role, "") for role in roles]), values
+        known = self._known.get(key)
+        if known is None:
+            conclusion = Conclusion(*key[:2])
+            known = self._known[key] = self.judge.odds(conclusion, view.pattern(name, values) if values else ())
+        if self.judge.preferred:
+            known += self.judge.preference(view.candidate(name, roles, values))
+        return known
+
+    # --------------------------------------------------------------------------------------------------------- moving
+
+    def _child(self, node: Node, ground: Ground) -> Node | None:
+        """Do a behaviour in a node's state; None if that leads where the search has been."""
+        if node is not self.at:
+            self._go(node)
+        mark = len(self.field.table.trail)
+        if not self.field.do(ground):
+            return None
+        here = frozenset(self.field.table.since(self.start).items())
+        if here in self.seen:
+            self.field.table.undo(mark)
+            return None
+        self.seen.add(here)
+        self._touch(mark)
+        self.at = Node(node, ground, node.depth + 1)
+        return self.at
+
+    def _touch(self, mark: int) -> None:
+        """Note which goals have something to do with what changed."""
+        table = self.field.table
+        for situation, key, old in table.trail[mark:]:
+            near: set[Key] = {*arguments_of(key), old, table.now[situation][key]}
+            near.update(cells[key] for cells in table.now.values() if key in cells)
+            for individual in near:
+                self.stale.update(self.touching.get(individual, ()))  # type: ignore[arg-type]
+
+    def _go(self, node: Node) -> None:
+        self.field.table.undo(self.start)
+        for ground in node.path():
+            self.field.do(ground)
+        self.at = node
+        self.focus.clear()
+        self.stale.update(self.field.goal)
+
+    def _reached(self, path: Sequence[Ground]) -> Node:
+        node = Node(None, None, 0, quick=False)
+        for ground in path[:-1]:
+            node = Node(node, ground, node.depth + 1, quick=False)
+        node.tried.add(path[-1])
+        self._go(node)
+        return node
+
+    def _count(self) -> int:
+        self.generated += 1
+        return -self.generated
