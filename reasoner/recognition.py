@@ -231,7 +231,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame, schema: Schema) ->
         yield from _steps_by_nodes(terms, len(terms) > 2, schema)
     elif isinstance(condition, ValueCondition) and not condition.negated and condition.value != FALSE:
         situation = known.domain.situations[condition.situation]
-        terms = condition.arguments if situation.boolean else (*condition.arguments, condition.value)
+        terms = condition.arguments if condition.value == TRUE else (*condition.arguments, condition.value)
         if len(terms) != 2 or condition.situation not in {name for name, _ in known.properties.values()}:
             yield from _steps_by_nodes(terms, True, schema, condition.situation)
             return
@@ -240,7 +240,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame, schema: Schema) ->
         yield _Step(subject, value, FREE)
         kind = scope.kinds.get(value)
         constants = frozenset({value}) if kind is None else frozenset(known.classes.get(kind, ()))
-        if situation.default in constants and not situation.boolean:
+        if situation.default in constants:
             return  # who has the default may not say so: it can't be found by it
         back = properties | (frozenset({CORE + "value"}) if schema.tuples else frozenset())
         cost = FROM_CONSTANT if kind is None else BACKWARD

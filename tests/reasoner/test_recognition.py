@@ -1,0 +1,185 @@
+"""The slice that a task can need has the same answer as the whole world, and doesn't grow with what is irrelevant."""
+
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from hypothesis import assume, event, given, settings
+from hypothesis import strategies as st
+
+from planner.behaviors import DomainError, Model, ground
+from planner.plan import Limits, Status
+from planner.refinement import plan
+from planner.search import mismatches
+from reasoner.generate import families, generate, write_scene
+from reasoner.graph import KnowledgeError, KnowledgeGraph, load
+from reasoner.reading import read, with_goals
+from reasoner.recognition import readings, recognise
+from reasoner.symbols import Problem
+from tests.reasoner.worlds import HEAD, graph_of, worlds
+
+
+def solvable(problem: Problem, most: int) -> bool | None:
+    """Return whether exhaustive search of level 1 finds the goal; None if that is too much."""
+    model = Model(problem)
+    grounds = ground(problem, 1)
+    start = model.values(problem.initial)
+    goal = {i: problem.goal[symbol] for i, symbol in enumerate(model.symbols) if symbol in problem.goal}
+    seen, waiting = {start}, [start]
+    while waiting:
+        state = waiting.pop()
+        if not mismatches(state, goal):
+            return True
+        if len(seen) > most:
+            return None
+        for applied in model.successors(grounds, state):
+            if applied.after not in seen:
+                seen.add(applied.after)
+                waiting.append(applied.after)
+    return False
+
+
+@settings(max_examples=300)
+@given(text=worlds())
+def test_the_slice_has_a_plan_exactly_if_the_world_has_one(text: str) -> None:
+    with TemporaryDirectory() as folder:
+        graph = graph_of(text, Path(folder))
+        whole, sliced = read(graph).problem, recognise(graph).problem
+    try:
+        expected = solvable(whole, 300)
+        found = solvable(sliced, 300 if expected is None else 10_000)
+    except DomainError:
+        assume(False)
+    assume(expected is not None)
+    left_out = len(whole.initial) - len(sliced.initial)
+    event(f"{'solvable' if expected else 'unsolvable'}, {'some' if left_out else 'nothing'} left out")
+    assert found is expected
+    kept = {name for members in sliced.classes.values() for name in members}
+    assert sliced.classes == {kind: tuple(m for m in members if m in kept) for kind, members in whole.classes.items()}
+
+
+def test_who_has_to_come_from_elsewhere_is_found(tmp_path: Path) -> None:
+    """To color x, somebody has to be where x is; y can come from s1, from which s0 is near, but not from s0 back."""
+    text = (
+        HEAD
+        + """
+    w:s0 a owl:NamedIndividual, w:Spot .
+    w:s1 a owl:NamedIndividual, w:Spot ; w:near w:s0 .
+    w:x a owl:NamedIndividual, w:Thing ; w:at w:s0 .
+    w:y a owl:NamedIndividual, w:Tool ; w:at w:s1 .
+    w:far a owl:NamedIndividual, w:Tool ; w:at w:nowhere .
+    w:PAINT a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:PAINT.x ; :precondition w:PAINT.at, w:PAINT.with ;
+      :postcondition w:PAINT.blue .
+    w:PAINT.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+    w:PAINT.z a owl:NamedIndividual, :Variable ; :termType w:Spot .
+    w:PAINT.w a owl:NamedIndividual, :Variable ; :termType w:Tool .
+    w:PAINT.at a owl:NamedIndividual, :ValueCondition ; :about w:PAINT.x ; :situationType w:AT ; :value w:PAINT.z .
+    w:PAINT.with a owl:NamedIndividual, :Witness ; :witness w:PAINT.w ; :condition w:PAINT.there .
+    w:PAINT.there a owl:NamedIndividual, :ValueCondition ; :about w:PAINT.w ; :situationType w:AT ; :value w:PAINT.z .
+    w:PAINT.blue a owl:NamedIndividual, :ValueEffect ; :about w:PAINT.x ; :situationType w:COLOR ; :value w:blue .
+    w:GO a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:GO.y, w:GO.to ; :precondition w:GO.at, w:GO.near ;
+      :postcondition w:GO.there .
+    w:GO.y a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Tool .
+    w:GO.to a owl:NamedIndividual, :Parameter ; :index 2 ; :termType w:Spot .
+    w:GO.from a owl:NamedIndividual, :Variable ; :termType w:Spot .
+    w:GO.at a owl:NamedIndividual, :ValueCondition ; :about w:GO.y ; :situationType w:AT ; :value w:GO.from .
+    w:GO.near a owl:NamedIndividual, :RelationCondition ; :about w:GO.from ; :relation w:near ; :value w:GO.to .
+    w:GO.there a owl:NamedIndividual, :ValueEffect ; :about w:GO.y ; :situationType w:AT ; :value w:GO.to .
+    w:task a owl:NamedIndividual, :Task ; :goal w:task.g .
+    w:task.g a owl:NamedIndividual, :ValueCondition ; :about w:x ; :situationType w:COLOR ; :value w:blue .
+    """
+    )
+    sliced = recognise(graph_of(text, tmp_path)).problem
+    assert sliced.classes["Thing"] == ("x", "y")
+    assert solvable(sliced, 100)
+
+
+@pytest.mark.parametrize("family", families())
+def test_clutter_is_left_out_and_nothing_else_that_moves(tmp_path: Path, family: str) -> None:
+    write_scene(tmp_path / "scene.ttl", family, objects=8, hands=3, clutter=30, seed=3)
+    write_scene(tmp_path / "bare.ttl", family, objects=8, hands=3, seed=3)
+    sliced, bare = recognise(load(tmp_path / "scene.ttl")), read(load(tmp_path / "bare.ttl"))
+    assert sliced.problem.domain == bare.problem.domain
+    reached = {place for _, place in bare.problem.relations["canReach"]}
+    places = reached | {value for symbol, value in bare.problem.goal.items() if symbol.situation == "LOCATION"}
+    assert places <= set(sliced.problem.classes["Location"])
+    if family != "random":  # where an object can stand beyond every reach
+        for kind in ("Movable", "Hand", "Location", "Beverage"):
+            assert sliced.problem.classes[kind] == bare.problem.classes[kind]
+        assert sliced.problem.initial == bare.problem.initial
+    assert sliced.problem.goal == bare.problem.goal
+
+
+def test_the_paper_s_scene_keeps_all_that_its_ids_count() -> None:
+    graph = load("beverage-serving")
+    whole, sliced = read(graph).problem, recognise(graph).problem
+    assert sliced.initial == whole.initial
+    assert [str(s) for s in plan(sliced).plan.walk()] == [str(s) for s in plan(whole).plan.walk()]  # type: ignore[union-attr]
+
+
+def counted(graph: KnowledgeGraph, monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    ask = KnowledgeGraph.query
+
+    def query(self: KnowledgeGraph, *arguments: object, **named: object) -> object:
+        counts["queries"] += 1
+        return ask(self, *arguments, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(KnowledgeGraph, "query", query)
+    return counts
+
+
+@pytest.mark.parametrize("sizes", [{"objects": 4}, {"objects": 4, "clutter": 2000}, {"objects": 80, "hands": 30}])
+def test_at_most_twelve_queries_at_any_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sizes: dict[str, int]
+) -> None:
+    path = tmp_path / "scene.ttl"
+    write_scene(
+        path, "handover", **({"objects": 8} if sizes["objects"] == 4 else sizes) | {"clutter": sizes.get("clutter", 0)}
+    )
+    graph = load(path)
+    counts = counted(graph, monkeypatch)
+    sliced = recognise(graph)
+    assert counts["queries"] <= 12
+    assert len(sliced.problem.classes["Hand"]) == sizes.get("hands", 2)
+
+
+def test_a_task_on_one_of_two_tables_leaves_the_other_out(tmp_path: Path) -> None:
+    """Hands, places and objects of a second table, with the same beverage, aren't read."""
+    second = "".join(
+        f":far_hand a owl:NamedIndividual, c:Hand ; k:canReach :far{i} .\n"
+        f":far{i} a owl:NamedIndividual, k:Location .\n"
+        f":far_bottle{i} a owl:NamedIndividual, k:Bottle ; k:location :far{i} ; k:beverage :beverage1 .\n"
+        for i in range(5)
+    )
+    path = tmp_path / "scene.ttl"
+    path.write_text(generate("served") + second, encoding="utf-8")
+    problem = recognise(load(path)).problem
+    assert problem.classes["Bottle"] == ("bottle1", "bottle2")
+    assert problem.classes["Hand"] == ("hand1", "hand2")
+
+
+def test_what_a_changed_goal_names_is_read_too(tmp_path: Path) -> None:
+    path = tmp_path / "scene.ttl"
+    write_scene(path, "served", clutter=3)
+    graph, goals = load(path), ["thing2 LOCATION location7"]
+    with pytest.raises(KnowledgeError, match="unknown individual 'thing2'"):
+        with_goals(recognise(graph), goals)
+    (reading, problem), (whole, _) = readings(graph, goals)
+    assert (reading.whole, whole.whole) == (False, True)
+    assert "thing2" in reading.problem.classes["Cup"]
+    assert "thing3" not in reading.problem.classes["Cup"]
+    assert str(next(s for s in problem.goal if s.arguments == ("thing2",))) == "<thing2, LOCATION>"
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 10_000), objects=st.sampled_from([2, 4]), hands=st.integers(1, 3))
+def test_random_tables_are_solvable_in_the_slice_if_in_the_world(seed: int, objects: int, hands: int) -> None:
+    with TemporaryDirectory() as folder:
+        write_scene(Path(folder) / "scene.ttl", "random", objects, hands, clutter=1, seed=seed)
+        graph = load(Path(folder) / "scene.ttl")
+    limits = Limits(expansions=400)
+    expected, found = plan(read(graph).problem, limits=limits), plan(recognise(graph).problem, limits=limits)
+    assume(Status.GAVE_UP not in (expected.status, found.status))
+    assert found.status is expected.status
