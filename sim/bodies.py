@@ -1,0 +1,254 @@
+"""Objects of the world: what they look like, weigh and contain.
+
+A shape kind is a `Kind` in `KINDS`: how to make it in PyBullet, and the cylinder that motion planning takes it for. A vessel is
+a wall of revolution, for contact a ring of flat boxes per segment of its profile on a bottom cylinder; to the eye it is round.
+Metres and kilograms; a body's frame has its origin in the middle of the base, z up.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pybullet
+
+from reasoner.embodiment import Shape
+from sim.urdf import Array
+
+PLANKS = 12
+"""Flat boxes per ring of a vessel's wall."""
+
+SIDES = 40
+"""Corners of a circle to the eye."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A shape kind: `make` builds it with (client, shape, position, orientation) and returns the body; `outer` its radius."""
+
+    make: Callable[[int, Shape, Array, Array], int]
+    outer: Callable[[Shape], float]
+    height: Callable[[Shape], float]
+
+
+def wall(shape: Shape) -> float:
+    """Return a vessel's wall thickness."""
+    return float(shape.numbers.get("wall", 0.004))
+
+
+def vessel_height(shape: Shape) -> float:
+    """Return the height of the rim above the base."""
+    return shape.profile[-1][0]
+
+
+def vessel_radius(shape: Shape) -> float:
+    """Return the largest outer radius."""
+    return max(radius for _, radius in shape.profile) + wall(shape)
+
+
+def inner_radius(shape: Shape, height: Array) -> Array:
+    """Return a vessel's inner radius at heights above its base."""
+    return np.interp(height, [h for h, _ in shape.profile], [r for _, r in shape.profile])
+
+
+def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) -> int:
+    """Make a vessel from a URDF of its own: PyBullet's compound shapes have at most 16 parts, a vessel's wall has more."""
+    planks = [*_planks(shape)]
+    base = shape.profile[0][1] + wall(shape)
+    inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = Path(folder) / "vessel.obj"
+        mesh.write_text(_revolved(shape))
+        urdf = Path(folder) / "vessel.urdf"
+        urdf.write_text(
+            VESSEL.format(
+                height=center_height(shape),
+                mass=shape.mass,
+                inertia=inertia,
+                mesh=mesh.name,
+                color=" ".join(str(part) for part in shape.color),
+                radius=base,
+                bottom=wall(shape),
+                middle=wall(shape) / 2,
+                planks="\n".join(planks),
+            )
+        )
+        body = pybullet.loadURDF(
+            str(urdf), position.tolist(), orientation.tolist(), useMaximalCoordinates=True, physicsClientId=client
+        )
+    return _rub(client, shape, body)
+
+
+VESSEL = """<robot name="vessel"><link name="vessel">
+<inertial><origin xyz="0 0 {height}"/><mass value="{mass}"/>
+<inertia ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><mesh filename="{mesh}"/></geometry>
+<material name="wall"><color rgba="{color}"/></material></visual>
+<collision><origin xyz="0 0 {middle}"/>
+<geometry><cylinder radius="{radius}" length="{bottom}"/></geometry></collision>
+{planks}
+</link></robot>
+"""
+
+PLANK = """<collision>
+<origin xyz="{x:.6f} {y:.6f} {z:.6f}" rpy="0 {lean:.6f} {angle:.6f}"/>
+<geometry><box size="{thick:.6f} {width:.6f} {length:.6f}"/></geometry></collision>"""
+
+
+def _planks(shape: Shape) -> Iterator[str]:
+    """Yield the wall's boxes: a ring per segment of the profile. Lines stay short, since PyBullet's parser wants that."""
+    thickness = wall(shape)
+    for (low, r_low), (high, r_high) in pairwise(shape.profile):
+        radius = (r_low + r_high) / 2 + thickness / 2
+        for i in range(PLANKS):
+            angle = 2 * math.pi * i / PLANKS
+            yield PLANK.format(
+                x=radius * math.cos(angle),
+                y=radius * math.sin(angle),
+                z=(low + high) / 2,
+                lean=math.atan2(r_high - r_low, high - low),
+                angle=angle,
+                thick=thickness,
+                width=2 * (max(r_low, r_high) + thickness) * math.tan(math.pi / PLANKS),
+                length=math.hypot(high - low, r_high - r_low),
+            )
+
+
+def _revolved(shape: Shape) -> str:
+    """Return a smooth visual as an OBJ file: outside up, over the rim, inside down to the bottom."""
+    thickness = wall(shape)
+    inner = [(h, r) for h, r in reversed(shape.profile)][:-1]
+    bottom = [(thickness, shape.profile[0][1]), (thickness, 0.0)]
+    outline = [(0.0, 0.0), *[(h, r + thickness) for h, r in shape.profile], *inner, *bottom]
+    lines, count = ["usemtl wall"], 0
+    for (h0, r0), (h1, r1) in pairwise(outline):
+        size = max(math.hypot(h1 - h0, r1 - r0), 1e-9)
+        out, up = (h1 - h0) / size, (r0 - r1) / size
+        for i in range(SIDES):
+            cos, sin = math.cos(2 * math.pi * i / SIDES), math.sin(2 * math.pi * i / SIDES)
+            lines += [f"v {r * cos:.5f} {r * sin:.5f} {h:.5f}" for h, r in ((h0, r0), (h1, r1))]
+            lines += [f"vn {out * cos:.4f} {out * sin:.4f} {up:.4f}"] * 2
+        for i in range(SIDES):
+            a, b = count + 2 * i + 1, count + 2 * ((i + 1) % SIDES) + 1
+            lines += [f"f {a}//{a} {b}//{b} {a + 1}//{a + 1}", f"f {a + 1}//{a + 1} {b}//{b} {b + 1}//{b + 1}"]
+        count += 2 * SIDES
+    return "\n".join(lines) + "\n"
+
+
+def make_cylinder(client: int, shape: Shape, position: Array, orientation: Array) -> int:
+    """Make a solid cylinder of `radius` and `height`."""
+    radius, height = shape.numbers["radius"], shape.numbers["height"]
+    frame = {"physicsClientId": client}
+    collision = pybullet.createCollisionShape(
+        pybullet.GEOM_CYLINDER, radius=radius, height=height, collisionFramePosition=[0, 0, height / 2], **frame
+    )
+    visual = pybullet.createVisualShape(
+        pybullet.GEOM_CYLINDER,
+        radius=radius,
+        length=height,
+        visualFramePosition=[0, 0, height / 2],
+        rgbaColor=shape.color,
+        **frame,
+    )
+    return _body(client, shape, collision, visual, position, orientation)
+
+
+def make_box(client: int, shape: Shape, position: Array, orientation: Array) -> int:
+    """Make a solid box of `width` (x), `depth` (y) and `height`."""
+    half = [shape.numbers["width"] / 2, shape.numbers["depth"] / 2, shape.numbers["height"] / 2]
+    frame = {"physicsClientId": client, "halfExtents": half}
+    collision = pybullet.createCollisionShape(pybullet.GEOM_BOX, collisionFramePosition=[0, 0, half[2]], **frame)
+    visual = pybullet.createVisualShape(
+        pybullet.GEOM_BOX, visualFramePosition=[0, 0, half[2]], rgbaColor=shape.color, **frame
+    )
+    return _body(client, shape, collision, visual, position, orientation)
+
+
+def center_height(shape: Shape) -> float:
+    """Return the height of the centre of mass above the base."""
+    return KINDS[shape.kind].height(shape) * 0.42
+
+
+def _body(client: int, shape: Shape, collision: int, visual: int, position: Array, orientation: Array) -> int:
+    """Make the body and give it its friction; maximal coordinates are three times as fast as a multibody."""
+    body = pybullet.createMultiBody(
+        baseMass=shape.mass,
+        baseCollisionShapeIndex=collision,
+        baseVisualShapeIndex=visual,
+        basePosition=list(position),
+        baseOrientation=list(orientation),
+        baseInertialFramePosition=[0, 0, center_height(shape)],
+        useMaximalCoordinates=True,
+        physicsClientId=client,
+    )
+    return _rub(client, shape, body)
+
+
+def _rub(client: int, shape: Shape, body: int) -> int:
+    """Give a body its friction."""
+    pybullet.changeDynamics(
+        body,
+        -1,
+        lateralFriction=shape.friction,
+        spinningFriction=0.01,
+        rollingFriction=0.001,
+        physicsClientId=client,
+    )
+    return int(body)
+
+
+KINDS: Mapping[str, Kind] = {
+    "vessel": Kind(make_vessel, vessel_radius, vessel_height),
+    "cylinder": Kind(make_cylinder, lambda s: s.numbers["radius"], lambda s: s.numbers["height"]),
+    "box": Kind(
+        make_box, lambda s: math.hypot(s.numbers["width"], s.numbers["depth"]) / 2, lambda s: s.numbers["height"]
+    ),
+}
+
+
+def outer_radius(shape: Shape) -> float:
+    """Return the radius of the upright cylinder around the shape."""
+    return KINDS[shape.kind].outer(shape)
+
+
+def height_of(shape: Shape) -> float:
+    """Return how high the shape stands above its base."""
+    return KINDS[shape.kind].height(shape)
+
+
+def outline(shape: Shape) -> tuple[Array, Array]:
+    """Return heights and outer radii that describe the shape from the side, for whatever stands upright."""
+    if shape.profile:
+        heights, radii = np.array(shape.profile).T
+        return heights, radii + wall(shape)
+    return np.array([0.0, height_of(shape)]), np.full(2, outer_radius(shape))
+
+
+def packed(shape: Shape, count: int, radius: float) -> Array:
+    """Return positions (count, 3) in a vessel's frame at which beads of `radius` can be let go: layers of rings, bottom up.
+
+    Raises
+    ------
+    ValueError
+        They don't fit; the message says how many do.
+    """
+    spots: list[tuple[float, float, float]] = []
+    height, pitch, layer = wall(shape) + radius * 1.05, radius * 2.06, 0
+    while height < vessel_height(shape):
+        room = float(inner_radius(shape, np.array(height))) - radius * 1.1
+        rings = [room - i * pitch for i in range(int(room / pitch) + 1)] if room > 0 else []
+        for ring in rings:
+            number = max(1, int(math.pi / math.asin(min(1.0, pitch / 2 / max(ring, pitch / 2)))))
+            number = 1 if ring < pitch / 2 else number
+            for i in range(number):
+                angle = 2 * math.pi * (i / number) + 0.4 * layer
+                spots.append((ring * math.cos(angle), ring * math.sin(angle), height))
+        height, layer = height + pitch, layer + 1
+    if count > len(spots):
+        raise ValueError(f"{count} beads of radius {radius} m don't fit: there is room for {len(spots)}")
+    return np.array(spots[:count]).reshape(-1, 3)

@@ -1,0 +1,142 @@
+"""Distances between an arm and everything around it, for many postures at once.
+
+The arm, and what its hand holds, is a set of spheres; the surroundings are solids (boxes and upright or lying cylinders) and the
+spheres of the robot's body and of other arms. A distance below zero is a collision. Metres throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sim.kinematics import Arm, link_transforms
+from sim.urdf import Array, Model, Spheres
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A named box (half extents) or cylinder (radius, radius, half height) with its centre and rotation in the world."""
+
+    name: str
+    kind: str
+    half: Array
+    center: Array
+    rotation: Array
+
+    def distance(self, points: Array) -> Array:
+        """Return the signed distance of points (..., 3) from the surface."""
+        local = np.abs((points - self.center) @ self.rotation)
+        if self.kind == "cylinder":
+            local = np.stack([np.hypot(local[..., 0], local[..., 1]), local[..., 2]], -1)
+            excess = local - np.array([self.half[0], self.half[2]])
+        else:
+            excess = local - self.half
+        distance: Array = np.linalg.norm(np.maximum(excess, 0.0), axis=-1) + np.minimum(excess.max(-1), 0.0)
+        return distance
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Return the corners of the axis-aligned box around it."""
+        extent = np.abs(self.rotation) @ self.half
+        return self.center - extent, self.center + extent
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What an arm must not touch: solids, and the spheres of the robot's body and other arms with their owners' names."""
+
+    solids: tuple[Solid, ...] = ()
+    centers: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    radii: Array = field(default_factory=lambda: np.zeros(0))
+    owners: tuple[str, ...] = ()
+
+    def without(self, *names: str) -> Surroundings:
+        """Return the surroundings less the solids of these names."""
+        return replace(self, solids=tuple(solid for solid in self.solids if solid.name not in names))
+
+    def plus(self, owner: str, spheres: Spheres) -> Surroundings:
+        """Return the surroundings with more spheres."""
+        return replace(
+            self,
+            centers=np.concatenate([self.centers, spheres.centers]),
+            radii=np.concatenate([self.radii, spheres.radii]),
+            owners=(*self.owners, *[owner] * len(spheres.radii)),
+        )
+
+
+@dataclass(frozen=True)
+class Mover:
+    """An arm's spheres at the zero posture, the joint that carries each, and the arm itself."""
+
+    arm: Arm
+    spheres: Spheres
+    carrier: Array
+
+    def at(self, q: Array) -> Array:
+        """Return sphere centres (n, m, 3) at postures (n, 7)."""
+        r, t = link_transforms(self.arm, q)
+        centers: Array = np.einsum("nmij,mj->nmi", r[:, self.carrier], self.spheres.centers) + t[:, self.carrier]
+        return centers
+
+    def holding(self, spheres: Spheres) -> Mover:
+        """Return the arm with more spheres in its hand, given in the hand's frame."""
+        world = spheres.centers @ self.arm.tip_rotation.T + self.arm.tip
+        together = Spheres(
+            np.concatenate([self.spheres.centers, world]), np.concatenate([self.spheres.radii, spheres.radii])
+        )
+        return Mover(self.arm, together, np.concatenate([self.carrier, np.full(len(spheres.radii), 6)]))
+
+    def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
+        """Return, for everything that is near, its distance (n,) from the arm at each posture."""
+        centers, radii = self.at(q), self.spheres.radii
+        low, high = (centers - radii[:, None]).min((0, 1)) - 0.05, (centers + radii[:, None]).max((0, 1)) + 0.05
+        found: dict[str, Array] = {}
+        for solid in around.solids:
+            bottom, top = solid.bounds()
+            if np.all(bottom <= high) and np.all(top >= low):
+                found[solid.name] = (solid.distance(centers) - radii).min(1)
+        near = np.all(
+            (around.centers + around.radii[:, None] >= low) & (around.centers - around.radii[:, None] <= high), -1
+        )
+        for owner in dict.fromkeys(name for name, close in zip(around.owners, near, strict=True) if close):
+            own = near & np.array([name == owner for name in around.owners])
+            gaps = np.linalg.norm(centers[:, :, None] - around.centers[own], axis=-1)
+            found[owner] = (gaps - radii[:, None] - around.radii[own]).min((1, 2))
+        return found
+
+
+def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
+    """Return the arm's moving spheres, with finger joints at `openings` (metres)."""
+    centers, radii, carriers = [], [], []
+    for link, spheres in model.spheres.items():
+        chain = model.chain(link)
+        moved = [arm.joints.index(joint.name) for joint in chain if joint.name in arm.joints]
+        if moved:
+            slide = sum((joint.axis * openings[joint.name] for joint in chain if joint.name in openings), np.zeros(3))
+            centers.append(spheres.centers + slide)
+            radii.append(spheres.radii)
+            carriers.append(np.full(len(spheres.radii), moved[-1]))
+    return Mover(arm, Spheres(np.concatenate(centers), np.concatenate(radii)), np.concatenate(carriers))
+
+
+def fixed_spheres(model: Model, arms: Sequence[Arm]) -> Spheres:
+    """Return the spheres of the robot that no arm moves."""
+    joints = {name for arm in arms for name in arm.joints}
+    still = [s for link, s in model.spheres.items() if not joints & {joint.name for joint in model.chain(link)}]
+    return Spheres(np.concatenate([s.centers for s in still]), np.concatenate([s.radii for s in still]))
+
+
+def column(heights: Array, radii: Array, bottom: float) -> Spheres:
+    """Return spheres that cover an upright body of revolution above `bottom`, but for its edges.
+
+    `heights` (ascending) and `radii` are its outline; each sphere is as wide as the body at its centre.
+
+    >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()
+    [0.02, 0.04, 0.06, 0.08]
+    """
+    top = float(heights[-1])
+    ends = [min(float(np.interp(z, heights, radii)) * 2 / 3, (top - bottom) / 2) for z in (bottom, top)]
+    first, last = bottom + ends[0], max(top - ends[1], bottom + ends[0])
+    z = np.linspace(first, last, 1 + int(np.ceil((last - first) / (0.8 * float(np.min(radii))))))
+    return Spheres(np.stack([0 * z, 0 * z, z], -1), np.interp(z, heights, radii))

@@ -1,0 +1,261 @@
+"""Collision-free motion of a hand, planned in the hand's own coordinates and timed within the joints' limits.
+
+A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres, the heading of its level pointing direction, the roll about
+it (0: upright; this is what pours), and the elbow's swivel, in radians. The closed form of `sim.kinematics` turns a pose
+into a posture, so a path that keeps a cup upright is simply one whose roll is 0: a straight line where it's free, else a short
+RRT-Connect over the same six numbers.
+
+``poses`` (n, 6) · ``q`` postures (n, 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sim.collision import Mover, Surroundings
+from sim.kinematics import Arm, hand_frames, inverse, swivel_of, turn
+from sim.urdf import Array
+
+STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
+"""How far apart checked poses of a path are (metres, radians)."""
+
+JUMP = 0.35
+"""Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
+
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Why a path isn't possible: a code of `sim.verdict`, what is in the way, and the smallest clearance in metres."""
+
+    code: str
+    objects: tuple[str, ...] = ()
+    clearance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reacher:
+    """An arm among its surroundings: answers which paths are possible. `margin` metres keep it off everything."""
+
+    mover: Mover
+    around: Surroundings
+    margin: float = 0.008
+    joint_margin: float = 0.03
+
+    @property
+    def arm(self) -> Arm:
+        """The arm that moves."""
+        return self.mover.arm
+
+    def solve(self, poses: Array) -> tuple[Array, Array]:
+        """Return postures of the poses and which are within reach and limits."""
+        return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin)
+
+    def free(self, q: Array) -> Array:
+        """Return which postures touch nothing."""
+        gaps = self.mover.clearances(q, self.around)
+        return np.all([gap > self.margin for gap in gaps.values()], axis=0) if gaps else np.ones(len(q), dtype=bool)
+
+    def follow(self, poses: Array) -> Array | None:
+        """Return the postures along sampled poses, or None if one is out of reach, in collision or past a singularity."""
+        q, valid = self.solve(poses)
+        if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP) or not self.free(q).all():
+            return None
+        return q
+
+    def blame(self, poses: Array) -> Blocked:
+        """Return why `follow` refuses the poses."""
+        q, valid = self.solve(poses)
+        if not valid.all():
+            return Blocked("unreachable")
+        gaps = {name: float(gap.min()) for name, gap in self.mover.clearances(q, self.around).items()}
+        touching = tuple(sorted((name for name, gap in gaps.items() if gap <= self.margin), key=gaps.__getitem__))
+        return Blocked("goal in collision" if touching else "no path", touching, min(gaps.values(), default=0.0))
+
+
+def rotations(poses: Array) -> Array:
+    """Return the hand's rotation matrices (n, 3, 3) of poses."""
+    return turn(Z, poses[:, 3]) @ turn(X, poses[:, 4])
+
+
+def pose_of(arm: Arm, q: Array) -> Array:
+    """Return the pose (6,) of one posture (7,) whose hand points level."""
+    r, p = hand_frames(arm, q[None])
+    yaw = np.arctan2(r[0, 1, 0], r[0, 0, 0])
+    roll = np.arctan2(r[0, 2, 1], r[0, 2, 2])
+    return np.concatenate([p[0], [yaw, roll, swivel_of(arm, q[None])[0]]])
+
+
+def line(start: Array, end: Array) -> Array:
+    """Return poses along the straight line from `start` to `end`, both included."""
+    count = 1 + max(1, int(np.ceil(np.max(np.abs(end - start) / STEP))))
+    return np.linspace(start, end, count)
+
+
+def polyline(corners: Array) -> Array:
+    """Return poses along straight lines through `corners` (k, 6)."""
+    pieces = [line(a, b)[1:] for a, b in pairwise(corners)]
+    return np.concatenate([corners[:1], *pieces])
+
+
+# ----------------------------------------------------------------------------------------------------- search
+
+
+def connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generator, attempts: int = 400) -> Array | None:
+    """Return corner poses of a free path from `start` to `goal`: a line if it's free, else by RRT-Connect; or None.
+
+    Parameters
+    ----------
+    attempts : int
+        Bound on the number of samples.
+    """
+    if reacher.follow(line(start, goal)) is not None:
+        return np.stack([start, goal])
+    for middle in _detours(start, goal):
+        corners = np.stack([start, middle, goal])
+        if reacher.follow(polyline(corners)) is not None:
+            return corners
+    found = _rrt_connect(reacher, start, goal, rng, attempts)
+    return None if found is None else _shortcut(reacher, found, rng)
+
+
+def _detours(start: Array, goal: Array) -> Iterator[Array]:
+    """Yield poses to pass through: over things, and closer to the body."""
+    for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
+        middle = (start + goal) / 2
+        heading = np.array([np.cos(middle[3]), np.sin(middle[3])])
+        middle[:2] -= back * heading
+        middle[2] = max(start[2], goal[2]) + up
+        yield middle
+
+
+def _rrt_connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generator, attempts: int) -> Array | None:
+    """Grow two trees of poses towards each other (Kuffner and LaValle 2000)."""
+    low, high = np.minimum(start, goal), np.maximum(start, goal)
+    spread = np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8])
+    low, high = low - spread, high + spread
+    trees: list[tuple[list[Array], list[int]]] = [([start], [-1]), ([goal], [-1])]
+    for turn_of in range(attempts):
+        (here, back), (there, _) = trees[turn_of % 2], trees[1 - turn_of % 2]
+        target = there[rng.integers(len(there))] if rng.random() < 0.2 else rng.uniform(low, high)
+        new = _extend(reacher, here, back, target)
+        if new is None:
+            continue
+        other, other_back = trees[1 - turn_of % 2]
+        meeting = _extend(reacher, other, other_back, new, greedy=True)
+        if meeting is not None and np.allclose(meeting, new):
+            ways = [_branch(*trees[i]) for i in range(2)]
+            return np.concatenate([ways[0], ways[1][::-1][1:]])
+    return None
+
+
+def _extend(reacher: Reacher, nodes: list[Array], back: list[int], target: Array, greedy: bool = False) -> Array | None:
+    """Add to a tree the free part of the way to `target`: a stretch of it, or all of it if `greedy`."""
+    nearest = int(np.argmin([np.max(np.abs(node - target) / STEP) for node in nodes]))
+    way = line(nodes[nearest], target)[1:]
+    if not greedy:
+        way = way[:14]
+    q, valid = reacher.solve(np.concatenate([nodes[nearest][None], way]))
+    smooth = np.abs(np.diff(q, axis=0)).max(1) <= JUMP
+    good = valid[1:] & smooth & reacher.free(q[1:])
+    reached = len(good) if good.all() else int(np.argmin(good))
+    if reached == 0:
+        return None
+    nodes.append(way[reached - 1])
+    back.append(nearest)
+    new: Array = way[reached - 1]
+    return new
+
+
+def _branch(nodes: list[Array], back: list[int]) -> Array:
+    """Return the poses from a tree's root to its last node."""
+    way, i = [], len(nodes) - 1
+    while i >= 0:
+        way.append(nodes[i])
+        i = back[i]
+    return np.array(way[::-1])
+
+
+def _shortcut(reacher: Reacher, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
+    """Leave out corners that a straight line can do without."""
+    for _ in range(attempts):
+        if len(corners) < 3:
+            break
+        i, j = sorted(rng.choice(len(corners), 2, replace=False))
+        if j - i > 1 and reacher.follow(line(corners[i], corners[j])) is not None:
+            corners = np.concatenate([corners[: i + 1], corners[j:]])
+    return corners
+
+
+# ----------------------------------------------------------------------------------------------------- timing
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How fast a motion may be: joint speeds (7,) and accelerations in radians, the hand's speed and acceleration in metres."""
+
+    velocity: Array
+    acceleration: float
+    hand_velocity: float
+    hand_acceleration: float
+
+
+def smooth(q: Array, window: int = 3) -> Array:
+    """Return postures with corners rounded by a moving average that leaves the ends where they are."""
+    out = q.copy()
+    for i in range(1, len(q) - 1):
+        half = min(window, i, len(q) - 1 - i)
+        out[i] = q[i - half : i + half + 1].mean(0)
+    return out
+
+
+def timed(arm: Arm, q: Array, limits: Limits, rate: float) -> tuple[Array, Array]:
+    """Return positions and velocities (m, 7) at `rate` hertz along postures (n, 7), as fast as the limits allow.
+
+    Time-optimal along the path but for one simplification: a joint gives half of its acceleration to the path's curvature and
+    half to speeding up, so that both can be bounded apart.
+    """
+    if len(q) < 2 or np.abs(q - q[0]).max() < 1e-9:
+        return q[-1:], np.zeros((1, 7))
+    rows = np.concatenate([q, hand_frames(arm, q)[1]], -1)
+    first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
+    second[1:-1] = np.diff(rows, 2, axis=0)
+    top = np.concatenate([limits.velocity, np.full(3, limits.hand_velocity)])
+    push = np.concatenate([np.full(7, limits.acceleration), np.full(3, limits.hand_acceleration)]) / 2
+    square = np.min((top / np.maximum(np.abs(first), 1e-9)) ** 2, -1)
+    square = np.minimum(square, np.min(push / np.maximum(np.abs(second), 1e-9), -1))
+    gain = np.min(push / np.maximum(np.abs(first), 1e-9), -1)
+    square[0] = square[-1] = 0.0
+    for i in range(1, len(q)):
+        square[i] = min(square[i], square[i - 1] + 2 * min(gain[i - 1], gain[i]))
+    for i in range(len(q) - 2, -1, -1):
+        square[i] = min(square[i], square[i + 1] + 2 * min(gain[i], gain[i + 1]))
+    speed = np.sqrt(square)
+    clock = np.concatenate([[0.0], np.cumsum(2.0 / np.maximum(speed[1:] + speed[:-1], 1e-6))])
+    return _sampled(q, speed, clock, rate)
+
+
+def _sampled(q: Array, speed: Array, clock: Array, rate: float) -> tuple[Array, Array]:
+    """Resample a path by time; the path parameter has constant acceleration between its samples."""
+    times = np.arange(1, int(np.ceil(clock[-1] * rate)) + 1) / rate
+    times = np.minimum(times, clock[-1])
+    i = np.minimum(np.searchsorted(clock, times, side="right") - 1, len(q) - 2)
+    span, since = clock[i + 1] - clock[i], times - clock[i]
+    s = speed[i] * since + (speed[i + 1] - speed[i]) / span * since**2 / 2
+    part = np.clip(s, 0.0, 1.0)[:, None]
+    position = q[i] * (1 - part) + q[i + 1] * part
+    velocity = np.gradient(position, axis=0) * rate if len(position) > 1 else np.zeros_like(position)
+    velocity[-1] = 0.0
+    return position, velocity
+
+
+def comfort(arm: Arm, q: Array) -> Array:
+    """Return how far postures (n, 7) are from the middle of the joints' ranges, growing steeply near the limits."""
+    middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
+    cost: Array = np.sum(((q - middle) / half) ** 8, -1)
+    return cost

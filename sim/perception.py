@@ -1,0 +1,165 @@
+"""Facts read off the world: each perceiver answers for one kind of situation type, and can set it up in a new world.
+
+A perceiver is an entry of `PERCEIVERS`: `observe` returns the value that holds for the arguments, or None if none does;
+`arrange` makes a value true in the draft of a world that isn't built yet; `code` is how a primitive failed if the value is not
+the expected one. Which situation type uses which perceiver, with which thresholds (metres, newtons, radians, numbers) and which
+individuals stand for its special values, is said in the ontology. Perceivers of other packages register as entry points of the
+group `confab.perceivers`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reasoner.embodiment import PerceiverUse
+from sim.urdf import Array
+
+if TYPE_CHECKING:
+    from sim.world import World
+
+
+@dataclass
+class Draft:
+    """A world to be built: where bodies stand (place names) and what vessels are filled with."""
+
+    places: dict[str, str] = field(default_factory=dict)
+    contents: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Perceiver:
+    """How a kind of situation type is read off the world and set up in it."""
+
+    observe: Callable[[World, PerceiverUse, tuple[str, ...]], str | None]
+    arrange: Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]
+    code: str
+
+
+def tilt_of(rotation: Array) -> float:
+    """Return the angle in radians between a frame's z axis and up."""
+    return float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
+
+
+# ------------------------------------------------------------------------------------------ where an object is
+
+
+def observe_place(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return the place on which the object stands, or `in_hand` if a hand carries it."""
+    body = arguments[0]
+    if body not in world.bodies:
+        return None
+    rotation, position = world.sense(body)
+    place, distance = world.nearest_place(position)
+    standing = abs(position[2] - world.embodiment.places[place].position[2]) < use.numbers["contact_height"]
+    if standing and distance < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
+        return place
+    if not standing and any(world.held(hand) == body for hand in world.hands):
+        return use.values["in_hand"]
+    return None
+
+
+def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Stand the object at a place; a world can't begin with an object in a hand."""
+    if value == use.values["in_hand"]:
+        raise ValueError(f"a world cannot begin with {arguments[0]} in a hand: let it stand at a place")
+    draft.places[arguments[0]] = value
+
+
+# ------------------------------------------------------------------------------------------ what a vessel contains
+
+
+def observe_content(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return what the vessel contains at least `least` servings of (the most, if several), or `empty`."""
+    if arguments[0] not in world.bodies:
+        return None
+    amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings}
+    enough = {name: amount for name, amount in amounts.items() if amount >= use.numbers["least"]}
+    return max(enough, key=enough.__getitem__) if enough else use.values["empty"]
+
+
+def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Fill the vessel, unless the value is `empty`."""
+    if value != use.values["empty"]:
+        draft.contents[arguments[0]] = value
+
+
+# ------------------------------------------------------------------------------------------ what a hand does
+
+
+def observe_held(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return what both fingers press, or `nothing`."""
+    return world.held(arguments[0], use.numbers["force"]) or use.values["nothing"]
+
+
+def observe_position(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return where a hand is: `raised`, at an object, or at a place.
+
+    What counts is the lowest point of the hand's load, or of its grip if it is empty, above the nearest place. Low enough, it
+    is at the object that it holds and that still stands on its place, at the vessel that the load is held over, at the object
+    between its open fingers, else at the place to which it points: an empty one may have drawn back from it.
+    """
+    hand, numbers = arguments[0], use.numbers
+    held = world.held(hand)
+    point = world.hands[hand].frame()[1] if held is None else world.sense(held)[1]
+    top = point if held is None else world.top(held)
+    place, distance = world.nearest_place(point)
+    height = min(point[2], top[2]) - world.embodiment.places[place].position[2]
+    if height >= numbers["raised"]:
+        return use.values["raised"]
+    if held is not None and height < numbers["contact_height"]:
+        return held
+    near = [(float(np.hypot(*(world.reading(body) - top)[:2])), body) for body in world.bodies if body != held]
+    gap, body = min(near, default=(np.inf, ""))
+    if gap < (numbers["beside"] if held is not None else numbers["between"]):
+        return body
+    if held is None:
+        rotation, point = world.hands[hand].frame()
+        place, distance = world.nearest_place(point + numbers["ahead"] * rotation[:, 0])
+    return place if distance < numbers["nearness"] else None
+
+
+def observe_tilt(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return whether a hand is `upright` or `tilted`, or None between the two."""
+    angle = tilt_of(world.hands[arguments[0]].frame()[0])
+    if angle <= use.numbers["upright_angle"]:
+        return use.values["upright"]
+    return use.values["tilted"] if angle >= use.numbers["tilted_angle"] else None
+
+
+def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]:
+    """Return an arranger for hands: a world begins with them at rest, so only the special value can be set up."""
+
+    def arrange(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+        """Accept the rest value and raise for any other."""
+        if value != use.values[special]:
+            raise ValueError(
+                f"a world cannot begin with {use.situation} of {arguments[0]} {value}: only {use.values[special]}"
+            )
+
+    return arrange
+
+
+BUILT_IN: Mapping[str, Perceiver] = {
+    "perceive_place": Perceiver(observe_place, arrange_place, "misplaced"),
+    "perceive_content": Perceiver(observe_content, arrange_content, "under-pour"),
+    "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
+    "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected"),
+    "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),
+}
+
+
+def perceiver(name: str) -> Perceiver:
+    """Return the perceiver of that name, from this module or an entry point; raise `KeyError` that lists the built-in ones."""
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    for point in entry_points(group="confab.perceivers", name=name):
+        found: Perceiver = point.load()
+        return found
+    raise KeyError(
+        f"no perceiver '{name}' (built in: {', '.join(BUILT_IN)}; others register in the group confab.perceivers)"
+    )

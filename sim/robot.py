@@ -1,0 +1,200 @@
+"""A hand with its arm: kinematics and the PyBullet joints that move it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pybullet
+
+from reasoner.embodiment import Hand, Robot
+from sim.collision import Mover, fixed_spheres, read_mover
+from sim.kinematics import Arm, hand_frames, read_arm
+from sim.motion import Limits, pose_of
+from sim.urdf import Array, Model, Spheres, read_urdf
+
+CENTERING = 400.0
+"""Newtons per metre by which a finger that is ahead of the other one yields, as the gear of a parallel gripper does."""
+
+CLOSING = 0.12
+"""Metres per second at which fingers close."""
+
+
+@dataclass
+class Manipulator:
+    """One hand of a robot in a physics world.
+
+    `posture` is what the arm was last commanded; `grasp` is where the held object was in the hand when it was grasped
+    (position and rotation), which is what slip is measured against.
+    """
+
+    client: int
+    body: int
+    robot: Robot
+    hand: Hand
+    model: Model
+    arm: Arm
+    joints: tuple[int, ...]
+    fingers: tuple[int, ...]
+    tip: int
+    efforts: tuple[float, ...]
+    finger_effort: float
+    posture: Array
+    closing: bool = False
+    grasp: tuple[Array, Array] | None = None
+    weakness: float = 1.0
+    links: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def limits(self) -> Limits:
+        """How fast the arm moves when it holds nothing."""
+        return Limits(self.arm.velocity * self.weakness, self.robot.acceleration * self.weakness, 1.6, 8.0)
+
+    @property
+    def pose(self) -> Array:
+        """The hand's commanded pose (x, y, z, yaw, roll, swivel)."""
+        return pose_of(self.arm, self.posture)
+
+    def frame(self) -> tuple[Array, Array]:
+        """Return the hand's measured rotation (3, 3) and position (3,)."""
+        r, p = hand_frames(self.arm, self.measured()[None])
+        return r[0], p[0]
+
+    def measured(self) -> Array:
+        """Return the arm's joint angles (7,) as they are."""
+        states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
+        return np.array([state[0] for state in states])
+
+    def openings(self) -> tuple[float, ...]:
+        """Return the finger joints' positions in metres."""
+        states = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
+        return tuple(state[0] for state in states)
+
+    def mover(self) -> Mover:
+        """Return the arm as spheres, its fingers as they are."""
+        return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, self.openings(), strict=True)))
+
+    def command(self, q: Array, velocity: Array | None = None) -> None:
+        """Set the motors' target; they keep it until the next command."""
+        self.posture = q
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self.joints,
+            pybullet.POSITION_CONTROL,
+            targetPositions=q.tolist(),
+            targetVelocities=[0.0] * 7 if velocity is None else velocity.tolist(),
+            forces=self.efforts,
+            positionGains=[0.4] * 7,
+            velocityGains=[1.0] * 7,
+            physicsClientId=self.client,
+        )
+
+    def open(self) -> None:
+        """Let the fingers go to their open position."""
+        self.closing, self.grasp = False, None
+        self._fingers_to(self.hand.opening)
+
+    def close(self) -> None:
+        """Let the fingers press; `drive` must then run in every step."""
+        self.closing = True
+
+    def drive(self) -> None:
+        """Drive closing fingers for one step: equal force on both, with the one that is ahead giving way."""
+        if not self.closing:
+            return
+        first, second = self.openings()
+        lead = np.clip(CENTERING * (first - second), -self.hand.grip * 0.6, self.hand.grip * 0.6)
+        for joint, force in zip(self.fingers, (self.hand.grip + lead, self.hand.grip - lead), strict=True):
+            pybullet.setJointMotorControl2(
+                self.body,
+                joint,
+                pybullet.VELOCITY_CONTROL,
+                targetVelocity=-CLOSING,
+                force=force,
+                physicsClientId=self.client,
+            )
+
+    def _fingers_to(self, opening: float) -> None:
+        for joint in self.fingers:
+            pybullet.setJointMotorControl2(
+                self.body,
+                joint,
+                pybullet.POSITION_CONTROL,
+                targetPosition=opening,
+                force=self.finger_effort,
+                maxVelocity=0.3,
+                physicsClientId=self.client,
+            )
+
+    def pressing(self, other: int) -> tuple[float, ...]:
+        """Return the normal force in newtons with which each finger presses a body."""
+        forces = []
+        for link in self.fingers:
+            contacts = pybullet.getContactPoints(self.body, other, link, -1, physicsClientId=self.client)
+            forces.append(sum(contact[9] for contact in contacts))
+        return tuple(forces)
+
+
+def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
+    """Load a robot with its arms at home; return the body, its hands and the spheres of what no arm moves."""
+    flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
+    body = pybullet.loadURDF(
+        robot.urdf,
+        robot.position,
+        pybullet.getQuaternionFromEuler([0, 0, robot.yaw]),
+        useFixedBase=True,
+        flags=flags | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
+        physicsClientId=client,
+    )
+    model = read_urdf(robot.urdf, robot.position, robot.yaw)
+    numbers, links, efforts = {}, {-1: robot.name}, {}
+    for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
+        info = pybullet.getJointInfo(body, i, physicsClientId=client)
+        numbers[info[1].decode()], links[i], efforts[info[1].decode()] = i, info[12].decode(), info[10]
+    hands = [_manipulator(client, body, robot, hand, model, numbers, links, efforts) for hand in robot.hands]
+    for hand in hands:
+        _go_home(hand)
+    return body, hands, fixed_spheres(model, [hand.arm for hand in hands])
+
+
+def _manipulator(
+    client: int,
+    body: int,
+    robot: Robot,
+    hand: Hand,
+    model: Model,
+    numbers: Mapping[str, int],
+    links: Mapping[int, str],
+    efforts: Mapping[str, float],
+) -> Manipulator:
+    arm = read_arm(model, hand.arm, hand.tip)
+    tip = next(number for number, link in links.items() if link == hand.tip)
+    return Manipulator(
+        client,
+        body,
+        robot,
+        hand,
+        model,
+        arm,
+        _look_up(numbers, hand.arm),
+        _look_up(numbers, hand.fingers),
+        tip,
+        tuple(efforts[name] for name in hand.arm),
+        efforts[hand.fingers[0]],
+        np.array(hand.home),
+        links=links,
+    )
+
+
+def _look_up(numbers: Mapping[str, int], names: Sequence[str]) -> tuple[int, ...]:
+    return tuple(numbers[name] for name in names)
+
+
+def _go_home(manipulator: Manipulator) -> None:
+    """Start at home: the only time that joints are set instead of driven."""
+    values = (*manipulator.hand.home, *[manipulator.hand.opening] * len(manipulator.fingers))
+    for joint, value in zip((*manipulator.joints, *manipulator.fingers), values, strict=True):
+        pybullet.resetJointState(manipulator.body, joint, value, physicsClientId=manipulator.client)
+    manipulator.command(np.array(manipulator.hand.home))
+    manipulator.open()

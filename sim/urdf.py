@@ -1,0 +1,180 @@
+"""The part of a URDF file that kinematics and collision checks need, placed in the world at the zero posture.
+
+Lengths in metres, angles in radians. Visual geometry and inertia are PyBullet's business, which loads the same file.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint at the zero posture: a point on its axis and the axis' direction in the world, its parent and child links."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Array
+    axis: Array
+    lower: float
+    upper: float
+    velocity: float
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres that cover a link's collision shapes: world centres (n, 3) at the zero posture, radii (n,)."""
+
+    centers: Array
+    radii: Array
+
+
+@dataclass(frozen=True)
+class Model:
+    """A robot at the zero posture: joints by name, link frames (rotation, origin) and covering spheres by link."""
+
+    joints: Mapping[str, Joint]
+    frames: Mapping[str, tuple[Array, Array]]
+    spheres: Mapping[str, Spheres]
+    parents: Mapping[str, Joint]
+
+    def chain(self, link: str) -> tuple[Joint, ...]:
+        """Return the joints from the base to `link`, fixed ones included."""
+        joints: list[Joint] = []
+        while link in self.parents:
+            joints.append(self.parents[link])
+            link = self.parents[link].parent
+        return tuple(reversed(joints))
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation matrix of URDF's fixed-axis roll, pitch and yaw."""
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Model:
+    """Read a robot whose base stands at `position` (metres), turned by `yaw` (radians).
+
+    Raises
+    ------
+    ValueError
+        The file isn't a URDF robot; the message names file and reason.
+    """
+    try:
+        root = ET.parse(Path(path)).getroot()
+    except (OSError, ET.ParseError) as problem:
+        raise ValueError(f"cannot read the robot's URDF {path}: {problem}") from problem
+    elements = {_end(joint, "child"): joint for joint in root.iter("joint") if joint.find("child") is not None}
+    links = {link.get("name", ""): link for link in root.iter("link")}
+    frames: dict[str, tuple[Array, Array]] = {}
+    parents: dict[str, Joint] = {}
+
+    def place(link: str) -> tuple[Array, Array]:
+        """Return the link's frame, placing its ancestors first."""
+        if link not in frames:
+            element = elements.get(link)
+            if element is None:
+                frames[link] = (rotation(0.0, 0.0, yaw), np.array(position, dtype=float))
+            else:
+                parent = _end(element, "parent")
+                turn, origin = place(parent)
+                local, shift = _origin(element)
+                frames[link] = (turn @ local, origin + turn @ shift)
+                parents[link] = _joint(element, parent, link, *frames[link])
+        return frames[link]
+
+    for link in links:
+        place(link)
+    spheres = {name: _cover(link, *frames[name]) for name, link in links.items()}
+    return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents)
+
+
+def _end(joint: ET.Element, which: str) -> str:
+    """Return the name of the link at one end of a joint."""
+    element = joint.find(which)
+    return "" if element is None else element.get("link", "")
+
+
+def _numbers(text: str | None, default: str = "0 0 0") -> Array:
+    return np.array([float(word) for word in (text or default).split()])
+
+
+def _origin(element: ET.Element) -> tuple[Array, Array]:
+    origin = element.find("origin")
+    if origin is None:
+        return np.eye(3), np.zeros(3)
+    return rotation(*_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
+
+
+def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Array) -> Joint:
+    axis, limit = element.find("axis"), element.find("limit")
+    direction = _numbers(None if axis is None else axis.get("xyz"), "1 0 0")
+    bounds = limit.attrib if limit is not None else {}
+    endless = element.get("type") == "continuous"
+    return Joint(
+        element.get("name", ""),
+        element.get("type", "fixed"),
+        parent,
+        child,
+        origin,
+        turn @ (direction / np.linalg.norm(direction)),
+        -math.pi if endless else float(bounds.get("lower", 0.0)),
+        math.pi if endless else float(bounds.get("upper", 0.0)),
+        float(bounds.get("velocity", 1.0)),
+    )
+
+
+def _cover(link: ET.Element, turn: Array, origin: Array) -> Spheres:
+    """Cover the link's collision primitives with spheres; meshes aren't covered and raise."""
+    centers, radii = [np.zeros((0, 3))], [np.zeros(0)]
+    for collision in link.iter("collision"):
+        local, shift = _origin(collision)
+        geometry = collision.find("geometry")
+        if geometry is None or not len(geometry):
+            continue
+        points, radius = _primitive(geometry[0])
+        centers.append(origin + (points @ local.T + shift) @ turn.T)
+        radii.append(np.full(len(points), radius))
+    return Spheres(np.concatenate(centers), np.concatenate(radii))
+
+
+def _primitive(shape: ET.Element) -> tuple[Array, float]:
+    """Return sphere centres in the shape's frame and their radius."""
+    if shape.tag == "sphere":
+        return np.zeros((1, 3)), float(shape.get("radius", 0.0))
+    if shape.tag in ("cylinder", "capsule"):
+        radius, length = float(shape.get("radius", 0.0)), float(shape.get("length", 0.0))
+        half = length / 2 if shape.tag == "capsule" else max(length / 2 - radius / 2, 0.0)
+        return np.array([[0.0, 0.0, z] for z in _spread(half, radius)]), radius
+    if shape.tag == "box":
+        size = _numbers(shape.get("size")) / 2
+        radius = float(np.sort(size)[1])
+        axes = [_spread(max(half - radius * 0.8, 0.0), radius) for half in size]
+        return np.array([[x, y, z] for x in axes[0] for y in axes[1] for z in axes[2]]), radius
+    raise ValueError(
+        f"collision shape '{shape.tag}' is none of box, cylinder, capsule and sphere: cover the mesh with these"
+    )
+
+
+def _spread(half: float, radius: float) -> Array:
+    """Return positions from -half to half no further apart than the radius."""
+    return np.linspace(-half, half, 1 + math.ceil(2 * half / radius)) if half > 0 else np.zeros(1)

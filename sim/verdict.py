@@ -1,0 +1,52 @@
+"""What physics says about a step: it did what it should, or how it failed, with the objects and the measured number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+CODES = {
+    "unreachable": "no posture of the arm takes the hand there",
+    "goal in collision": "the hand, or what it holds, would touch something there",
+    "no path": "the hand cannot get there without touching something",
+    "tracking error": "the arm did not follow its motion: something stopped it",
+    "object disturbed": "something moved that should have stayed where it was",
+    "no grasp": "the fingers did not get hold of the object",
+    "slip or drop": "the object moved in the hand or fell from it",
+    "under-pour": "too little reached the target",
+    "spill": "too much went beside the target",
+    "toppled": "something fell over",
+    "misplaced": "the object is not where it should be",
+    "timeout": "the skill did not end in its time",
+    "unexpected": "what is perceived afterwards is not what the behaviour promises",
+}
+"""Failure codes and what they mean. `Verdict.code` is one of them, or None for success."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a step went in the world. `measured` has numbers by name; the name ends with the unit."""
+
+    ok: bool
+    code: str | None = None
+    objects: tuple[str, ...] = ()
+    measured: Mapping[str, float] = field(default_factory=dict)
+    message: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as `confab verify --json` prints it."""
+        return {
+            "ok": self.ok,
+            "code": self.code,
+            "objects": list(self.objects),
+            "measured": {name: round(value, 6) for name, value in self.measured.items()},
+        }
+
+
+class SkillError(Exception):
+    """Raised inside a skill when it cannot go on; `World.execute` turns it into a `Verdict`."""
+
+    def __init__(self, code: str, objects: tuple[str, ...] = (), message: str = "", /, **measured: float) -> None:
+        super().__init__(message or CODES[code])
+        self.verdict = Verdict(False, code, objects, measured, message or CODES[code])

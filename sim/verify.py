@@ -1,0 +1,151 @@
+"""Does a plan work in the world? Its primitives are carried out one by one; what is perceived is held against expectations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from planner.validation import successor
+from reasoner.embodiment import Embodiment
+from reasoner.symbols import Problem, State
+from sim.perception import perceiver
+from sim.verdict import Verdict
+from sim.world import Clock, Perturbation, Step, World
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """A primitive and what physics said about it; `seconds` is the simulated time that it took."""
+
+    step: Step
+    verdict: Verdict
+    seconds: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as `confab verify --json` prints it."""
+        return {"path": list(self.step.path), "id": self.step.id, **self.verdict.as_json()}
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """One execution of a plan. `poured` is the share of a serving that arrived, per pour; `state` what was perceived last."""
+
+    seed: int
+    ok: bool
+    steps: tuple[StepReport, ...]
+    poured: tuple[float, ...]
+    cpu_seconds: float
+    simulated_seconds: float
+    state: State = field(default_factory=dict)
+    clock: Clock = field(default_factory=Clock, compare=False)
+
+    @property
+    def failure(self) -> StepReport | None:
+        """The step that failed, if one did."""
+        return next((report for report in self.steps if not report.verdict.ok), None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as `confab verify --json` prints it."""
+        return {
+            "seed": self.seed,
+            "ok": self.ok,
+            "steps": [report.as_json() for report in self.steps],
+            "poured": [round(share, 6) for share in self.poured],
+            "cpu_seconds": round(self.cpu_seconds, 3),
+            "simulated_seconds": round(self.simulated_seconds, 4),
+        }
+
+
+def expectations(problem: Problem, steps: Sequence[Step]) -> list[State]:
+    """Return the states that the behaviours of a plan promise, one after each step.
+
+    Raises
+    ------
+    ValueError
+        A step's preconditions don't hold where it is done; the message names it.
+    """
+    state = problem.initial
+    states: list[State] = []
+    for step in steps:
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
+        if after is None:
+            raise ValueError(
+                f"step {step.path}, {step}: its preconditions don't hold; this is no plan from the initial state"
+            )
+        state = after
+        states.append(state)
+    return states
+
+
+def verify(
+    embodiment: Embodiment,
+    initial: State,
+    steps: Sequence[Step],
+    expected: Sequence[State],
+    *,
+    seed: int = 0,
+    perturb: Perturbation | None = None,
+    beads: bool = True,
+    noise: float = 0.0,
+    prepare: Callable[[World], None] | None = None,
+    watch: Callable[[World], None] | None = None,
+    progress: Callable[[int, Step], None] | None = None,
+) -> Rollout:
+    """Carry out the primitives of a plan in a new world until one fails.
+
+    Parameters
+    ----------
+    embodiment, initial
+        What the world is made of, and the facts that it begins with.
+    steps : sequence of Step
+        Primitives in the order of execution.
+    expected : sequence of State
+        The state after each of them, as `expectations` computes it; symbols without perceiver are not looked at.
+    seed, perturb, beads, noise
+        As in `World`.
+    prepare : callable, optional
+        Called with the world before the first step: plants a fault, say.
+    watch : callable, optional
+        Called with the world after every simulation step: a camera, say.
+    progress : callable, optional
+        Called with the number of steps done and the step that is done next.
+
+    Returns
+    -------
+    Rollout
+        The same arguments give the same rollout, bit by bit, CPU seconds apart.
+    """
+    begin = time.process_time()
+    reports: list[StepReport] = []
+    with World(embodiment, initial, seed, perturb, beads, noise, watch) as world:
+        if prepare is not None:
+            prepare(world)
+        for number, (step, state) in enumerate(zip(steps, expected, strict=True)):
+            if progress is not None:
+                progress(number, step)
+            started = world.steps
+            verdict = world.execute(step)
+            if verdict.ok:
+                verdict = compare(world, state, verdict)
+            reports.append(StepReport(step, verdict, (world.steps - started) / world.rate))
+            if not verdict.ok:
+                break
+        poured = tuple(min(1.0, r.verdict.measured["poured"]) for r in reports if "poured" in r.verdict.measured)
+        ok = len(reports) == len(steps) and all(report.verdict.ok for report in reports)
+        cpu = time.process_time() - begin
+        return Rollout(seed, ok, tuple(reports), poured, cpu, world.seconds, world.observe(), world.clock)
+
+
+def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
+    """Return the verdict if what is perceived is what is expected, else one that names the first fact that isn't."""
+    seen = world.observe()
+    for symbol in world.symbols:
+        wanted, got = expected.get(symbol), seen.get(symbol)
+        if wanted is not None and got != wanted:
+            code = perceiver(world.embodiment.perceivers[symbol.situation].perceiver).code
+            objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
+            message = f"{symbol} should be {wanted} and is {got or 'nothing that can be perceived'}"
+            return Verdict(False, code, objects, verdict.measured, message)
+    return verdict
