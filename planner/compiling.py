@@ -83,6 +83,7 @@ class Program:
         self.members = {kind: frozenset(members) for kind, members in problem.classes.items()}
         self.levels = problem.domain.levels
         self.achievers: dict[tuple[int, str], list[Achiever]] = {}
+        self.thorough = False
         self.variables: dict[str, tuple[str, ...]] = {}
         self.alike = Alike(problem, named(problem))
         self._globals: dict[str, object] = {"prefer": prefer, "pick": self._picker}
@@ -99,7 +100,7 @@ class Program:
         self, candidates: tuple[str, ...], focus: Mapping[str, None], who: Mapping[str, Mapping[Key, None]]
     ) -> Sequence[str]:
         found = [term for term in focus if term in candidates] if focus else []
-        if found or len(candidates) <= FEW:
+        if found or len(candidates) <= FEW or self.thorough:
             return found or candidates
         return representatives(self.alike.groups(candidates), who, {})
 

@@ -14,9 +14,12 @@ from itertools import product
 from time import perf_counter
 
 from planner.compiling import Program
+from planner.exhaust import Space, TooLargeError
+from planner.flat import plan_level
 from planner.lifted import Done, Refiner, Template
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
-from planner.segments import Advice, Effort, Forbidden, OutOfTimeError, Segments
+from planner.proofs import contested, unattainable
+from planner.segments import Advice, Effort, Forbidden, LimitError, Segments
 from planner.table import Cell, Table, arguments_of, key_of
 from reasoner.symbols import FALSE, Problem
 
@@ -24,6 +27,10 @@ EASY = Effort(depth=1, expansions=10)
 SHORT = Effort(depth=3, expansions=150)
 LONG = Effort(depth=4, expansions=200)
 WIDE = Effort(depth=5, expansions=1000, slack=1, breadth=3)
+
+
+STATES_PER_EXPANSION = 10
+"""Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
 
 
 @dataclass
@@ -63,29 +70,51 @@ def plan(
     """
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + limits.seconds
-    using = using or compiled(problem)
-    call = Call(problem, using, deadline, advice)
+    call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
+
+    def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
+        return Outcome(status, plan, reason, call.segments.counts, call.fallbacks, perf_counter() - begin)
+
+    impossible = unattainable(call.segments) or contested(call.segments)
+    if impossible:
+        return outcome(Status.UNSOLVABLE, reason=impossible)
     try:
-        solved = call.serialise()
-    except OutOfTimeError:
-        solved = False
-    counts = call.segments.counts
-    if solved:
-        tree = call.tree()
-        return Outcome(Status.SOLVED, tree, None, counts, call.fallbacks, perf_counter() - begin)
-    reason = Reason("the fast planner found no plan")
-    return Outcome(Status.GAVE_UP, None, reason, counts, call.fallbacks, perf_counter() - begin)
+        if call.serialise():
+            return outcome(Status.SOLVED, call.tree())
+    except LimitError as limit:
+        return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
+    call.fallbacks += 1
+    return outcome(*last_resort(problem, limits, deadline))
+
+
+def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:
+    """Decide a problem on its lowest level alone: every state if they are few enough to be counted, else flat search."""
+    level = problem.domain.levels[-1]
+    try:
+        found = Space(problem, level).search(limits.expansions * STATES_PER_EXPANSION, deadline)
+        if found.steps is not None:
+            return Status.SOLVED, Plan(found.steps), None
+        states = f"all {found.states} states of level {level} that can be reached were looked at"
+        return Status.UNSOLVABLE, None, Reason(f"no state with the goal's facts can be reached; {states}")
+    except TimeoutError:
+        return Status.GAVE_UP, None, Reason("stopped at the limit: the time limit")
+    except TooLargeError:
+        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+        flat = plan_level(problem, level, limits=Limits(limits.expansions, left))
+        return flat.status, flat.plan, flat.reason
 
 
 class Call:
     """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
 
-    def __init__(self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None) -> None:
+    def __init__(
+        self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None, most: int
+    ) -> None:
         self.problem = problem
         self.program = using.program
         self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
         self.table = Table(problem.domain.situations, problem.initial)
-        self.segments = Segments(self.program, self.table, self.goal, deadline, advice)
+        self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
         self.refiner = Refiner(self.segments, using.templates)
         self.kept: dict[Cell, str] = {}
         self.steps: list[Done] = []

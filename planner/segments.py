@@ -35,8 +35,8 @@ Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
 """Orders what could be done, given the level and the state; may leave nothing out."""
 
 
-class OutOfTimeError(Exception):
-    """The time limit of the planning call has passed."""
+class LimitError(Exception):
+    """A limit of the planning call has been reached; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,10 @@ class Segments:
     goal : mapping of cell to value
         The task's goal, which proposes values.
     deadline : float, optional
-        `perf_counter` at which `OutOfTimeError` is raised.
+        `perf_counter` at which `LimitError` is raised.
     advice : Advice, optional
+    most : int
+        Expansions of all searches together, after which `LimitError` is raised.
     """
 
     program: Program
@@ -73,9 +75,11 @@ class Segments:
     goal: Mapping[Cell, str]
     deadline: float | None = None
     advice: Advice | None = None
+    most: int = 200_000
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.expanded = 0
         self.focus: dict[str, None] = {}
         bound = self.program.bind(self.table, self.focus)
         self.forward, self.achieve = bound.forward, bound.achieve
@@ -238,7 +242,10 @@ class Segments:
         """Count an expansion, and look at the clock now and then."""
         counts = self.counts[level]
         counts.expanded += 1
-        if counts.expanded % 32 == 0:
+        self.expanded += 1
+        if self.expanded > self.most:
+            raise LimitError(f"{self.most} expansions")
+        if self.expanded % 32 == 0:
             self.check_time()
 
     def exists(self, situation: str, key: object) -> bool:
@@ -318,6 +325,6 @@ class Segments:
         return list(found)
 
     def check_time(self) -> None:
-        """Raise `OutOfTimeError` when the time limit has passed."""
+        """Raise `LimitError` when the time limit has passed."""
         if self.deadline is not None and perf_counter() > self.deadline:
-            raise OutOfTimeError
+            raise LimitError("the time limit")

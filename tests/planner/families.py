@@ -131,3 +131,26 @@ def family(name: str, n: int, seed: int = 0, hands: int = 2) -> Problem:
         pours = {f"cup{i + 1}": f"beverage{i + 1}" for i in range(served)}
         goals |= {f"bottle{i + 1}": at[(i + 1) % bottles] for i in range(bottles)}
     return table(places, hands, cups, bottles, at, goals, pours, reach)
+
+
+def random_table(seed: int) -> Problem:
+    """Return a small table with random reach, objects and goals; about a third of them are unsolvable."""
+    rng = random.Random(f"random {seed}")
+    places = rng.randint(3, 6)
+    bottles, cups = rng.randint(0, 2), rng.randint(1, 2)
+    hands = rng.choice((1, 2, 2, 2))
+    count = min(bottles + cups, places)
+    cups = count - bottles
+    at = rng.sample(range(1, places + 1), count)
+    reach = [set(rng.sample(range(1, places + 1), rng.randint(2, places))) for _ in range(hands)]
+    drinks = {f"bottle{i + 1}": rng.choice(("beverage1", "beverage2")) for i in range(bottles)}
+    names = [f"bottle{i + 1}" for i in range(bottles)] + [f"cup{i + 1}" for i in range(cups)]
+    wanted = rng.sample(names, rng.randint(1, count))
+    aims = rng.sample(range(1, places + 1), len(wanted))
+    filled = {f"cup{i + 1}": rng.choice(("beverage1", "beverage2")) for i in range(cups) if rng.random() < 0.15}
+    pours = {
+        f"cup{i + 1}": rng.choice(sorted(set(drinks.values())) or ["beverage1"])
+        for i in range(cups)
+        if bottles and rng.random() < 0.6
+    }
+    return table(places, hands, cups, bottles, at, dict(zip(wanted, aims, strict=True)), pours, reach, drinks, filled)
