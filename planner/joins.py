@@ -78,13 +78,16 @@ class Table:
 
     def _index(self, columns: tuple[int, ...]) -> tuple[NDArray[np.generic], Ints]:
         """Return the rows' keys on some columns in order, and whose they are."""
-        size, keys, order = self._indices.get(columns, (-1, self.rows[:0, 0], self.rows[:0, 0]))
+        size, keys, order = self._indices.get(columns, (-1, _NONE, _NONE))
         if size != len(self):
             unsorted = pack(self.rows[:, columns], self.radix)
             order = np.argsort(unsorted, kind="stable")
             keys = unsorted[order]
             self._indices[columns] = (len(self), keys, order)
         return keys, order
+
+
+_NONE: Ints = np.empty(0, np.int64)
 
 
 def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
