@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
 import pyoxigraph as ox
 
@@ -40,6 +42,16 @@ Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
 Row = tuple[Term, ...]
 
 
+Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
+
+
+class Remote(Protocol):
+    """A store elsewhere that answers SPARQL 1.1, as `reasoner.stores.Endpoint` is."""
+
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+        """Return what a query answers."""
+
+
 class KnowledgeError(ValueError):
     """The knowledge that was given can't be used; the message says what, where, and what to do."""
 
@@ -63,12 +75,18 @@ class KnowledgeGraph:
         What was read into the graph `asserted`, the scene first.
     prefixes : mapping of prefix to namespace
         Those of SPARQL queries: the files' own, and `PREFIXES`.
+    remote : Remote, optional
+        The store that answers instead of `store`; it is only read.
+    round_trips : int
+        How many queries were asked so far.
     """
 
     scene: str
     store: ox.Store = field(default_factory=ox.Store)
     files: dict[str, Path] = field(default_factory=dict)
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
+    remote: Remote | None = None
+    round_trips: int = 0
 
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
         """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
@@ -91,7 +109,12 @@ class KnowledgeGraph:
         return tuple(variable.value for variable in answer.variables), [tuple(row) for row in answer]
 
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
-        """Return the triples of some graphs as N-Triples."""
+        """Return the triples of some graphs as N-Triples; of a remote store, all that it shows."""
+        if self.remote:
+            answer = self.query("CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }")
+            return (
+                answer.serialize(format=ox.RdfFormat.N_TRIPLES) or b"" if isinstance(answer, ox.QueryTriples) else b""
+            )
         triples = {
             q.triple
             for name in graphs
@@ -99,10 +122,11 @@ class KnowledgeGraph:
         }
         return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
 
-    def query(
-        self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str
-    ) -> ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean:
-        """Return what any SPARQL 1.1 query answers on the union of some graphs."""
+    def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
+        """Return what any SPARQL 1.1 query answers on the union of some graphs; a remote store decides itself on which."""
+        self.round_trips += 1
+        if self.remote:
+            return self.remote.query(query, self.prefixes, bindings)
         try:
             return self.store.query(
                 query,
@@ -115,6 +139,8 @@ class KnowledgeGraph:
 
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
         """Add triples of IRIs to one of the named graphs."""
+        if self.remote:
+            raise KnowledgeError(f"{self.scene}: a remote store is only read; add to it with its own tools")
         name = ox.NamedNode(BASE + graph)
         self.store.extend(ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples)
 
@@ -124,13 +150,15 @@ class KnowledgeGraph:
         return self.files.get(self.scene)
 
 
-def load(source: str | Path) -> KnowledgeGraph:
+def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
     """Load a scene with all that it imports, and its reach file if there is one.
 
     Parameters
     ----------
     source : str or Path
         Name of a shipped scene, or a file in Turtle, N-Triples or RDF/XML.
+    store : pyoxigraph.Store, optional
+        An empty store to load into; one in memory if left out.
 
     Raises
     ------
@@ -138,16 +166,18 @@ def load(source: str | Path) -> KnowledgeGraph:
         No such scene or file; syntax error with line and column; an import that no catalog knows.
     """
     path = scene_file(source)
-    scene = _ontology_iri(path)
-    graph = KnowledgeGraph(scene)
-    waiting = [(scene, path)]
+    graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
+    read_into(graph, path, "asserted")
+    graph.scene = _only_ontology(graph, path)
+    waiting = [(graph.scene, path)]
     places: dict[Path, Mapping[str, Path]] = {}
     while waiting:
         iri, file = waiting.pop(0)
         if iri in graph.files:
             continue
+        if iri != graph.scene:
+            read_into(graph, file, "asserted")
         graph.files[iri] = file
-        read_into(graph, file, "asserted")
         for imported in _imports(graph, iri):
             if imported not in graph.files:
                 waiting.append((imported, _locate(imported, file, places)))
@@ -173,10 +203,11 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     form = FORMATS.get(file.suffix.lower())
     if form is None:
         raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
-    target = ox.NamedNode(BASE + name)
+    base = file.resolve().as_uri()
     try:
-        parser = ox.parse(path=str(file), format=form, base_iri=file.resolve().as_uri())
-        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in parser)
+        graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
+        parser = ox.parse(path=str(file), format=form, base_iri=base)
+        list(islice(parser, 1))  # the prefixes stand at the top
     except SyntaxError as error:
         raise KnowledgeError(f"{file}: {error}") from error
     except OSError as error:
@@ -185,10 +216,8 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         graph.prefixes.setdefault(prefix, namespace)
 
 
-def _ontology_iri(path: Path) -> str:
-    probe = KnowledgeGraph("")
-    read_into(probe, path, "asserted")
-    rows = probe.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
+def _only_ontology(graph: KnowledgeGraph, path: Path) -> str:
+    rows = graph.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
     if len(rows) != 1 or not isinstance(rows[0][0], ox.NamedNode):
         raise KnowledgeError(
             f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it"
