@@ -16,6 +16,7 @@ from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
 from reasoner.graph import KnowledgeError, KnowledgeGraph
 from reasoner.graph import load as load_graph
+from reasoner.inference import infer
 from reasoner.links import Links
 from reasoner.names import Names
 from reasoner.reading import Reading, read, with_goals
@@ -223,5 +224,6 @@ def load(source: str | Path) -> Scene:
     """
     begin = perf_counter()
     graph = load_graph(source)
+    infer(graph)
     reading = read(graph)
     return Scene(graph, reading, {"load": perf_counter() - begin})

@@ -40,11 +40,11 @@ from reasoner.symbols import (
 OWL = "http://www.w3.org/2002/07/owl#"
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 THING = OWL + "Thing"
-EXPRESSIONS = """?class owl:equivalentClass ?expression .
-    ?expression (owl:intersectionOf|owl:unionOf|owl:complementOf|owl:onProperty|owl:someValuesFrom|owl:allValuesFrom
-                 |rdf:first|rdf:rest)* ?part_of_it .
-    { BIND(?class AS ?node) BIND(owl:equivalentClass AS ?property) BIND(?expression AS ?value) } UNION
-    { BIND(?part_of_it AS ?node) ?node ?property ?value . FILTER(isBlank(?node)) }"""
+EXPRESSIONS = """{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(isBlank(?value)) } UNION
+    { ?class owl:equivalentClass ?expression .
+      ?expression (owl:intersectionOf|owl:unionOf|owl:complementOf|owl:oneOf|owl:onProperty|owl:someValuesFrom
+                   |owl:allValuesFrom|rdf:first|rdf:rest)* ?node .
+      ?node ?property ?value . FILTER(isBlank(?node)) }"""
 """The part of a SPARQL query that yields every definition with what is nested inside, as (node, property, value)."""
 
 

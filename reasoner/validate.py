@@ -23,6 +23,7 @@ import pyoxigraph as ox
 import ontology
 from reasoner.findings import Finding, Places, fill, unique
 from reasoner.graph import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.inference import infer
 from reasoner.names import local_name
 from reasoner.reading import Reading, read
 from reasoner.rules import RULES, Case
@@ -67,6 +68,7 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
         yield Finding(str(path), 0, "", "", "unreadable", str(error), why, "see the message")
         return
     places = Places(graph)
+    yield from _merged(graph, places)
     found = [*_violations(graph, places), *_ill_formed(graph, places)]
     yield from found
     reading, problem = _read(graph)
@@ -84,6 +86,15 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
 
         for rule, node, what, why, remedy in deep_faults(graph):
             yield places.finding(rule, node, what, why, remedy)
+
+
+def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    """Conclude what follows by OWL 2 RL, so that the other checks see it, too."""
+    try:
+        infer(graph)
+    except KnowledgeError as error:
+        why = "what holds of the one would be concluded of the other"
+        yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
 
 
 def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:

@@ -1,0 +1,170 @@
+"""A class defined by situations becomes conditions, so that it stays true as the state changes."""
+
+from pathlib import Path
+
+import pytest
+
+from planner.behaviors import Model
+from reasoner.graph import KnowledgeError, load
+from reasoner.inference import infer
+from reasoner.reading import Reading, read
+from reasoner.symbols import (
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    GroundBehavior,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+from reasoner.validate import validate
+from tests.ontology.faults import skeleton
+
+DIRTY = "c:about :B1_WASH.item ; c:situationType :CLEANLINESS ; c:value :dirty"
+
+
+def scene(folder: Path, *definitions: str, asked: str = "Special") -> Path:
+    """Write the skeleton, with washing allowed for items of a class `asked` that is defined by the given axioms."""
+    path = skeleton(folder)
+    domain = folder / "washing.ttl"
+    text = domain.read_text()
+    assert DIRTY in text
+    text = text.replace(
+        ":B1_WASH.isDirty a owl:NamedIndividual, c:ValueCondition",
+        ":B1_WASH.isDirty a owl:NamedIndividual, c:ClassCondition",
+    )
+    text = text.replace(DIRTY, f"c:about :B1_WASH.item ; c:ofClass :{asked}")
+    domain.write_text(text + "\n".join(definitions))
+    return path
+
+
+def defined(expression: str, name: str = "Special") -> str:
+    return (
+        f':{name} a owl:Class, owl:NamedIndividual ; rdfs:label "{name.lower()}" ; owl:equivalentClass {expression} .'
+    )
+
+
+def restriction(prop: str, said: str) -> str:
+    return f"[ a owl:Restriction ; owl:onProperty {prop} ; {said} ]"
+
+
+def both(*parts: str) -> str:
+    return f"[ a owl:Class ; owl:intersectionOf ( {' '.join(parts)} ) ]"
+
+
+IS_DIRTY = restriction(":cleanliness", "owl:hasValue :dirty")
+AT_SINK = restriction(":isAt", "owl:someValuesFrom :Sink")
+DIRTY_VALUE = ValueCondition("CLEANLINESS", ("?item",), "dirty")
+AT_SOME_SINK = Witness("?item_isAt", "Sink", (ValueCondition("PLACE", ("?item",), "?item_isAt"),))
+OTHERS = (ValueCondition("PLACE", ("?item",), "?where"), ClassCondition("?where", "Sink"))
+
+
+def asked_of_item(path: Path) -> Condition:
+    reading = read(load(path))
+    conditions = reading.problem.domain.behaviors["B1_WASH"].preconditions
+    return next(condition for condition in conditions if condition not in OTHERS)
+
+
+@pytest.mark.parametrize(
+    ("expression", "condition"),
+    [
+        (IS_DIRTY, DIRTY_VALUE),
+        (AT_SINK, AT_SOME_SINK),
+        (both(":Item", IS_DIRTY), AnyOf(((ClassCondition("?item", "Item"), DIRTY_VALUE),))),
+        (f"[ a owl:Class ; owl:unionOf ( {IS_DIRTY} {AT_SINK} ) ]", AnyOf(((DIRTY_VALUE,), (AT_SOME_SINK,)))),
+        (
+            f"[ a owl:Class ; owl:complementOf {IS_DIRTY} ]",
+            ValueCondition("CLEANLINESS", ("?item",), "dirty", negated=True),
+        ),
+        (
+            restriction(":isAt", "owl:allValuesFrom :Sink"),
+            Witness(
+                "?item_isAt",
+                "PLACE",
+                (ValueCondition("PLACE", ("?item",), "?item_isAt"), ClassCondition("?item_isAt", "Sink", negated=True)),
+                negated=True,
+            ),
+        ),
+        (
+            restriction(":isAt", "owl:someValuesFrom [ a owl:Class ; owl:oneOf ( :clean ) ]"),
+            Witness(
+                "?item_isAt",
+                "PLACE",
+                (
+                    ValueCondition("PLACE", ("?item",), "?item_isAt"),
+                    AnyOf(((EqualityCondition("?item_isAt", "clean"),),)),
+                ),
+            ),
+        ),
+    ],
+)
+def test_owl_expressions_become_conditions(tmp_path: Path, expression: str, condition: Condition) -> None:
+    assert asked_of_item(scene(tmp_path, defined(expression))) == condition
+
+
+def test_a_definition_may_name_another_one(tmp_path: Path) -> None:
+    path = scene(tmp_path, defined(IS_DIRTY, "Dirty"), defined(both(":Item", ":Dirty")))
+    assert asked_of_item(path) == AnyOf(((ClassCondition("?item", "Item"), DIRTY_VALUE),))
+
+
+def test_an_inverse_property_turns_the_condition_round(tmp_path: Path) -> None:
+    occupied = restriction("[ owl:inverseOf :isAt ]", "owl:someValuesFrom :Plate")
+    path = scene(tmp_path, defined(both(":Place", occupied)))
+    text = (
+        (tmp_path / "washing.ttl")
+        .read_text()
+        .replace("c:about :B1_WASH.item ; c:ofClass :Special", "c:about :B1_WASH.where ; c:ofClass :Special")
+    )
+    (tmp_path / "washing.ttl").write_text(text)
+    (found,) = (c for c in read(load(path)).problem.domain.behaviors["B1_WASH"].preconditions if isinstance(c, AnyOf))
+    assert found.alternatives[0][1] == Witness(
+        "?where_isAt", "Plate", (ValueCondition("PLACE", ("?where_isAt",), "?where"),)
+    )
+
+
+def applicable(reading: Reading, item: str, **changes: str) -> bool:
+    """Tell whether an item can be washed in the initial state with some changes to that item."""
+    model = Model(reading.problem)
+    state = {**reading.problem.initial, **{Symbol(name, (item,)): value for name, value in changes.items()}}
+    return model.apply(GroundBehavior(0, "B1_WASH", (item,)), model.values(state)) is not None
+
+
+def test_membership_follows_the_state(tmp_path: Path) -> None:
+    reading = read(load(scene(tmp_path, defined(both(":Item", IS_DIRTY)))))
+    assert applicable(reading, "plate1", PLACE="sink")
+    assert not applicable(reading, "plate1", PLACE="sink", CLEANLINESS="clean")
+    assert not applicable(reading, "plate2", PLACE="sink")
+    assert applicable(reading, "plate2", PLACE="sink", CLEANLINESS="dirty")
+
+
+def test_a_parameter_of_a_defined_class_ranges_over_its_base_and_is_tested_in_the_state(tmp_path: Path) -> None:
+    path = scene(tmp_path, defined(both(":Plate", IS_DIRTY)), asked="Plate")
+    text = (tmp_path / "washing.ttl").read_text()
+    old = ":B1_WASH.item a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Item"
+    assert old in text
+    (tmp_path / "washing.ttl").write_text(text.replace(old, old.replace(":Item", ":Special")))
+    reading = read(load(path))
+    assert reading.problem.domain.behaviors["B1_WASH"].parameters[0].kind == "Plate"
+    assert applicable(reading, "plate1", PLACE="sink")
+    assert not applicable(reading, "plate1", PLACE="sink", CLEANLINESS="clean")
+
+
+def test_nobody_is_stated_to_be_in_a_class_that_changes(tmp_path: Path) -> None:
+    graph = load(scene(tmp_path, defined(both(":Item", IS_DIRTY))))
+    infer(graph, always=True)
+    assert graph.select("SELECT ?x WHERE { ?x a <https://example.org/washing#Special> }") == []
+
+
+def test_a_domain_with_definitions_is_valid(tmp_path: Path) -> None:
+    assert [str(f) for f in validate([scene(tmp_path, defined(both(":Item", IS_DIRTY)))])] == []
+
+
+def test_a_type_without_a_bounding_class_is_refused_by_name(tmp_path: Path) -> None:
+    path = scene(tmp_path, defined(IS_DIRTY), asked="Plate")
+    text = (tmp_path / "washing.ttl").read_text()
+    (tmp_path / "washing.ttl").write_text(
+        text.replace("c:index 1 ; c:termType :Item", "c:index 1 ; c:termType :Special")
+    )
+    with pytest.raises(KnowledgeError, match="Special is used as a type"):
+        read(load(path))
