@@ -100,7 +100,9 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
         behavior, places = exported.actions[words[0]]
         unknown = [word for word in words[1:] if word not in exported.objects]
         if unknown or (places and max(places) >= len(words) - 1):
-            raise ValueError(f"line {number}: {'no object ' + unknown[0] if unknown else 'too few objects'}: {line.strip()}")
+            raise ValueError(
+                f"line {number}: {'no object ' + unknown[0] if unknown else 'too few objects'}: {line.strip()}"
+            )
         steps.append((behavior, tuple(exported.objects[words[1 + place]] for place in places)))
     return steps
 
@@ -195,7 +197,9 @@ class _Export:
         return f"({predicate} {self.term(term)})"
 
     def term(self, name: str) -> str:
-        return "?" + re.sub(r"[^0-9a-z_-]", "_", name[1:].lower()) if name.startswith("?") else self.name("object", name)
+        return (
+            "?" + re.sub(r"[^0-9a-z_-]", "_", name[1:].lower()) if name.startswith("?") else self.name("object", name)
+        )
 
     # ----------------------------------------------------------------------------------------------- conditions
 
@@ -250,8 +254,7 @@ class _Export:
                     where.append(self.is_a(inner, kind))
                 for c in conditions:
                     self.condition(_put(c, {variable: inner}), action, where)
-            case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True) if about ==
-            variable:
+            case Witness(_, kind, (ValueCondition(situation, (_,), value, False),), True) if _absent(one):
                 self.absence(kind, situation, value, action, where)
             case _:
                 where.append(self.formula(one))
@@ -279,8 +282,12 @@ class _Export:
             for c in behavior.preconditions:
                 if _absent(c) == (kind, situation):
                     asked |= self.members_of(behavior, c.conditions[0].value)  # type: ignore[union-attr]
-        held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in self.sets[kind]]
-        if any(v in asked for v in held) and len([v for v in held if v in asked]) > len({v for v in held if v in asked}):
+        held = [
+            v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in self.sets[kind]
+        ]
+        if any(v in asked for v in held) and len([v for v in held if v in asked]) > len(
+            {v for v in held if v in asked}
+        ):
             return False
         return all(
             not self.members_of(behavior, effect.value) & asked
@@ -374,7 +381,12 @@ class _Export:
         for conditions, effects, conditional in self.cases(behavior, effect):
             yield conditions, effects, conditional
             situation = self.situations.get(effect.situation)
-            if not effects or situation is None or situation.boolean or not self.members_of(behavior, effect.value) & asked:
+            if (
+                not effects
+                or situation is None
+                or situation.boolean
+                or not self.members_of(behavior, effect.value) & asked
+            ):
                 continue
             old = {
                 c.value
@@ -429,7 +441,11 @@ class _Export:
             return
         asked = self.contrary.get(situation.name, set()) or any(name == situation.name for _, name in self.free)
         if asked and self.members(action, value) & set(asked if isinstance(asked, set) else self.sets[situation.range]):
-            if old.startswith("?other") or old.startswith("?old") or self.members(action, old) & self.members(action, value):
+            if (
+                old.startswith("?other")
+                or old.startswith("?old")
+                or self.members(action, old) & self.members(action, value)
+            ):
                 action.needs.append(self.different(old, value, self.members(action, value)))
         action.ends.append(self.predicate(situation.name, arguments, old))
         action.begins.append(self.predicate(situation.name, arguments, value))
@@ -443,7 +459,9 @@ class _Export:
         situation = self.situations.get(effect.situation)
         if situation is None:
             return
-        own = {v.name: self.type_of.get(v.kind, "object") for v in action.behavior.variables if v.name not in action.terms}
+        own = {
+            v.name: self.type_of.get(v.kind, "object") for v in action.behavior.variables if v.name not in action.terms
+        }
         inside = {t for c in effect.when for t in _terms(c)} | {*effect.arguments, effect.value}
         own = {name: kind for name, kind in own.items() if name in inside}
         kinds = {v.name: v.kind for v in action.behavior.variables}
@@ -523,8 +541,8 @@ class _Export:
     def domain_text(self, name: str, actions: Sequence[str]) -> str:
         body = "\n".join(actions)
         predicates = [
-            f"({predicate}{''.join(f' ?x{i}' for i in range(arity))})" for predicate, arity in
-            sorted(self.arity.items())
+            f"({predicate}{''.join(f' ?x{i}' for i in range(arity))})"
+            for predicate, arity in sorted(self.arity.items())
         ]
         wanted = {
             ":negative-preconditions": any("(not (" in a.split(":effect")[0] for a in actions),
@@ -585,10 +603,12 @@ class _Export:
         metric = "  (:metric minimize (total-cost))\n" if self.costs else ""
         others = [o for o in individuals if self.name("object", o) not in self._mentioned]
         rest = "\n    "
+        name = self.name("domain", self.problem.scene.rsplit("/", 1)[-1] + " ")
         return (
-            f"(define (problem {self.name('domain', self.problem.scene.rsplit('/', 1)[-1] + ' ')})\n  (:domain
-            {domain})\n" f"  (:objects\n    {self.objects_text(others)})\n  (:init\n    {rest.join([*costs,
-            *facts])})\n" f"  (:goal (and\n    {rest.join(goals)}))\n{metric})\n"
+            f"(define (problem {name})\n  (:domain {domain})\n"
+            f"  (:objects\n    {self.objects_text(others)})\n"
+            f"  (:init\n    {rest.join([*costs, *facts])})\n"
+            f"  (:goal (and\n    {rest.join(goals)}))\n{metric})\n"
         )
 
 

@@ -408,9 +408,9 @@ class _Import:
         if one == other:
             return True
         for form in _conjuncts(action.precondition):
-            if form.head == "not" and isinstance(form.items[1], Form) and _words(form.items[1])[0] == "=":
-                if {*_words(form.items[1])[1:]} == {one, other}:
-                    return False
+            inner = form.items[1] if form.head == "not" else form
+            if form is not inner and isinstance(inner, Form) and {*_words(inner)} == {"=", one, other}:
+                return False
         return bool(self.domain_of(action, one) & self.domain_of(action, other))
 
     # ---------------------------------------------------------------------------------------------- behaviours

@@ -1,5 +1,4 @@
-"""A planning problem written as a scene in Turtle, in the core vocabulary: what `reasoner.reading` reads back as the
-same problem.
+"""A planning problem written as a scene in Turtle: what `reasoner.reading` reads back as the same problem.
 
 Domain and scene go into one file. Every condition and effect is an individual with an IRI of its own, so that Protégé
 shows and edits it. Effects are numbered in the order in which they are made.
