@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from urllib.parse import quote
 
 import ontology
 from reasoner.files import write_whole
@@ -83,8 +84,8 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 
 
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
-    """Write what `generate` returns into a file, whole or not at all, piece by piece."""
-    write_whole(path, pieces(family, objects, hands, clutter, seed))
+    """Write a scene, called like its file, whole or not at all and piece by piece; parameters as in `generate`."""
+    write_whole(path, pieces(family, objects, hands, clutter, seed, path.stem))
 
 
 def families() -> tuple[str, ...]:
@@ -96,8 +97,8 @@ def families() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.ttl")))
 
 
-def pieces(family: str, objects: int, hands: int, clutter: int, seed: int) -> Iterator[str]:
-    """Yield the text of `generate` in pieces."""
+def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name: str | None = None) -> Iterator[str]:
+    """Yield the text of `generate` in pieces; `name` is the last part of the scene's IRI."""
     if family not in families():
         raise KnowledgeError(f"no family '{family}'{nearest(family, families())} (families: {', '.join(families())})")
     if objects < 2 or objects % 2 or hands < 1 or clutter < 0:
@@ -109,7 +110,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int) -> It
     blocks = _blocks(FOLDER / f"{family}.ttl")
     (placement,) = (name.removeprefix("placement ") for name, _ in blocks if name.startswith("placement "))
     layout = PLACEMENTS[placement](objects, hands, random)
-    scene = f"{family}-{objects}-{hands}-{clutter}-{seed}"
+    scene = quote(name or f"{family}-{objects}-{hands}-{clutter}-{seed}", safe="")
     once = {"SCENE": scene, "FAMILY": family, "OBJECTS": objects, "HANDS": hands, "CLUTTER": clutter, "SEED": seed}
     for section, text in blocks:
         pattern = WORD.sub(r"%(\1)s", text.replace("%", "%%"))

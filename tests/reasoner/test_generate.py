@@ -14,6 +14,7 @@ from reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, wr
 from reasoner.graph import KnowledgeError, load
 from reasoner.reading import Reading, read
 from reasoner.symbols import Problem, Symbol
+from reasoner.validate import validate
 
 
 def reading_of(folder: Path, family: str, **sizes: int) -> Reading:
@@ -61,6 +62,13 @@ def test_four_objects_served_are_the_papers_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize("family", sorted({*families()} - {"unsolvable", "random"}))
 def test_the_paper_s_mode_plans_four_objects_of_a_family(tmp_path: Path, family: str) -> None:
     assert plan(reading_of(tmp_path, family, clutter=1).problem).plan
+
+
+@pytest.mark.parametrize("family", families())
+def test_a_generated_scene_is_valid(tmp_path: Path, family: str) -> None:
+    path = tmp_path / f"my-{family}.ttl"
+    write_scene(path, family, objects=6, clutter=3)
+    assert validate([path]) == []
 
 
 def test_no_hand_reaches_a_goal_of_the_unsolvable(tmp_path: Path) -> None:
