@@ -77,7 +77,8 @@ def world_of(triples: bytes) -> Any:
 
     world = owlready2.World()
     kept = b"\n".join(line for line in triples.splitlines() if f"<{IMPORTS}>".encode() not in line)
-    world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):  # it warns of punned relations
+        world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
     return world
 
 

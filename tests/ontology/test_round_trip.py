@@ -1,0 +1,59 @@
+"""Every shipped file and a learned memory come back from the real OWL API as they were, inside OWL 2 DL."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pyoxigraph as ox
+import pytest
+
+import confab
+import ontology
+from tests.ontology import owlapi
+from tests.ontology.faults import skeleton
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(owlapi.jvm() is None or not owlapi.jars(), reason="no Java, or no jars of the OWL API"),
+]
+
+
+def canonical(file: Path) -> ox.Dataset:
+    """Return a file's triples with blank nodes named by RDFC-1.0."""
+    dataset = ox.Dataset(ox.parse(path=str(file), format=ox.RdfFormat.TURTLE, base_iri="https://example.org/"))
+    dataset.canonicalize(ox.CanonicalizationAlgorithm.RDFC_1_0)
+    return dataset
+
+
+def through_the_owl_api(files: list[Path], target: Path) -> dict[str, list[str]]:
+    """Save what the OWL API makes of some files into a folder; return each file's violations of OWL 2 DL."""
+    target.mkdir()
+    command = [sys.executable, "-m", "tests.ontology.owlapi", str(target), *map(str, files)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
+    found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def test_shipped_files_and_a_learned_memory_come_back_equal_and_inside_owl_2_dl(tmp_path: Path) -> None:
+    scene = confab.load("beverage-serving")
+    memory = confab.Memory.of(scene)
+    memory.learn(scene, scene.plan(mode="paper").plan)
+    memory.save(tmp_path / "memory.ttl")
+    files = [*ontology.shipped().values(), skeleton(tmp_path), tmp_path / "washing.ttl", tmp_path / "memory.ttl"]
+    violations = through_the_owl_api(files, tmp_path / "back")
+    assert {file: found for file, found in violations.items() if found} == {}
+    assert [file.name for file in files if canonical(file) != canonical(tmp_path / "back" / file.name)] == []
+
+
+def test_a_violation_of_owl_2_dl_and_a_changed_triple_are_seen(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    domain = tmp_path / "washing.ttl"
+    axioms = (
+        ":near a owl:ObjectProperty, owl:TransitiveProperty, owl:FunctionalProperty . :Item skos:undeclared :Plate .\n"
+    )
+    domain.write_text(domain.read_text() + axioms)
+    violations = through_the_owl_api([domain, scene], tmp_path / "back")
+    assert violations[str(domain)]
+    assert canonical(scene) != canonical(domain)
