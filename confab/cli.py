@@ -74,6 +74,43 @@ def plan(
 
 
 @app.command()
+def run(
+    scene: SceneName = "beverage-serving",
+    memory: MemoryFile = None,
+    mode: Mode = "guarded",
+    seed: Seed = 0,
+    out: Out = Path("confab-out"),
+    no_video: Annotated[bool, typer.Option("--no-video", help="Don't film: faster.")] = False,
+) -> None:
+    """Do the main job: validate, plan, verify in physics, learn, report."""
+    from confab.running import run as run_all
+
+    raise typer.Exit(run_all(scene, memory, mode, seed, out, film=not no_video))
+
+
+@app.command()
+def verify(
+    scene: SceneName,
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.json", help="What 'confab plan --json' prints.")],
+    rollouts: Annotated[
+        int, typer.Option("--rollouts", metavar="N", min=1, help="How often, with seeds S, S+1, …")
+    ] = 1,
+    seed: Seed = 0,
+    perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
+    video: Annotated[Path | None, typer.Option("--video", metavar="OUT.mp4", help="Film the first rollout.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Let a robot carry out a plan in physics, and check every primitive there."""
+    from confab.interchange import read_plan
+    from confab.scene import load
+
+    loaded = load(scene)
+    report = loaded.verify(read_plan(plan, loaded.problem), rollouts=rollouts, seed=seed, perturb=perturb, video=video)
+    _print(report.json() if as_json else report)
+    raise typer.Exit(YES if report.verified else NO)
+
+
+@app.command()
 def query(
     scene: SceneName,
     sparql: Annotated[str | None, typer.Argument(metavar="QUERY", help="SPARQL text, or a .rq file.")] = None,
@@ -151,22 +188,6 @@ def validate(
 
 @app.command()
 def generate(
-    family: Annotated[str, typer.Argument(metavar="FAMILY", help="What kind of scene; an unknown one lists them.")],
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
-    objects: Annotated[int, typer.Option(help="How many objects are on the table; even.")] = 4,
-    hands: Annotated[int, typer.Option(help="How many hands the robot has.")] = 2,
-    clutter: Annotated[int, typer.Option(help="How many irrelevant objects are in other rooms.")] = 0,
-    seed: Seed = 0,
-) -> None:
-    """Write a scene for trials, without geometry: it asserts what hands reach."""
-    from reasoner.generate import write_scene
-
-    write_scene(out, family, objects, hands, clutter, seed)
-    _print(f"{out}")
-
-
-@app.command()
-def generate(
     family: Annotated[
         str,
         typer.Argument(metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable."),
@@ -209,10 +230,11 @@ def _print(what: Any) -> None:
 def main() -> NoReturn:
     """Run the command line; turn errors into one clear line and an exit code."""
     from planner.behaviors import DomainError
+    from reasoner.embody import EmbodimentError
 
     try:
         app()
-    except (KnowledgeError, DomainError) as error:
+    except (KnowledgeError, DomainError, EmbodimentError) as error:
         _complain(str(error))
     except OSError as error:
         _complain(f"{error.filename or 'file'}: {error.strerror or error}")

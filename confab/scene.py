@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     import rdflib
     from rich.tree import Tree
 
+    from confab.physics import Report
+    from reasoner.embodiment import Embodiment
+
 MODES = ("guarded", "strict", "paper")
 DEFAULT_MODE = MODES[0]
 
@@ -74,6 +77,31 @@ class Scene:
         for prefix, namespace in self.knowledge.prefixes.items():
             graph.bind(prefix, namespace)
         return graph
+
+    @cached_property
+    def embodiment(self) -> Embodiment:
+        """What the ontology says about bodies: robot, furniture, shapes, skills and perceivers.
+
+        Raises
+        ------
+        KnowledgeError
+            The scene is symbolic only.
+        EmbodimentError
+            Something that physics needs isn't said; the message names it.
+        """
+        from reasoner.embody import read_embodiment
+
+        if self.knowledge.select("SELECT ?why WHERE { ?ontology :symbolicOnly ?why }"):
+            raise KnowledgeError(
+                f"{self.iri} is symbolic only: it states reach without geometry, so physics can't verify it"
+            )
+        return read_embodiment(self.knowledge.store, self.names.short)
+
+    def verify(self, plan: Plan, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+        """Carry out the primitives of a plan in PyBullet: see `confab.physics.verify`."""
+        from confab.physics import verify
+
+        return verify(self, plan, rollouts, seed, **options)
 
     def query(self, sparql: str) -> Table:
         """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
@@ -161,6 +189,10 @@ class Result:
             reason = self.outcome.reason.text if self.outcome.reason else ""
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
         return self.outcome.plan
+
+    def verify(self, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+        """Carry out the plan in PyBullet: see `confab.physics.verify`."""
+        return self.scene.verify(self.plan, rollouts, seed, **options)
 
     @property
     def solved(self) -> bool:

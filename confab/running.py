@@ -1,0 +1,85 @@
+"""The main job, end to end: validate, plan, verify in physics, learn from it, report."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from confab.memory import Memory
+from confab.physics import Report, progress_bar
+from confab.scene import Result, Scene, load
+from planner.plan import Status
+from reasoner.files import write_whole
+from reasoner.observed import assert_observed, save_observed
+from reasoner.validate import validate
+
+YES, NO, GAVE_UP = 0, 1, 3
+
+
+def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool) -> int:
+    """Do the main job on a scene and say on stdout what came of it; files go to `out`.
+
+    Returns
+    -------
+    int
+        Exit code: 0 verified, 1 invalid, unsolvable or failed in physics, 3 gave up.
+
+    Raises
+    ------
+    KnowledgeError
+        The scene, or the memory, can't be read.
+    """
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=True)
+    findings = validate([name])
+    if findings:
+        console.print("\n".join(map(str, findings)), markup=False, highlight=False)
+        return NO
+    scene = load(name)
+    remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
+    result = scene.plan(memory=remembered.links, mode=mode)
+    if result.outcome.plan is None:
+        console.print(result)
+        return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
+    report = verified(scene, result, seed, out / "run.mp4" if film else None)
+    console.print(report)
+    assert_observed(scene.knowledge, report.rollouts[0].state, scene.names)
+    if report.verified:
+        remembered.learn(scene, result.plan)
+    for what, path in written(scene, result, report, remembered, out).items():
+        console.print(f"{what:<9} {path}", highlight=False)
+    return YES if report.verified else NO
+
+
+def verified(scene: Scene, result: Result, seed: int, video: Path | None) -> Report:
+    """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
+    steps = result.plan.primitives
+    with progress_bar() as bar:
+        task = bar.add_task("", total=len(steps))
+        return scene.verify(
+            result.plan,
+            seed=seed,
+            video=video,
+            progress=lambda done, step: bar.update(task, completed=done, description=str(step)),
+        )
+
+
+def written(scene: Scene, result: Result, report: Report, memory: Memory, out: Path) -> dict[str, Path]:
+    """Write plan, verdicts, observed facts, memory and report, and return what lies where."""
+    from confab.report import report_html
+
+    paths = {
+        "plan": result.save(out / "plan.json"),
+        "verdicts": out / "verify.json",
+        "observed": out / "observed.ttl",
+        "memory": memory.save(out / "memory.ttl"),
+        "report": out / "report.html",
+    }
+    write_whole(paths["verdicts"], json.dumps(report.json(), indent=1) + "\n")
+    save_observed(paths["observed"], report.rollouts[0].state, scene.names, scene.iri)
+    write_whole(paths["report"], report_html(scene, result, report))
+    if report.video is not None:
+        paths["video"] = report.video
+    return paths
