@@ -203,15 +203,20 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     form = FORMATS.get(file.suffix.lower())
     if form is None:
         raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
-    base = file.resolve().as_uri()
     try:
+        base = file.resolve().as_uri()
         graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
-        parser = ox.parse(path=str(file), format=form, base_iri=base)
-        list(islice(parser, 1))  # the prefixes stand at the top
+        read_prefixes(graph, file)
     except SyntaxError as error:
         raise KnowledgeError(f"{file}: {error}") from error
     except OSError as error:
         raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
+
+
+def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
+    """Read the prefixes at the top of a file into the graph's."""
+    parser = ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.resolve().as_uri())
+    list(islice(parser, 1))
     for prefix, namespace in parser.prefixes.items():
         graph.prefixes.setdefault(prefix, namespace)
 
