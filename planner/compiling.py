@@ -85,7 +85,8 @@ class Program:
         self.achievers: dict[tuple[int, str], list[Achiever]] = {}
         self.thorough = False
         self.variables: dict[str, tuple[str, ...]] = {}
-        self.alike = Alike(problem, named(problem))
+        self.named = named(problem)
+        self.alike = Alike(problem, self.named)
         self._globals: dict[str, object] = {"prefer": prefer, "pick": self._picker}
         self._fan: dict[str, float] = {}
         self.source = "\n".join(self._module())

@@ -16,6 +16,7 @@ from time import perf_counter
 from planner.compiling import Program
 from planner.exhaust import Space, TooLargeError
 from planner.flat import plan_level
+from planner.improve import Improver
 from planner.lifted import Done, Refiner, Template
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from planner.proofs import contested, unattainable
@@ -29,6 +30,7 @@ LONG = Effort(depth=4, expansions=200)
 WIDE = Effort(depth=5, expansions=1000, slack=1, breadth=3)
 
 
+IMPROVEMENTS = 4
 STATES_PER_EXPANSION = 10
 """Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
 
@@ -39,6 +41,7 @@ class Compiled:
 
     program: Program
     templates: dict[str, list[Template]] = field(default_factory=dict)
+    shapes: dict[object, Template | None] = field(default_factory=dict)
 
 
 def compiled(problem: Problem) -> Compiled:
@@ -51,6 +54,7 @@ def plan(
     *,
     advice: Advice | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
+    improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
@@ -61,6 +65,8 @@ def plan(
     advice : Advice, optional
         Orders what could be done; without it the order is that of goals, behaviours and individuals.
     limits : Limits
+    improve : int
+        How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
     using : Compiled, optional
         From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
 
@@ -80,6 +86,8 @@ def plan(
         return outcome(Status.UNSOLVABLE, reason=impossible)
     try:
         if call.serialise():
+            if improve:
+                call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
             return outcome(Status.SOLVED, call.tree())
     except LimitError as limit:
         return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
@@ -111,6 +119,7 @@ class Call:
         self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None, most: int
     ) -> None:
         self.problem = problem
+        self.using = using
         self.program = using.program
         self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
         self.table = Table(problem.domain.situations, problem.initial)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TypeAlias
 
-from planner.segments import Effort, Forbidden, Segments
+from planner.segments import Effort, Forbidden, Ground, Segments
 from planner.table import Cell, Change
 from reasoner.symbols import FALSE
 
@@ -91,8 +91,8 @@ class Refiner:
         below = self.levels[self.levels.index(level) + 1]
         known = self.templates.setdefault(name, [])
         for position, template in enumerate(known if self.use_templates else ()):
-            for roles in self._roles(template, individuals):
-                steps = self._replay(below, template, roles, targets)
+            for roles in self.roles(template, individuals):
+                steps = self.replay(below, template, roles, targets)
                 if steps is not None:
                     self.hits += 1
                     if position:
@@ -103,13 +103,14 @@ class Refiner:
         if found is None:
             self.failures += 1
             return None
-        known.insert(0, self._template(found, individuals))
+        known.insert(0, self.template([step[1:3] for step in found], individuals))
         del known[TEMPLATES:]
         return found
 
-    def _replay(
+    def replay(
         self, level: int, template: Template, roles: Sequence[str], targets: dict[Cell, str]
     ) -> tuple[Done, ...] | None:
+        """Do a template's steps; None, and the table as it was, if one can't be done or the changes aren't the targets."""
         mark = len(self.table.trail)
         steps = []
         for name, places in template.steps:
@@ -153,14 +154,15 @@ class Refiner:
                 return tuple(steps)
             table.undo(mark)
 
-    def _template(self, steps: Sequence[Done], individuals: tuple[str, ...]) -> Template:
+    def template(self, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Template:
+        """Return steps with individuals replaced by their places among those given, and by open roles."""
         behaviors = self.segments.program.domain.behaviors
         places: dict[str, int] = {}
         for place, individual in enumerate(individuals):
             places.setdefault(individual, place)
         opened: dict[str, str] = {}
         lifted = []
-        for _, name, arguments, _, _ in steps:
+        for name, arguments in steps:
             for argument, parameter in zip(arguments, behaviors[name].parameters, strict=True):
                 if argument not in places:
                     places[argument] = len(individuals) + len(opened)
@@ -168,7 +170,7 @@ class Refiner:
             lifted.append((name, tuple(places[argument] for argument in arguments)))
         return Template(tuple(lifted), tuple(opened.items()))
 
-    def _roles(self, template: Template, individuals: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    def roles(self, template: Template, individuals: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
         """Yield ways to fill the roles of a template: the parent's individuals, and one of each sort for open roles."""
         if not template.open:
             yield individuals
