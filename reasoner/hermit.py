@@ -77,13 +77,16 @@ def world_of(triples: bytes) -> Any:
 
     world = owlready2.World()
     kept = b"\n".join(line for line in triples.splitlines() if f"<{IMPORTS}>".encode() not in line)
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):  # it warns of punned relations
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()),
+    ):  # it warns of punned relations
         world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
     return world
 
 
 def classify(graph: KnowledgeGraph, prototypes: str = "") -> Classification:
-    """Return what HermiT concludes from a graph, with the given Turtle added.
+    """Return what HermiT concludes from a graph, with the given Turtle added; texts and numbers are left out.
 
     Raises
     ------
@@ -96,7 +99,10 @@ def classify(graph: KnowledgeGraph, prototypes: str = "") -> Classification:
     added = (
         ox.serialize(ox.parse(prototypes.encode(), format=ox.RdfFormat.TURTLE), format=ox.RdfFormat.N_TRIPLES) or b""
     )
-    world = world_of(graph.ntriples(SCENE) + added)
+    things = [
+        line for line in graph.ntriples(SCENE).splitlines() if b' "' not in line
+    ]  # an IRI has neither blank nor quote
+    world = world_of(b"\n".join([*things, added]))
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             owlready2.sync_reasoner_hermit(world, infer_property_values=False, debug=0)

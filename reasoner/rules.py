@@ -15,7 +15,7 @@ from pathlib import Path
 import pyoxigraph as ox
 
 import ontology
-from reasoner.graph import BASE, CORE, SCENE, KnowledgeGraph
+from reasoner.graph import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading import Reading
 from reasoner.symbols import FALSE, AnyOf, Behavior, Condition, Problem, ValueCondition, Witness
@@ -98,17 +98,23 @@ def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str
         yield value.value, "a property", PROPERTIES
 
 
+MERGEABLE = """
+SELECT DISTINCT ?individual ?class WHERE {
+  { ?above a :SituationType } UNION { ?above rdfs:subClassOf :Object } UNION { VALUES ?above { :Object } }
+  UNION { ?property a owl:FunctionalProperty, owl:ObjectProperty ; rdfs:range ?above }
+  ?class rdfs:subClassOf* ?above . FILTER(isIRI(?class))
+  ?individual a ?class, owl:NamedIndividual . FILTER NOT EXISTS { ?individual a owl:Class }
+  FILTER(!STRSTARTS(STR(?class), STR(:)) || ?class = :Hand)
+}"""
+
+
 def individuals_not_different(case: Case) -> Iterator[Fault]:
-    """Find individuals of one class that nothing says to be different."""
+    """Find things, or values of a functional property, of one class that nothing says to be different."""
     groups = _all_different(case)
     apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
     members: dict[str, set[str]] = defaultdict(set)
-    for iri, types in case.types.items():
-        if OWL + "NamedIndividual" in types and OWL + "Class" not in types:
-            for kind in types:
-                if OWL + "Class" in case.types.get(kind, set()) and not kind.startswith((CORE, OWL)):
-                    members[kind].add(iri)
-    members[CORE + "Hand"] = {iri for iri, types in case.types.items() if CORE + "Hand" in types}
+    for individual, its_class in case.graph.select(MERGEABLE, SCENE):
+        members[text(its_class)].add(text(individual))
     for kind, individuals in sorted(members.items()):
         if len(individuals) < 2 or any(individuals <= group for group in groups):
             continue

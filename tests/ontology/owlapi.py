@@ -54,7 +54,7 @@ def ontology_iri(file: Path) -> str:
 
     kind = ox.NamedNode("http://www.w3.org/2002/07/owl#Ontology")
     quads = ox.parse(path=str(file), format=ox.RdfFormat.TURTLE, base_iri=file.as_uri())
-    return next((quad.subject.value for quad in quads if quad.object == kind), str(file))  # type: ignore[union-attr]
+    return next((quad.subject.value for quad in quads if quad.object == kind), str(file))
 
 
 def round_trip(file: Path, target: Path, mapped: dict[str, Path]) -> list[str]:
