@@ -6,6 +6,7 @@ fetched from the network: an import is looked up in the catalog beside the file,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -204,6 +205,8 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     if form is None:
         raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
     try:
+        if form == ox.RdfFormat.RDF_XML:
+            _refuse_entity_tricks(file)
         base = file.resolve().as_uri()
         graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
         read_prefixes(graph, file)
@@ -211,6 +214,19 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         raise KnowledgeError(f"{file}: {error}") from error
     except OSError as error:
         raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
+
+
+def _refuse_entity_tricks(file: Path) -> None:
+    """Let through RDF/XML whose entities abbreviate namespaces, as Protégé 4 wrote them, and nothing else of a DTD."""
+    head = file.read_text(encoding="utf-8", errors="replace").partition("<rdf:RDF")[0]
+    doctype = re.search(r"<!DOCTYPE\s+[^\[>]*", head)
+    for entity in re.findall(r"<!ENTITY\s[^>]*>", head) + ([doctype[0] + ">"] if doctype else []):
+        plain = re.fullmatch(r"""<!ENTITY\s+[\w.-]+\s+(?:"[^"&%]*"|'[^'&%]*')\s*>|<!DOCTYPE\s+[\w:.-]+\s*>""", entity)
+        if plain is None:
+            raise KnowledgeError(
+                f"{file}: refused, since '{entity}' reads another file or grows when expanded; "
+                "save the ontology again without a document type (Protégé 5 writes none)"
+            )
 
 
 def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
