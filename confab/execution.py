@@ -1,0 +1,165 @@
+"""Execution at the front desk: interventions as people write them, episodes as JSON."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from confab.interchange import step_json
+from planner.episode import Change, Episode, Intervention
+from reasoner.graph import KnowledgeError
+from reasoner.names import nearest
+from reasoner.reading import parse_fact
+from reasoner.symbols import Fact, Problem, Symbol
+
+FORMS = (
+    "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "
+    "'after=28 add Cup cup9 FACT', with after=ID, after=PATH (0.1.2) or at=SECONDS"
+)
+
+
+def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
+    """Return interventions from texts; each may also be a file with one per line (``#`` begins a comment).
+
+    Raises
+    ------
+    KnowledgeError
+        A text isn't of a known form, or names what the scene doesn't have.
+    """
+    found: list[Intervention] = []
+    for text in texts:
+        lines = [text]
+        if "=" not in text:
+            path = Path(text)
+            if not path.is_file():
+                raise KnowledgeError(f"'{text}' is no intervention and no file; wanted {FORMS}")
+            lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+        found += [parse_intervention(problem, line) for line in lines if line]
+    return found
+
+
+def parse_intervention(problem: Problem, text: str) -> Intervention:
+    """Return one intervention.
+
+    Raises
+    ------
+    KnowledgeError
+        The text isn't of a known form, or names what the scene doesn't have.
+    """
+    match = re.fullmatch(r"\s*(after|at)=(\S+)\s+(.+?)\s*", text)
+    if match is None:
+        raise KnowledgeError(f"'{text}' is no intervention; wanted {FORMS}")
+    when: dict[str, Any] = {"text": text.strip()}
+    try:
+        if match[1] == "at":
+            when["at"] = float(match[2])
+        else:
+            when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(int, match[2].split(".")))
+    except ValueError as error:
+        raise KnowledgeError(
+            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2, or seconds"
+        ) from error
+    verb, _, rest = match[3].partition(" ")
+    words = rest.split()
+    if verb == "goal":
+        return Intervention(Change.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
+    if verb == "drop-goal":
+        return Intervention(Change.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
+    if verb == "remove":
+        (individual,) = words if len(words) == 1 else ("",)
+        return Intervention(Change.REMOVE, individual=_known(problem, individual, text), **when)
+    if verb == "add":
+        return _add(problem, words, text, when)
+    return Intervention(Change.WORLD, (Fact(*parse_fact(problem, match[3])),), **when)
+
+
+def _symbol(problem: Problem, words: list[str], text: str) -> Symbol:
+    if len(words) < 2:
+        raise KnowledgeError(f"'{text}': wanted 'drop-goal object SITUATION'")
+    symbol = Symbol(words[1], (words[0], *words[2:]))
+    known = {str(s): s for s in (*problem.initial, *problem.goal)}
+    if str(symbol) not in known:
+        raise KnowledgeError(f"'{text}': there is no {symbol}{nearest(str(symbol), known)}")
+    return symbol
+
+
+def _known(problem: Problem, individual: str, text: str) -> str:
+    individuals = {symbol.arguments[0] for symbol in problem.initial}
+    if individual not in individuals:
+        raise KnowledgeError(f"'{text}': no object '{individual}'{nearest(individual, individuals)}")
+    return individual
+
+
+def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
+    """Read ``KIND NAME`` and facts about it without its name: ``LOCATION location5 BEVERAGE no_beverage``."""
+    from planner.symbolic import with_individual
+
+    if len(words) < 4 or len(words) % 2:
+        raise KnowledgeError(f"'{text}': wanted 'add CLASS NAME SITUATION value …'")
+    kind, individual, *pairs = words
+    if kind not in problem.classes:
+        raise KnowledgeError(f"'{text}': unknown class '{kind}'{nearest(kind, problem.classes)}")
+    if any(individual in members for members in problem.classes.values()):
+        raise KnowledgeError(f"'{text}': there is a '{individual}' already; take another name")
+    wider = with_individual(problem, individual, kind)
+    facts = [
+        Fact(*parse_fact(wider, f"{individual} {situation} {value}"))
+        for situation, value in zip(pairs[::2], pairs[1::2], strict=True)
+    ]
+    return Intervention(Change.ADD, tuple(facts), individual=individual, kind=kind, **when)
+
+
+def episode_json(episode: Episode) -> dict[str, Any]:
+    """Return an episode as JSON data (docs/execution.md)."""
+    return {
+        "scene": episode.scene,
+        "status": episode.status.value,
+        "reasons": [{"text": reason.text, "terms": list(reason.terms)} for reason in episode.reasons],
+        "length": {str(level): count for level, count in episode.done.length.items()},
+        "planned": [step_json(step) for step in episode.planned.steps],
+        "steps": [step_json(step) for step in episode.done.steps],
+        "events": [
+            {
+                "path": list(event.step.path),
+                "id": event.step.id,
+                "behavior": event.step.behavior,
+                "arguments": list(event.step.arguments),
+                "begin": round(event.begin, 4),
+                "end": round(event.end, 4),
+                "ok": event.ok,
+                "code": event.code,
+                "surprises": [
+                    {"symbol": str(s.symbol), "expected": s.expected, "observed": s.observed} for s in event.surprises
+                ],
+            }
+            for event in episode.events
+        ],
+        "interventions": [{"text": i.text, "seconds": round(at, 4)} for i, at in episode.interventions],
+        "replans": [
+            {
+                "after": list(replan.after),
+                "kind": replan.kind,
+                "because": replan.because,
+                "cost": replan.cost,
+                "dropped": replan.dropped,
+                "added": replan.added,
+                "seconds": round(replan.seconds, 6),
+                "steps": [step_json(step) for step in replan.steps],
+            }
+            for replan in episode.replans
+        ],
+        "failures": [
+            {
+                "path": list(failure.step.path),
+                "id": failure.step.id,
+                "code": failure.code,
+                "objects": list(failure.objects),
+                "message": failure.message,
+            }
+            for failure in episode.failures
+        ],
+        "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
+        "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
+    }

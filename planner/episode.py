@@ -1,0 +1,204 @@
+"""The values of execution: what people do in the meantime, what a world says to a step, and what an episode was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+from planner.plan import Plan, Reason, Step
+from reasoner.symbols import Fact, State, Symbol
+
+
+class Change(Enum):
+    """What an intervention changes."""
+
+    WORLD = "world"  # an object gets another value: moved, emptied, filled
+    REMOVE = "remove"  # an object is taken away
+    ADD = "add"  # an object appears
+    GOAL = "goal"  # a goal is added, or replaces that of its symbol
+    DROP_GOAL = "drop-goal"
+
+
+@dataclass(frozen=True)
+class Intervention:
+    """Something that a person does in the course of an episode.
+
+    It happens as soon as the step with the ID `after` (an int: a step of the most abstract level) or the path `after` (a tuple)
+    is done, or when the world's clock shows `at` seconds, which may be inside a primitive.
+
+    Attributes
+    ----------
+    change : Change
+    facts : tuple of Fact
+        What holds from then on, or is wanted.
+    symbol : Symbol, optional
+        Whose goal is dropped.
+    individual, kind : str
+        What is added or taken away; of which class it is.
+    after : int or tuple of int, optional
+    at : float, optional
+    text : str
+        As it was written.
+    """
+
+    change: Change
+    facts: tuple[Fact, ...] = ()
+    symbol: Symbol | None = None
+    individual: str = ""
+    kind: str = ""
+    after: int | tuple[int, ...] | None = None
+    at: float | None = None
+    text: str = ""
+
+    @property
+    def of_world(self) -> bool:
+        """Whether it changes the world, and not what is wanted of it."""
+        return self.change in (Change.WORLD, Change.REMOVE, Change.ADD)
+
+
+class Verdict(Protocol):
+    """What a world says to a step: it did what it should, or how it failed."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the step did what it should."""
+
+    @property
+    def code(self) -> str | None:
+        """How it failed."""
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """What was involved in the failure."""
+
+    @property
+    def message(self) -> str:
+        """The failure in words."""
+
+
+class World(Protocol):
+    """Where plans are carried out: a simulation, a toy, a robot (docs/execution.md)."""
+
+    def observe(self) -> State:
+        """Return the facts that are perceived now; what can't be perceived is left out."""
+
+    def execute(self, step: Step) -> Verdict:
+        """Carry out a primitive, or stop it at once when an intervention makes it pointless."""
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention happen now."""
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of interventions that shall happen at a time of the world's clock."""
+
+    @property
+    def seconds(self) -> float:
+        """What the world's clock shows."""
+
+
+class End(Enum):
+    """How an episode ended."""
+
+    REACHED = "reached"
+    IMPOSSIBLE = "impossible"  # proved: what is wanted can't be brought about any more
+    GAVE_UP = "gave-up"  # a limit came first
+
+
+@dataclass(frozen=True)
+class Surprise:
+    """A symbol that wasn't observed as expected; `None` where nothing was perceived, or nothing expected."""
+
+    symbol: Symbol
+    expected: str | None
+    observed: str | None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A primitive that failed: in which situation, how, and what it tells about."""
+
+    step: Step
+    code: str
+    objects: tuple[str, ...]
+    message: str
+    state: State
+
+
+@dataclass(frozen=True)
+class Event:
+    """A primitive that was begun: when, how it ended, and what was surprising afterwards."""
+
+    step: Step
+    begin: float
+    end: float
+    ok: bool
+    code: str | None = None
+    surprises: tuple[Surprise, ...] = ()
+
+
+@dataclass(frozen=True)
+class Replan:
+    """A change of the plan.
+
+    `after` is the path of the last primitive that was begun. `kind` is ``repair`` where valid steps of the old plan were kept,
+    else ``replan``. `steps` is what was to be done from then on, of cost `cost`; `dropped` and `added` count its primitives'
+    difference from what was to be done before.
+    """
+
+    after: tuple[int, ...]
+    kind: str
+    because: str
+    steps: tuple[Step, ...]
+    cost: float
+    dropped: int
+    added: int
+    seconds: float
+
+    @property
+    def distance(self) -> int:
+        """Primitives dropped plus primitives added."""
+        return self.dropped + self.added
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What was planned, done and seen, what people did, and how the plan changed.
+
+    Attributes
+    ----------
+    scene : str
+    status : End
+    reasons : tuple of Reason
+        Why not everything that was wanted was reached.
+    planned : Plan
+        As it was before anything happened.
+    done : Plan
+        As it was carried out; a primitive that failed isn't part of it.
+    initial, observed : State
+        The situation in the beginning, and as it was seen in the end.
+    goal : State
+        What was wanted in the end.
+    events : tuple of Event
+        Every primitive that was begun, in order.
+    interventions : tuple of (Intervention, float)
+        Those that happened, with the time.
+    replans : tuple of Replan
+    failures : tuple of Failure
+        Experience for the memory.
+    """
+
+    scene: str
+    status: End
+    reasons: tuple[Reason, ...]
+    planned: Plan
+    done: Plan
+    initial: State
+    observed: State
+    goal: State
+    events: tuple[Event, ...] = ()
+    interventions: tuple[tuple[Intervention, float], ...] = ()
+    replans: tuple[Replan, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,370 @@
+"""Repair: what of a plan is still valid is kept, the rest is planned anew.
+
+The steps that are still to be done are replayed on one table from the situation as it is. A step is
+
+dropped     if what it is for holds already, or isn't wanted any more
+kept        if its primitives still do what they should; else refined anew (by another hand, for instance)
+put off     if it can't be done yet; then so is what concerns the same individuals
+
+What was put off is tried again as long as anything else succeeds. The goals that are open in the end are left to the fast
+planner, on the same table. A hand that stands in the middle of something first finishes it, or is brought to rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
+from time import perf_counter
+
+from planner.fast import EASY, Call, Compiled, compiled
+from planner.fast import plan as fast_plan
+from planner.lifted import Done
+from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
+from planner.proofs import contested, unattainable
+from planner.segments import Effort, LimitError
+from planner.table import Cell, arguments_of, key_of
+from reasoner.symbols import FALSE, Problem, State, Symbol
+
+RESTING = Effort(depth=6, expansions=400)
+CLOSE = 1.1
+"""A repair within this factor of the least that its goals can cost is taken without comparing it with replanning."""
+
+Planner = Callable[[Problem], Outcome]
+
+
+@dataclass(frozen=True)
+class Mended:
+    """What is to be done from now on, and how it came about. `steps` is None if nothing was found."""
+
+    kind: str
+    steps: tuple[Step, ...] | None
+    cost: float
+    seconds: float
+    outcome: Outcome | None = None
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What repair found: the steps, their cost, and the `least` that any plan for the open goals costs."""
+
+    steps: tuple[Step, ...]
+    cost: float
+    least: float
+
+
+def mend(
+    problem: Problem,
+    rest: Sequence[Step],
+    planned: Problem,
+    planner: Planner | None = None,
+    using: Compiled | None = None,
+    in_progress: bool = True,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+) -> Mended:
+    """Return what to do from a situation that isn't the one that a plan was made for.
+
+    Parameters
+    ----------
+    problem : Problem
+        The situation as it is, and the goal as it is now.
+    rest : sequence of Step
+        What was to be done from here on; the first step may be partly done, with only its open sub-steps below it.
+    planned : Problem
+        What `rest` was planned for: the situation that was expected here, and the goal.
+    planner : callable, optional
+        Plans from scratch, from a situation of rest; the fast planner if left out.
+    using : Compiled, optional
+        From `planner.fast.compiled`, for the same domain, individuals and static facts.
+    in_progress : bool
+        Whether the first step of `rest` may be finished as it was planned.
+    limits : Limits
+    """
+    begin = perf_counter()
+    using = using or compiled(problem)
+    repaired = repair(problem, rest, planned, using, in_progress, limits)
+    if repaired is not None and repaired.cost <= CLOSE * repaired.least:
+        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
+    anew, outcome = replan(problem, planner, using, limits)
+    if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
+        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
+    return Mended("replan", anew, cost(problem, anew or ()), perf_counter() - begin, outcome)
+
+
+def repair(
+    problem: Problem, rest: Sequence[Step], planned: Problem, using: Compiled, in_progress: bool, limits: Limits
+) -> Repaired | None:
+    """Return what is to be done with as much of `rest` as is still valid, or None if that wasn't found.
+
+    The least counts what was planned and isn't touched by the changes, what was in progress, and for each goal that is open the
+    step that achieves it.
+    """
+    wanted = planned.goal
+    touched = changed_individuals(planned, problem)
+    call = _call(problem, using, limits)
+    pending = list(rest)
+    try:
+        if not _at_rest(call):
+            if in_progress:
+                _finish(call, pending, wanted)
+            else:
+                del pending[:1]
+            settle(call)
+        begun = len(call.steps) if rest and touched.isdisjoint(rest[0].arguments) else 0
+        settled = len(call.steps)
+        _replay(call, pending, wanted)
+        kept = range(settled, len(call.steps))
+        settle(call)
+        solved = not unattainable(call.segments) and call.serialise()
+    except LimitError:
+        solved = False
+    if not solved:
+        return None
+    costs = [_cost(call, done) for done in call.steps]
+    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
+    return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed | _last_steps(call)))
+
+
+def changed_individuals(planned: Problem, now: Problem) -> set[str]:
+    """Return the individuals that are named by what differs between two situations and their goals."""
+    touched: set[str] = set()
+    for old, new in ((planned.initial, now.initial), (planned.goal, now.goal)):
+        for symbol in old.keys() | new.keys():
+            was, is_ = old.get(symbol, FALSE), new.get(symbol, FALSE)
+            if was != is_:
+                touched.update((*symbol.arguments, was, is_))
+    return touched
+
+
+def replan(
+    problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
+) -> tuple[tuple[Step, ...] | None, Outcome]:
+    """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
+    begin = perf_counter()
+    call = _call(problem, using, limits)
+    impossible = unattainable(call.segments) or contested(call.segments)
+    if impossible:
+        return None, Outcome(Status.UNSOLVABLE, None, impossible, seconds=perf_counter() - begin)
+    try:
+        settle(call)
+        solved = planner is None and call.serialise()
+    except LimitError:
+        solved = False
+    first = call.tree().steps
+    if solved:
+        counts = call.segments.counts
+        return first, Outcome(Status.SOLVED, Plan(first), None, counts, call.fallbacks, perf_counter() - begin)
+    at_rest = replace(problem, initial=call.table.state()) if planner is not None else problem
+    outcome = planner(at_rest) if planner is not None else fast_plan(problem, limits=limits, using=using)
+    if outcome.plan is None:
+        return None, outcome
+    return renumbered((*(first if planner is not None else ()), *outcome.plan.steps)), outcome
+
+
+def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
+    """Return the goals that can't hold because what they are about isn't there any more, and why."""
+    return [
+        (
+            symbol,
+            Reason(f"{symbol} = {value} is wanted, but {symbol.arguments[0]} isn't there", (*symbol.arguments, value)),
+        )
+        for symbol, value in problem.goal.items()
+        if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean
+    ]
+
+
+def settle(call: Call) -> bool:
+    """Bring everything that the upper levels don't know of to rest, the lowest level first; whether that succeeded.
+
+    What a hand holds goes where it is wanted if that takes no longer, else to any place.
+    """
+    levels, domain = call.program.levels, call.problem.domain
+    for level in reversed(levels[1:]):
+        targets = {
+            (name, key): situation.rest
+            for name, situation in domain.situations.items()
+            if situation.level == level and situation.rest is not None
+            for key, value in call.table.now[name].items()
+            if value != situation.rest
+        }
+        if not targets:
+            continue
+        hidden = {
+            (name, key): call.goal[name, key]
+            for name, cells in call.table.now.items()
+            for key, value in cells.items()
+            if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
+        }
+        found = (call.segments.find(level, {**targets, **hidden}, {}, RESTING) if hidden else None) or (
+            call.segments.find(level, targets, {}, RESTING)
+        )
+        for name, arguments in found or ():
+            done = call.refiner.do(level, name, arguments)
+            if done is None:
+                return False
+            call.steps.append(done)
+    return _at_rest(call)
+
+
+def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
+    """Return how many primitives of the old steps are dropped, and how many of the new ones are added.
+
+    What is done in another order is dropped at one place and added at the other: the two sequences are compared.
+    """
+    before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
+    same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
+    return len(before) - same, len(after) - same
+
+
+def cost(problem: Problem, steps: Iterable[Step]) -> float:
+    """Return what the primitives of some steps cost."""
+    behaviors = problem.domain.behaviors
+    return sum(behaviors[step.behavior].cost for step in Plan(tuple(steps)).primitives)
+
+
+def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
+    """Return steps with their paths counted from `first` on."""
+    return tuple(
+        replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
+        for i, step in enumerate(steps, first)
+    )
+
+
+# -------------------------------------------------------------------------------------------------------------- replaying
+
+
+def _finish(call: Call, pending: list[Step], wanted: State) -> None:
+    """Do the open steps of what is in progress, up to a situation of rest, and take them from `pending`.
+
+    If they don't lead to one, or to what isn't wanted any more, nothing is done, and the first of them is given up.
+    """
+    mark = len(call.table.trail)
+    for count, step in enumerate(pending, 1):
+        done = _redo(call, step, begun=count == 1)
+        if done is None:
+            break
+        call.steps.append(done)
+        if _at_rest(call):
+            if _useless(call, call.table.since(mark), wanted):
+                break  # nor is it to be finished if it changes nothing that the upper levels know of
+            del pending[:count]
+            return
+    call.table.undo(mark)
+    call.steps.clear()
+    del pending[:1]
+
+
+def _replay(call: Call, pending: list[Step], wanted: State) -> None:
+    """Do as many of the pending steps as can be done, in their order where that is possible."""
+    progress = True
+    while progress and pending:
+        progress, put_off, waiting = False, list[Step](), set[str]()
+        for step in pending:
+            call.segments.check_time()
+            if not waiting.isdisjoint(step.arguments):
+                put_off.append(step)
+                continue
+            effects = _effects(call, step.behavior, step.arguments, step.bindings)
+            if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
+                continue
+            if _useless(call, effects, wanted):
+                _achieve_instead(call, effects)
+                continue
+            done = _redo(call, step) or call.refiner.do(step.level, step.behavior, step.arguments)
+            if done is None:
+                put_off.append(step)
+                waiting.update(individual for _, key in effects for individual in arguments_of(key))
+            else:
+                call.steps.append(done)
+                progress = True
+        pending[:] = put_off
+
+
+def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
+    """Do a step by the very primitives that it has, or return None with the table as it was.
+
+    Of a step that was `begun` before, only what is below it counts; any other must be applicable, and do what it promises.
+    """
+    mark = len(call.table.trail)
+    applicable = call.segments.forward[step.behavior](*step.arguments)
+    if applicable is None and not (begun and step.steps):
+        return None
+    if not step.steps:
+        assert applicable is not None
+        call.refiner.apply(applicable[1])
+        return step.level, step.behavior, step.arguments, applicable[0], ()
+    below = []
+    for position, child in enumerate(step.steps):
+        done = _redo(call, child, begun and position == 0)
+        if done is None:
+            call.table.undo(mark)
+            return None
+        below.append(done)
+    now = call.table.now
+    if not begun and applicable is not None and any(now[s].get(k, FALSE) != value for s, k, value in applicable[1]):
+        call.table.undo(mark)
+        return None
+    names = call.program.variables[step.behavior]
+    bindings = applicable[0] if applicable and not begun else tuple(step.bindings.get(name, "") for name in names)
+    return step.level, step.behavior, step.arguments, bindings, tuple(below)
+
+
+def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
+    """Where another value is wanted now than the one that a step gives, give that, if one step does it."""
+    for cell in effects:
+        if cell in call.goal and not call.met(cell):
+            call.achieve(call.program.levels[0], cell, EASY)
+
+
+def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
+    """Whether all that is changed, as far as the first level knows of it, was wanted once and isn't any more."""
+    situations, first = call.problem.domain.situations, call.program.levels[0]
+    return all(
+        call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value
+        for (name, key), value in effects.items()
+        if situations[name].level <= first
+    )
+
+
+def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapping[str, str]) -> dict[Cell, str]:
+    """Return the values that a step gives to symbols, whether it is applicable or not."""
+    lifted = call.problem.domain.behaviors[behavior]
+    env = {p.name: argument for p, argument in zip(lifted.parameters, arguments, strict=True)}
+    env |= {f"?{name}": value for name, value in bindings.items()}
+    return {
+        (effect.situation, key_of(tuple(env.get(a, a) for a in effect.arguments))): env.get(effect.value, effect.value)
+        for effect in lifted.effects
+        if not effect.when
+    }
+
+
+def _at_rest(call: Call) -> bool:
+    """Whether everything that the uppermost level doesn't know of rests."""
+    return all(
+        value == situation.rest
+        for name, situation in call.problem.domain.situations.items()
+        if situation.level > call.program.levels[0] and situation.rest is not None
+        for value in call.table.now[name].values()
+    )
+
+
+def _cost(call: Call, done: Done) -> float:
+    """Return what the primitives of a step cost."""
+    below = done[4]
+    return sum([_cost(call, child) for child in below]) if below else call.problem.domain.behaviors[done[1]].cost
+
+
+def _last_steps(call: Call) -> set[int]:
+    """Return the positions of the steps that are the last to give a goal that was open its value."""
+    start, variables = call.problem.initial, call.program.variables
+    last: dict[Cell, int] = {}
+    for position, (_, name, arguments, bindings, _) in enumerate(call.steps):
+        for cell in _effects(call, name, arguments, dict(zip(variables[name], bindings, strict=False))):
+            last[cell] = position
+    cells = {(s.situation, key_of(s.arguments)): start.get(s, FALSE) != value for s, value in call.problem.goal.items()}
+    return {position for cell, position in last.items() if cells.get(cell)}
+
+
+def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
+    deadline = None if limits.seconds is None else perf_counter() + limits.seconds
+    return Call(problem, using, deadline, None, limits.expansions)
