@@ -297,10 +297,12 @@ class Reached:
             case RelationCondition(relation, terms, negated):
                 table = self.tables["relation", relation]
                 if all(t in columns for t in terms) and table.arity == len(terms):
-                    return (table.find(np.stack([columns[t] for t in terms], axis=1)) >= 0) != negated
+                    places = table.find(np.stack([columns[t] for t in terms], axis=1))
+                    return np.asarray((places >= 0) != negated)
             case ClassCondition(term, kind, negated):
                 if term in columns:
-                    return (self.tables["class", kind].find(columns[term][:, None]) >= 0) != negated
+                    places = self.tables["class", kind].find(columns[term][:, None])
+                    return np.asarray((places >= 0) != negated)
         used = sorted(variables(condition) & columns.keys())
         combinations, inverse = self.combinations(columns, used, count)
         holds = [self.formulas.condition(condition, dict(zip(used, c, strict=True)), kinds) == () for c in combinations]

@@ -158,7 +158,9 @@ class _Compiler:
         fresh: Iterator[int],
     ) -> Iterator[Condition]:
         """Yield the conjuncts of a group, its own variables renamed."""
-        own = {name: kinds[name] for name in sorted(set().union(*map(variables, group)) - shared)} | dict(witness)
+        own = {name: kinds[name] for name in sorted(set().union(*map(variables, group)) - shared - witness.keys())} | {
+            **witness
+        }
         names = {name: f"?{next(fresh)}{name[1:]}" for name in own}
         kinds |= {names[name]: kind for name, kind in own.items()}
         yield from (ClassCondition(names[name], kind) for name, kind in own.items())

@@ -34,7 +34,6 @@ from reasoner.symbols import (
     Problem,
     RelationCondition,
     State,
-    Symbol,
     ValueCondition,
     ValueEffect,
     Witness,
@@ -149,7 +148,8 @@ class _Export:
         self.find_types()
         for _ in "ab":  # the first time finds which contraries have to be kept up to date
             actions = [action for behavior in self.behaviors for action in self.actions(behavior)]
-        texts, table = [], {}
+        texts: list[str] = []
+        table: dict[str, tuple[str, tuple[int, ...]]] = {}
         for action in actions:
             name = self.name("action", f"{action.behavior.name} {len(table)}", action.behavior.name)
             parameters = [p.name for p in action.behavior.parameters]
@@ -376,8 +376,8 @@ class _Export:
     ) -> Iterator[tuple[tuple[Condition, ...], tuple[ValueEffect, ...], tuple[ValueEffect, ...]]]:
         """Yield the cases of an effect, two of one that may leave a value as it is of which the contrary is kept."""
         asked = set(self.contrary.get(effect.situation, ()))
-        for kind, situation in self.free:
-            asked |= self.sets[self.situations[situation].range] if situation == effect.situation else set()
+        for _, name in self.free:
+            asked |= self.sets[self.situations[name].range] if name == effect.situation else set()
         for conditions, effects, conditional in self.cases(behavior, effect):
             yield conditions, effects, conditional
             situation = self.situations.get(effect.situation)
@@ -439,14 +439,11 @@ class _Export:
                 action.needs.append(self.predicate(situation.name, arguments, old))
         if old == value:
             return
-        asked = self.contrary.get(situation.name, set()) or any(name == situation.name for _, name in self.free)
-        if asked and self.members(action, value) & set(asked if isinstance(asked, set) else self.sets[situation.range]):
-            if (
-                old.startswith("?other")
-                or old.startswith("?old")
-                or self.members(action, old) & self.members(action, value)
-            ):
-                action.needs.append(self.different(old, value, self.members(action, value)))
+        free = any(name == situation.name for _, name in self.free)
+        asked = self.sets[situation.range] if free else frozenset(self.contrary.get(situation.name, ()))
+        news = self.members(action, value)
+        if news & asked and (old.startswith(("?other", "?old")) or self.members(action, old) & news):
+            action.needs.append(self.different(old, value, news))
         action.ends.append(self.predicate(situation.name, arguments, old))
         action.begins.append(self.predicate(situation.name, arguments, value))
         action.begins.append(f"?contrary {situation.name} {' '.join((*arguments, old))}")

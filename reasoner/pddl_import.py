@@ -26,7 +26,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 
 from reasoner.pddl_syntax import Action, Form, Pddl, PddlError, Typed, Word
 from reasoner.symbols import (
@@ -50,6 +50,9 @@ from reasoner.symbols import (
 
 THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
+REACH_GOAL = "reach-goal"
+COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
+"""For a predicate's number of arguments, which one may be the object and which one the value."""
 MOST_COSTS = 200  # of one action
 WORLD, THE_WORLD = "World", "the_world"
 """The class, and its only individual, that a predicate without arguments is about."""
@@ -87,7 +90,20 @@ class Place:
     value: str = TRUE
 
 
-def problem_of(pddl: Pddl, scene: str | None = None) -> Problem:
+@dataclass(frozen=True)
+class Imported:
+    """A problem, and what its names were in PDDL: a behaviour's action, an individual's object, and so on."""
+
+    problem: Problem
+    said: Mapping[str, str]
+
+    def line(self, behavior: str, arguments: Sequence[str]) -> str:
+        """Return a step as plans are written in PDDL; nothing for the step that only says that the goal is reached."""
+        action = self.said.get(behavior, behavior)
+        return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
+
+
+def imported(pddl: Pddl, scene: str | None = None) -> Imported:
     """Return the planning problem that a PDDL domain and problem describe.
 
     Parameters
@@ -99,9 +115,11 @@ def problem_of(pddl: Pddl, scene: str | None = None) -> Problem:
     Raises
     ------
     PddlError
-        An action's cost takes too many different values, or none for some objects.
+        An action's cost takes too many different values, or adds up several functions.
     """
-    return _Import(pddl, scene or pddl.problem).problem()
+    table = _Import(pddl, scene or pddl.problem)
+    problem = table.problem()
+    return Imported(problem, {ours: theirs.split(" = ")[0] for (_, theirs), ours in table.names.items()})
 
 
 @dataclass
@@ -146,8 +164,12 @@ class _Import:
             self.kind(kind)
         for thing in pddl.objects:
             self.name("object", thing)
-        classes = {self.kind(kind): tuple(self.name("object", o) for o in pddl.of_type(kind)) for kind in pddl.types}
-        parents = {self.kind(kind): (self.kind(above),) for kind, above in pddl.types.items() if above}
+        classes: dict[str, tuple[str, ...]] = {
+            self.kind(kind): tuple(self.name("object", o) for o in pddl.of_type(kind)) for kind in pddl.types
+        }
+        parents: dict[str, tuple[str, ...]] = {
+            self.kind(kind): (self.kind(above),) for kind, above in pddl.types.items() if above
+        }
         relations: dict[str, frozenset[tuple[str, ...]]] = {}
         for predicate, signature in pddl.predicates.items():
             if predicate in self.changing or not signature:
@@ -249,23 +271,21 @@ class _Import:
             return found, None
         name = self.name("situation", "goal reached", "GOAL_REACHED")
         situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
-        action, variables = Action("reach-goal", (), self.pddl.goal, None, Word("", 0, 0)), _Variables(self)
+        action, variables = Action(REACH_GOAL, (), self.pddl.goal, None, Word("", 0, 0)), _Variables(self)
         conditions = tuple(c for part in parts for c in variables.condition(part, {}))
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
-        reach = Behavior(
-            self.name("action", action.name, "REACH_GOAL"), 1, (), variables.own(), conditions, (effect,), 0.0
-        )
+        reach = Behavior(self.name("action", action.name, "REACH_GOAL"), 1, (), (), conditions, (effect,), 0.0)
         return {Symbol(name, (THE_WORLD,)): TRUE}, reach
 
     # --------------------------------------------------------------------------------------------- invariants
 
     def invariants(self) -> list[tuple[Part, ...]]:
         """Return disjoint invariants: tuples of parts, of which at most one fact holds for an object."""
-        candidates = [
+        candidates: list[tuple[Part, ...]] = [
             (Part(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
             if predicate in self.changing
-            for key, counted in {1: [(0, None)], 2: [(0, 1), (1, 0)]}.get(len(signature), [])
+            for key, counted in COUNTED.get(len(signature), ())
         ]
         proved: list[tuple[Part, ...]] = []
         seen = set(candidates)
@@ -431,9 +451,7 @@ class _Import:
         conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form, types))
         conditions = tuple(dict.fromkeys(conditions))
         effects = self.value_effects(name, variables, types, conditions)
-        behavior = Behavior(
-            self.name("action", name, name.upper()), 1, parameters, variables.own(), conditions, effects
-        )
+        behavior = Behavior(self.name("action", name, name.upper()), 1, parameters, (), conditions, effects)
         constant, functions = 0.0, []
         for amount in _increases(action.effect):
             if isinstance(amount, Word):
@@ -472,18 +490,14 @@ class _Import:
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
         effects = self.effects[name]
-        for effect in effects:
+        for effect, named in ((e, n) for e in effects for n in self.instances(e)):
             inner = {**types, **{v.name: v.type for v in effect.variables}}
-            named = variables.renamed(effect.variables)
             when = tuple(
                 c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, inner, named)
             )
             at = self.atom(effect.atom)
-            at = replace(
-                at, arguments=tuple(named.get(a, a) for a in at.arguments), value=named.get(at.value, at.value)
-            )
-            kinds = tuple(ClassCondition(named[self.term(v.name)], self.kind(v.type)) for v in effect.variables)
-            when = (*kinds, *when)
+            put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
+            at = replace(at, arguments=put[:-1], value=put[-1])
             place = self.places[effect.atom[0]]
             if effect.true:
                 begins.append(ValueEffect(at.situation, at.arguments, at.value, when))
@@ -494,6 +508,12 @@ class _Import:
                 none = self.names["value", place.situation]
                 ends.append(ValueEffect(at.situation, at.arguments, none, when if known else (*when, at)))
         return tuple(dict.fromkeys((*ends, *begins)))
+
+    def instances(self, effect: Effect) -> Iterator[dict[str, str]]:
+        """Yield each way to put individuals in for the variables that an effect is quantified over."""
+        names = [self.term(v.name) for v in effect.variables]
+        things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
+        yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
         """Return whether another effect gives the same symbol a new value whenever this one ends its value."""
@@ -512,13 +532,10 @@ class _Variables:
     table: _Import
     kinds: dict[str, str] = field(default_factory=dict)
 
-    def own(self) -> tuple[Parameter, ...]:
-        return tuple(Parameter(name, kind) for name, kind in self.kinds.items() if not name.startswith("?w_"))
-
-    def renamed(self, typed: Sequence[Typed], prefix: str = "?v_") -> dict[str, str]:
+    def renamed(self, typed: Sequence[Typed]) -> dict[str, str]:
         found = {}
         for one in typed:
-            name = f"{prefix}{self.table.term(one.name)[1:]}"
+            name = f"?w_{self.table.term(one.name)[1:]}"
             while name in self.kinds:
                 name += "_"
             self.kinds[name] = self.table.kind(one.type)
@@ -545,7 +562,7 @@ class _Variables:
             yield AnyOf(tuple(groups), negated)
         elif head in ("exists", "forall"):
             typed = _typed(form.items[1])  # type: ignore[arg-type]
-            inner = dict(named) | self.renamed(typed, "?w_")
+            inner = dict(named) | self.renamed(typed)
             flip = head == "forall"
             conditions = tuple(
                 self.condition(rest[1], {**types, **{t.name: t.type for t in typed}}, inner, negated=flip)
@@ -569,7 +586,7 @@ class _Variables:
             return tuple(named.get(t, t) for t in terms)
 
         if atom[0] == "=":
-            yield EqualityCondition(*put([table.term(t) for t in atom[1:]]), negated)
+            yield EqualityCondition(put([table.term(atom[1])])[0], put([table.term(atom[2])])[0], negated)
         elif atom[0] in table.places:
             at = table.atom(atom)
             found = ValueCondition(at.situation, put(at.arguments), put([at.value])[0], negated)
@@ -582,7 +599,8 @@ class _Variables:
             if wider and negated:
                 yield AnyOf(((replace(found, negated=False), *wider),), True)
             else:
-                yield from (found, *wider)
+                yield found
+                yield from wider
         elif len(atom) == 2:
             yield ClassCondition(put([table.term(atom[1])])[0], table.names["static", atom[0]], negated)
         else:
@@ -592,7 +610,9 @@ class _Variables:
 
 def _typed(form: Form) -> list[Typed]:
     """Return the variables of a quantifier, which have been checked before."""
-    found, waiting, items = [], [], [w for w in form.items if isinstance(w, Word)]
+    found: list[Typed] = []
+    waiting: list[Word] = []
+    items = [w for w in form.items if isinstance(w, Word)]
     position = 0
     while position < len(items):
         if items[position].text == "-":

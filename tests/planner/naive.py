@@ -67,7 +67,10 @@ def bindings(problem: Problem, names: set[str], kinds: Terms, terms: Terms) -> I
 
 
 def holds(problem: Problem, state: Facts, condition: Condition, terms: Terms, kinds: Terms) -> bool:
-    get = lambda name: terms.get(name, name)  # noqa: E731
+
+    def get(name: str) -> str:
+        return terms.get(name, name)
+
     match condition:
         case ValueCondition(situation, arguments, value, negated):
             symbol = Symbol(situation, tuple(map(get, arguments)))

@@ -1,0 +1,238 @@
+"""The field's own problems: coverage, time and length beside pyperplan and Fast Downward; grounding beside its translator.
+
+    python -m benchmarks pddl                        with problems in ../shared/pddl
+    CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
+    CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
+
+Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and ``…/pNN.pddl``, the problems
+beside the domain or one folder below it.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+import venv
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+SECONDS, BYTES = 30, 4 * 2**30
+ROOT = Path(__file__).resolve().parents[1]
+PER_FOLDER = 4
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of one problem: `plan` is None where there is none."""
+
+    plan: tuple[str, ...] | None
+    seconds: float
+    output: str
+
+
+def main() -> None:
+    """Print the tables."""
+    folder = Path(os.environ.get("CONFAB_PDDL", ROOT.parent / "shared" / "pddl"))
+    found = list(problems(folder))
+    if not found:
+        print(f"no problems in {folder}; name a folder with CONFAB_PDDL")
+        return
+    python = peers()
+    coverage(found, {name: command for name, command in planners(python).items() if name in wanted()})
+    if "grounding" in wanted():
+        grounding(found, python)
+
+
+def wanted() -> list[str]:
+    """Return the planners to run: all, or those that CONFAB_PLANNERS names."""
+    named = os.environ.get("CONFAB_PLANNERS")
+    return named.split(",") if named else ["confab", "confab-fast", "pyperplan", "lama-first", "grounding"]
+
+
+def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
+    """Yield (domain's name, domain, problem): four per folder, evenly spread, the first and the last included."""
+    for domain in sorted(folder.rglob("domain.pddl")):
+        for place in [domain.parent, *sorted(p for p in domain.parent.iterdir() if p.name.startswith("testing"))]:
+            here = sorted(place.glob("p*.pddl"))
+            chosen = {i * (len(here) - 1) // (PER_FOLDER - 1) for i in range(PER_FOLDER)} if here else set()
+            for i in sorted(chosen):
+                yield str(place.relative_to(folder)), domain, here[i]
+
+
+def peers() -> str:
+    """Return a Python that has the peers, made under ``confab-out`` the first time."""
+    if "CONFAB_PEERS" in os.environ:
+        return os.environ["CONFAB_PEERS"]
+    place = ROOT / "confab-out" / "peers"
+    python = place / "bin" / "python"
+    if not python.exists():
+        venv.create(place, with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "-q", "pyperplan", "up-fast-downward"], check=True)
+    return str(python)
+
+
+def planners(python: str) -> dict[str, list[str]]:
+    """Return each planner's command; ``{domain}``, ``{problem}`` and ``{plan}`` are put in."""
+    inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
+    place = subprocess.run([python, "-c", inside], capture_output=True, text=True, check=True).stdout.strip()
+    downward = [python, f"{place}/downward/fast-downward.py"]
+    ours = [sys.executable, "-m", "benchmarks.pddl", "{domain}", "{problem}", "{plan}"]
+    return {
+        "confab": ours,
+        "confab-fast": [*ours, "fast"],
+        "pyperplan": [python, "-m", "pyperplan", "-s", "gbf", "-H", "hff", "{domain}", "{problem}"],
+        "lama-first": [*downward, "--alias", "lama-first", "--plan-file", "{plan}", "{domain}", "{problem}"],
+        "translate": [*downward, "--translate", "--sas-file", "{plan}", "{domain}", "{problem}"],
+    }
+
+
+def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
+    """Run one planner on one problem, within the limits."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "problem.pddl"  # pyperplan writes its plan beside the problem
+        copy.write_text(problem.read_text())
+        plan = Path(folder) / "plan"
+        words = [w.format(domain=domain, problem=copy, plan=plan) for w in command]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        try:
+            done = subprocess.run(
+                words, cwd=ROOT, capture_output=True, text=True, timeout=4 * SECONDS, preexec_fn=_limit, check=False
+            )
+            output = done.stdout + done.stderr
+        except subprocess.TimeoutExpired:
+            output = "timeout"
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        beside = Path(f"{copy}.soln")
+        text = next((p.read_text() for p in (plan, beside) if p.exists()), None)
+        lines = None if text is None else tuple(re.findall(r"^\((.*)\)", text, re.MULTILINE))
+        return Run(lines, seconds, output)
+
+
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+
+
+def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[str]]) -> None:
+    """Print solved problems, CPU time and plan length per domain and planner; check every plan of ours."""
+    runs: dict[tuple[str, Path], Run] = {}
+    rejected = []
+    for _, domain, problem in found:
+        for name, command in commands.items():
+            runs[name, problem] = run(command, domain, problem)
+            plan = runs[name, problem].plan
+            if plan is not None and name.startswith("confab") and not accepted(domain, problem, plan):
+                rejected.append(f"{problem}: {name}")
+    folders = list(dict.fromkeys(place for place, _, _ in found))
+    print("Solved, and CPU seconds over the problems that the planner solved; median length beside lama-first's.\n")
+    print("| problems |", " | ".join(commands), "|")
+    print("|---" * (len(commands) + 1) + "|")
+    for folder in [*folders, "all"]:
+        here = [problem for place, _, problem in found if folder in (place, "all")]
+        cells = []
+        for name in commands:
+            solved = [runs[name, p] for p in here if runs[name, p].plan is not None]
+            seconds = sum(r.seconds for r in solved)
+            cells.append(f"{len(solved)} ({seconds:.1f} s{_ratio(runs, name, here)})")
+        print(f"| {folder}: {len(here)} | {' | '.join(cells)} |", flush=True)
+    print(f"\nPlans of ours that unified-planning's validator rejects: {len(rejected)}", *rejected, sep="\n")
+    for name in commands:
+        missing = [str(p.relative_to(p.parents[2])) for _, _, p in found if runs[name, p].plan is None]
+        print(f"Not solved by {name}:", ", ".join(missing) or "none")
+
+
+def _ratio(runs: dict[tuple[str, Path], Run], name: str, here: Sequence[Path]) -> str:
+    """Return the geometric mean of length over lama-first's, where both have a plan."""
+    pairs = [(runs[name, p].plan, runs["lama-first", p].plan) for p in here if ("lama-first", p) in runs]
+    ratios = [log(len(a) / len(b)) for a, b in pairs if a and b]
+    return f", length × {exp(sum(ratios) / len(ratios)):.2f}" if ratios and name != "lama-first" else ""
+
+
+def accepted(domain: Path, problem: Path, plan: Sequence[str]) -> bool:
+    """Return whether unified-planning's sequential plan validator accepts a plan."""
+    from unified_planning.engines import SequentialPlanValidator
+    from unified_planning.engines.results import ValidationResultStatus
+    from unified_planning.io import PDDLReader
+    from unified_planning.plans import ActionInstance, SequentialPlan
+
+    task = PDDLReader().parse_problem(str(domain), str(problem))
+    steps = []
+    for line in plan:
+        name, *words = line.split()
+        manager = task.environment.expression_manager
+        steps.append(ActionInstance(task.action(name), tuple(manager.ObjectExp(task.object(word)) for word in words)))
+    validator = SequentialPlanValidator()
+    validator.skip_checks = True  # it refuses action costs that it then handles
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        result = validator.validate(task, SequentialPlan(steps))
+    return bool(result.status == ValidationResultStatus.VALID)
+
+
+def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
+    """Print the time to ground, from the text on, beside that of Fast Downward's translator."""
+    from planner.grounding import ground
+    from planner.task import Task
+    from reasoner.pddl_import import imported
+    from reasoner.pddl_syntax import parse_files
+
+    translate = planners(python)["translate"]
+    rows = []
+    for _, domain, problem in found:
+        begin = perf_counter()
+        task = ground(imported(parse_files(domain, problem)).problem)
+        if isinstance(task, Task):
+            rows.append((len(task), perf_counter() - begin, domain, problem))
+    print("\nGrounding, seconds: ours in-process from the text on; the translator's own count ('Done!')\n")
+    print("| problem | operators | ours | translator | ratio |\n|---|---|---|---|---|")
+    ratios = []
+    for operators, seconds, domain, problem in sorted(rows, reverse=True, key=lambda row: row[:2])[:12]:
+        output = run(translate, domain, problem).output
+        match = re.search(r"Done! \[([\d.]+)s CPU", output)
+        theirs = float(match.group(1)) if match else float("nan")
+        ratios.append(theirs / seconds)
+        name = problem.relative_to(problem.parents[2])
+        print(f"| {name} | {operators} | {seconds:.3f} | {theirs:.3f} | {ratios[-1]:.1f} |")
+    print(f"\nmedian ratio {median(ratios):.1f}")
+
+
+def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
+    """Solve one problem with the flat core and write its plan (what a benchmarked process does)."""
+    gc.disable()
+    from planner.flat import search
+    from planner.grounding import ground
+    from planner.plan import Limits, Status
+    from planner.task import Task
+    from reasoner.pddl_import import imported
+    from reasoner.pddl_syntax import parse_files
+
+    scene = imported(parse_files(Path(domain), Path(problem)))
+    task = ground(scene.problem)
+    if not isinstance(task, Task):
+        print(task.text)
+        return
+    kernel = None
+    if fast:
+        from planner.kernel import heuristic
+
+        kernel = heuristic(task)
+    found = search(task, Limits(expansions=10**9), evaluate=kernel)
+    print(found.status, found.counts)
+    if found.status is Status.SOLVED:
+        steps = (scene.line(*task.describe(operator)[:2]) for operator in found.plan)
+        Path(target).write_text("".join(f"({line})\n" for line in steps if line))
+
+
+if __name__ == "__main__":
+    _solve(sys.argv[1], sys.argv[2], sys.argv[3], "fast" in sys.argv[4:])

@@ -1,0 +1,85 @@
+"""What `confab import` and `confab export` do: PDDL files in, a scene out; a level of a scene out as PDDL, its plans in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from planner.plan import Plan, Step
+from reasoner.graph import KnowledgeError
+from reasoner.pddl_export import plan_of, to_pddl
+from reasoner.pddl_import import imported
+from reasoner.pddl_syntax import PddlError, parse_files
+from reasoner.symbols import Problem
+from reasoner.turtle import turtle
+
+
+def import_pddl(domain: Path, problem: Path, out: Path) -> Problem:
+    """Write a PDDL domain and problem as a scene in Turtle.
+
+    Returns
+    -------
+    Problem
+        What the scene says.
+
+    Raises
+    ------
+    KnowledgeError
+        The PDDL can't be used, or the scene can't be written: one line, with file, line and column where there are any.
+    """
+    try:
+        pddl = parse_files(domain, problem)
+        found = imported(pddl, out.stem)
+    except PddlError as error:
+        raise KnowledgeError(str(error)) from error
+    title = f"{pddl.problem} ({pddl.domain})"
+    text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
+    _write(out, text)
+    return found.problem
+
+
+def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:
+    """Write one level of a scene, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such level, or the folder can't be written.
+    """
+    levels = problem.domain.levels
+    if level is not None and level not in levels:
+        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}")
+    exported = to_pddl(problem, level)
+    paths = folder / "domain.pddl", folder / "problem.pddl"
+    for path, text in zip(paths, (exported.domain, exported.problem), strict=True):
+        _write(path, text)
+    return paths
+
+
+def read_pddl_plan(problem: Problem, level: int | None, text: str) -> Plan:
+    """Read a plan that another planner found for the export of a level, as a plan of ours.
+
+    Raises
+    ------
+    KnowledgeError
+        A line is no action of the export.
+    """
+    level = problem.domain.levels[-1] if level is None else level
+    try:
+        found = plan_of(to_pddl(problem, level), text)
+    except ValueError as error:
+        raise KnowledgeError(str(error)) from error
+    steps = (
+        Step((i,), problem.id_of(behavior, arguments), level, behavior, arguments)
+        for i, (behavior, arguments) in enumerate(found)
+    )
+    return Plan(tuple(steps))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f"{path.name}.part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise KnowledgeError(f"{path}: can't be written: {error.strerror or error}") from error

@@ -1,0 +1,287 @@
+"""PDDL both ways: what goes in comes out again, and what can't be used is refused with its place."""
+
+from __future__ import annotations
+
+import os
+import random
+import warnings
+from pathlib import Path
+
+import pytest
+
+from confab.pddl_commands import export_pddl, import_pddl, read_pddl_plan
+from planner.flat import plan_level, search
+from planner.grounding import ground
+from planner.plan import Limits, Status
+from planner.task import Task
+from planner.validation import validate as faults
+from reasoner.graph import KnowledgeError, load
+from reasoner.pddl_export import Exported, plan_of, to_pddl
+from reasoner.pddl_import import Imported, imported
+from reasoner.pddl_syntax import PddlError, parse, parse_files
+from reasoner.reading import read
+from reasoner.symbols import Problem
+from reasoner.turtle import turtle
+from reasoner.validate import validate
+
+TRUCKS = (
+    """(define (domain trucks) (:requirements :strips :typing)
+ (:types place locatable - object truck parcel - locatable)
+ (:predicates (at ?x - locatable ?p - place) (in ?x - parcel ?t - truck) (road ?a ?b - place) (empty ?t - truck))
+ (:action drive :parameters (?t - truck ?a ?b - place)
+  :precondition (and (at ?t ?a) (road ?a ?b)) :effect (and (not (at ?t ?a)) (at ?t ?b)))
+ (:action load :parameters (?x - parcel ?t - truck ?p - place)
+  :precondition (and (at ?t ?p) (at ?x ?p) (empty ?t)) :effect (and (not (at ?x ?p)) (in ?x ?t) (not (empty ?t))))
+ (:action unload :parameters (?x - parcel ?t - truck ?p - place)
+  :precondition (and (at ?t ?p) (in ?x ?t)) :effect (and (at ?x ?p) (not (in ?x ?t)) (empty ?t))))""",
+    """(define (problem two) (:domain trucks) (:objects t - truck x1 x2 - parcel a b c - place)
+ (:init (at t a) (at x1 b) (at x2 c) (road a b) (road b c) (road c b) (road b a) (empty t))
+ (:goal (and (at x1 c) (at x2 a))))""",
+)
+LAMPS = (  # negation, disjunction, quantifiers, conditional effects, equality, constants
+    """(define (domain lamps) (:requirements :adl)
+ (:types lamp room) (:constants hall - room)
+ (:predicates (lit ?l - lamp) (in ?l - lamp ?r - room) (broken ?l - lamp) (here ?r - room) (dark) (linked ?a ?b - lamp))
+ (:action walk :parameters (?from ?to - room)
+  :precondition (and (here ?from) (not (= ?from ?to)) (or (= ?to hall) (= ?from hall)))
+  :effect (and (here ?to) (not (here ?from))))
+ (:action switch :parameters (?l - lamp)
+  :precondition (and (exists (?r - room) (and (here ?r) (in ?l ?r))) (not (broken ?l)))
+  :effect (and (when (lit ?l) (not (lit ?l))) (when (not (lit ?l)) (lit ?l))
+   (forall (?o - lamp) (when (and (linked ?l ?o) (not (broken ?o))) (lit ?o)))))
+ (:action rest :parameters () :precondition (forall (?l - lamp) (imply (in ?l hall) (not (lit ?l)))) :effect (dark))
+ (:action wake :parameters () :precondition (dark) :effect (not (dark))))""",
+    """(define (problem evening) (:domain lamps) (:objects l1 l2 l3 - lamp study - room)
+ (:init (here study) (in l1 hall) (in l2 study) (in l3 hall) (lit l1) (broken l3) (linked l1 l2))
+ (:goal (and (dark) (or (lit l2) (lit l3)) (not (lit l1)))))""",
+)
+TOLLS = (
+    """(define (domain tolls) (:requirements :strips :action-costs)
+ (:predicates (at ?p) (road ?a ?b)) (:functions (total-cost) - number (toll ?a ?b) - number)
+ (:action go :parameters (?a ?b) :precondition (and (at ?a) (road ?a ?b))
+  :effect (and (at ?b) (not (at ?a)) (increase (total-cost) (toll ?a ?b)))))""",
+    """(define (problem trip) (:domain tolls) (:objects a b c)
+ (:init (at a) (road a b) (road b c) (road a c) (= (toll a b) 1) (= (toll b c) 2) (= (toll a c) 9) (= (total-cost) 0))
+ (:goal (at c)) (:metric minimize (total-cost)))""",
+)
+OWN = {"trucks": TRUCKS, "lamps": LAMPS, "tolls": TOLLS}
+GIVEN = Path(os.environ.get("CONFAB_PDDL", Path(__file__).resolve().parents[3] / "shared" / "pddl"))
+"""Problems that others wrote: not part of this repository, tested where they are."""
+
+
+def given_problems() -> list[Path]:
+    return [sorted(d.parent.rglob("p*.pddl"))[0] for d in sorted(GIVEN.rglob("domain.pddl"))]
+
+
+def given(problem: Path) -> Imported:
+    folder = next(f for f in problem.parents if (f / "domain.pddl").is_file())
+    return imported(parse_files(folder / "domain.pddl", problem))
+
+
+def task_of(problem: Problem) -> Task:
+    task = ground(problem)
+    assert isinstance(task, Task)
+    return task
+
+
+def same(first: Problem, second: Problem) -> bool:
+    """Return whether two problems say the same, parents and the classes of the core vocabulary aside."""
+    return (
+        (first.scene, first.domain.behaviors, first.domain.situations, first.goal, first.initial)
+        == (second.scene, second.domain.behaviors, second.domain.situations, second.goal, second.initial)
+        and {k: v for k, v in first.relations.items() if v} == {k: v for k, v in second.relations.items() if v}
+        and {k: second.classes.get(k, ()) for k in first.classes} == dict(first.classes)
+    )
+
+
+def assert_same_behaviour(first: Problem, exported: Exported, second: Imported, steps: int = 60) -> None:
+    """Walk at random through both: in every state the same behaviours are applicable, and the goal holds in both or neither."""
+    one, other = task_of(first), task_of(second.problem)
+
+    def applicable(task: Task, state: int) -> dict[tuple[str, tuple[str, ...]], int]:
+        found = {}
+        for operator in range(len(task)):
+            after = task.applied(state, operator)
+            if after is not None and after != state:
+                name, arguments, _ = task.describe(operator)
+                if task is one:
+                    found[name, arguments] = operator
+                else:
+                    (step,) = plan_of(exported, second.line(name, arguments))
+                    found[step] = operator
+        return found
+
+    choice = random.Random(0)
+    states = one.initial, other.initial
+    for _ in range(steps):
+        assert (states[0] & one.goal == one.goal) == (states[1] & other.goal == other.goal)
+        ours, theirs = applicable(one, states[0]), applicable(other, states[1])
+        assert ours.keys() == theirs.keys()
+        if not ours:
+            return
+        step = choice.choice(sorted(ours, key=str))
+        left, right = one.applied(states[0], ours[step]), other.applied(states[1], theirs[step])
+        assert left is not None and right is not None
+        states = left, right
+
+
+# ------------------------------------------------------------------------------------------------------------- import
+
+
+def test_predicates_that_exclude_each_other_become_one_situation_type() -> None:
+    problem = imported(parse(*TRUCKS)).problem
+    at = problem.domain.situations["AT"]
+    assert not at.boolean and at.arguments == ("Locatable",)
+    assert "IN" not in problem.domain.situations
+    assert {"t", "a", "b", "c", "no_at"} == set(problem.classes["AT"])
+
+
+def test_look_alikes_stay_apart() -> None:
+    domain = """(define (domain lift) (:predicates (boarded ?p) (served ?p) (waiting ?p))
+      (:action board :parameters (?p) :precondition (waiting ?p) :effect (boarded ?p))
+      (:action leave :parameters (?p) :precondition (boarded ?p) :effect (and (not (boarded ?p)) (served ?p))))"""
+    problem = "(define (problem one) (:domain lift) (:objects p) (:init (waiting p)) (:goal (served p)))"
+    situations = imported(parse(domain, problem)).problem.domain.situations
+    assert all(s.boolean for s in situations.values())
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_an_imported_scene_is_valid_and_reads_back_as_the_same_problem(name: str, tmp_path: Path) -> None:
+    (tmp_path / "d.pddl").write_text(OWN[name][0])
+    (tmp_path / "p.pddl").write_text(OWN[name][1])
+    problem = import_pddl(tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "scene.ttl")
+    assert validate([tmp_path / "scene.ttl"]) == []
+    assert same(problem, read(load(tmp_path / "scene.ttl")).problem)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_import_export_import_is_the_same_problem(name: str) -> None:
+    first = imported(parse(*OWN[name])).problem
+    exported = to_pddl(first)
+    assert_same_behaviour(first, exported, imported(parse(exported.domain, exported.problem)))
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_plans_of_imported_problems_are_accepted_by_unified_planning(name: str) -> None:
+    scene = imported(parse(*OWN[name]))
+    task = task_of(scene.problem)
+    found = search(task)
+    assert found.status is Status.SOLVED
+    outcome = plan_level(scene.problem)
+    assert outcome.plan is not None and faults(scene.problem, outcome.plan) == []
+    lines = [scene.line(*task.describe(operator)[:2]) for operator in found.plan]
+    assert accepted(*OWN[name], [line for line in lines if line])
+
+
+def accepted(domain: str, problem: str, plan: list[str]) -> bool:
+    engines = pytest.importorskip("unified_planning.engines")
+    from unified_planning.io import PDDLReader
+    from unified_planning.plans import ActionInstance, SequentialPlan
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its parser's deprecations; and it isn't sure of action costs
+        task = PDDLReader().parse_problem_string(domain, problem)
+        term = task.environment.expression_manager.ObjectExp
+        steps = [
+            ActionInstance(task.action(name), tuple(term(task.object(word)) for word in words))
+            for name, *words in (line.split() for line in plan)
+        ]
+        validator = engines.SequentialPlanValidator()
+        validator.skip_checks = True
+        result = validator.validate(task, SequentialPlan(steps))
+    return bool(result.status.name == "VALID")
+
+
+def test_costs_that_depend_on_objects_are_kept() -> None:
+    problem = imported(parse(*TOLLS)).problem
+    assert {b.name: b.cost for b in problem.domain.behaviors.values()} == {"GO_AT_1": 1, "GO_AT_2": 2, "GO_AT_9": 9}
+
+
+@pytest.mark.parametrize("path", given_problems(), ids=lambda p: str(p.relative_to(GIVEN)))
+def test_given_domains_go_in_and_out(path: Path, tmp_path: Path) -> None:
+    found = given(path)
+    scene = tmp_path / f"{found.problem.scene.rsplit('/', 1)[-1]}.ttl"
+    scene.write_text(turtle(found.problem, "title", "description", found.said))
+    assert validate([scene]) == []
+    assert same(found.problem, read(load(scene)).problem)
+    exported = to_pddl(found.problem)
+    assert_same_behaviour(found.problem, exported, imported(parse(exported.domain, exported.problem)), 20)
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+
+DOMAIN = """(define (domain d)
+ (:types a b)
+ (:predicates (p ?x - a) (q ?x ?y))
+ (:action f :parameters (?x - a)
+  :precondition {}
+  :effect {}))"""
+PROBLEM = "(define (problem e) (:domain d)\n (:objects o - a)\n (:init {})\n (:goal {}))"
+
+
+@pytest.mark.parametrize(
+    ("precondition", "effect", "init", "goal", "message"),
+    [
+        ("(p ?x", "(p ?x)", "", "(p o)", "domain:1:1: this '(' is never closed"),
+        ("(r ?x)", "(p ?x)", "", "(p o)", "domain:5:17: undefined predicate 'r' (known: p, q)"),
+        ("(p ?y)", "(p ?x)", "", "(p o)", "domain:5:20: undefined variable ?y (known: ?x)"),
+        ("(p ?x ?x)", "(p ?x)", "", "(p o)", "domain:5:17: predicate 'p' takes 1 arguments, got 2"),
+        ("(exists (?z - c) (p ?z))", "(p ?x)", "", "(p o)", "domain:5:31: undefined type 'c' (known: a, b, object)"),
+        ("(> (f) 3)", "(p ?x)", "", "(p o)", "domain:5:17: numeric conditions are not supported"),
+        ("(p ?x)", "(assign (f) 3)", "", "(p o)", "domain:6:11: numeric effects are not supported (assign)"),
+        ("(p ?x)", "(p ?x)", "(p u)", "(p o)", "problem:3:12: undefined object 'u'"),
+        ("(p ?x)", "(p ?x)", "(p o o)", "(p o)", "problem:3:9: predicate 'p' takes 1 arguments, got 2"),
+        ("(p ?x)", "(p ?x)", "(at 5 (p o))", "(p o)", "problem:3:9: timed initial literals are not supported"),
+        ("(p ?x)", "(p ?x)", "", "(p o))", "problem:4:16: ')' without '('"),
+    ],
+)  # fmt: skip
+def test_bad_pddl_is_refused_with_its_place(precondition: str, effect: str, init: str, goal: str, message: str) -> None:
+    with pytest.raises(PddlError) as refused:
+        parse(DOMAIN.format(precondition, effect), PROBLEM.format(init, goal))
+    assert str(refused.value).startswith(message)
+    assert "\n" not in str(refused.value)
+
+
+def test_unsupported_features_are_refused_by_name() -> None:
+    domain = "(define (domain d) (:predicates (p))\n (:durative-action f :parameters () :duration (= ?duration 1)))"
+    with pytest.raises(PddlError, match=r"domain:2:2: durative actions are not supported"):
+        parse(domain, "(define (problem e) (:domain d) (:init) (:goal (p)))")
+    with pytest.raises(PddlError, match="derived predicates are not supported"):
+        parse("(define (domain d) (:requirements :derived-predicates))", "")
+
+
+def test_a_hundred_thousand_objects_are_read_in_seconds(tmp_path: Path) -> None:
+    names = " ".join(f"o{i}" for i in range(100_000))
+    pddl = parse(
+        DOMAIN.format("(p ?x)", "(not (p ?x))"),
+        f"(define (problem e) (:domain d) (:objects {names} - a) (:init) (:goal (p o1)))",
+    )
+    assert len(pddl.objects) == 100_000
+    (tmp_path / "huge.pddl").write_bytes(b" " * (33 * 2**20))
+    with pytest.raises(PddlError, match="33 MB, more than the 32 MB allowed"):
+        parse_files(tmp_path / "huge.pddl", tmp_path / "huge.pddl")
+
+
+# -------------------------------------------------------------------------------------------------------------- export
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tmp_path: Path) -> None:
+    problem = read(load("beverage-serving")).problem
+    domain, task = export_pddl(problem, level, tmp_path)
+    exported = to_pddl(problem, level)
+    second = imported(parse(domain.read_text(), task.read_text()))
+    grounded = task_of(second.problem)
+    found = search(grounded, Limits(expansions=20_000))
+    assert found.status is Status.SOLVED
+    lines = "".join(f"({second.line(*grounded.describe(operator)[:2])})\n" for operator in found.plan)
+    plan = read_pddl_plan(problem, level, lines)
+    assert faults(problem, plan) == []
+    assert exported.actions.keys() >= {line.strip("()").split()[0] for line in lines.splitlines()}
+    with pytest.raises(KnowledgeError, match="line 1: no action 'fly'"):
+        read_pddl_plan(problem, level, "(fly left_hand)")
+
+
+def test_an_unknown_level_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(KnowledgeError, match="no level 7; this scene has 1, 2, 3"):
+        export_pddl(read(load("beverage-serving")).problem, 7, tmp_path)
