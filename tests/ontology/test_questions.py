@@ -1,0 +1,70 @@
+"""Competency questions: each was asked in words first, and its answer is known.
+
+A question's file says the question, the scene, its expected rows, and a property without whose triples the answer is another one.
+`python -m tests.ontology.test_questions` prints the rows of each question as such lines.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyoxigraph as ox
+import pytest
+
+import ontology
+from reasoner.graph import KnowledgeGraph, load, text
+from reasoner.inference import infer
+from reasoner.names import local_name
+
+
+@dataclass(frozen=True)
+class Question:
+    name: str
+    words: str
+    scene: str
+    rows: list[str]
+    needs: str
+    query: str
+
+
+def question(path: Path) -> Question:
+    content = path.read_text(encoding="utf-8")
+    head = [line[2:].split(": ", 1) for line in content.splitlines() if line.startswith("# ")]
+    said = dict(pair for pair in head if pair[0] != "Row")
+    rows = [pair[1] for pair in head if pair[0] == "Row"]
+    return Question(path.stem, said["Question"], said["Scene"], rows, said["Fails without"], content)
+
+
+QUESTIONS = [question(path) for path in sorted((ontology.ROOT / "questions").glob("*.rq"))]
+
+
+def scene(name: str) -> KnowledgeGraph:
+    graph = load(name)
+    infer(graph)
+    return graph
+
+
+def answer(graph: KnowledgeGraph, question: Question) -> list[str]:
+    rows = graph.select(question.query)
+    return [" | ".join(local_name(text(t)) if isinstance(t, ox.NamedNode) else text(t) for t in row) for row in rows]
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.name)
+def test_a_question_has_its_known_answer(question: Question) -> None:
+    assert question.words.endswith("?")
+    assert question.rows
+    assert answer(scene(question.scene), question) == question.rows
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.name)
+def test_without_what_it_asks_for_the_answer_is_another_one(question: Question) -> None:
+    graph = scene(question.scene)
+    prefix, name = question.needs.split(":")
+    needed = ox.NamedNode(graph.prefixes[prefix] + name)
+    for quad in list(graph.store.quads_for_pattern(None, needed, None, None)):
+        graph.store.remove(quad)
+    assert answer(graph, question) != question.rows
+
+
+if __name__ == "__main__":
+    for asked in QUESTIONS:
+        print(asked.name, *(f"# Row: {row}" for row in answer(scene(asked.scene), asked)), sep="\n")
