@@ -13,8 +13,12 @@ from time import perf_counter
 
 from planner.behaviors import Applied, Model, Values, ground
 from planner.cogency import PAPER, PaperConstants, cogencies, ranking
+from planner.compiling import Program
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step
+from planner.proofs import contested, unattainable
 from planner.search import Found, Goal, a_star
+from planner.segments import Segments
+from planner.table import Table, key_of
 from reasoner.links import Links
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -65,13 +69,13 @@ def plan(
     levels = problem.domain.levels
     call = _call(problem, levels, links, constants, limits, grounds)
     start, goal = call.model.values(problem.initial), _goal(call.model)
-    steps = solve(call, levels[0], start, goal)
-    proof = None if steps is not None or call.gave_up else impossible(problem, call.deadline)
-    for level in levels[1:]:
-        if steps is not None or proof is not None or call.gave_up:
-            break
-        call.fallbacks += 1
+    proof = impossible(problem)
+    steps = None
+    for level in levels if proof is None else ():
         steps = solve(call, level, start, goal)
+        if steps is not None or call.gave_up:
+            break
+        call.fallbacks += level != levels[-1]
     seconds = perf_counter() - begin
     if steps is not None:
         tree = Plan(tuple(_numbered(steps)))
@@ -121,16 +125,11 @@ def _goal(model: Model) -> Goal:
     return {i: model.problem.goal[symbol] for i, symbol in enumerate(model.symbols) if symbol in model.problem.goal}
 
 
-def impossible(problem: Problem, deadline: float | None) -> Reason | None:
-    """Return a proof that there is no plan, if one is cheap: a wanted fact that not even a relaxed world can bring about."""
-    from planner.grounding import OutOfTimeError, TooLargeError
-    from planner.grounding import ground as reach_relaxed  # NumPy, which a solvable problem doesn't need
-
-    try:
-        reached = reach_relaxed(problem, deadline=deadline)
-    except (OutOfTimeError, TooLargeError):
-        return None
-    return reached if isinstance(reached, Reason) else None
+def impossible(problem: Problem) -> Reason | None:
+    """Return a proof that there is no plan, if one is cheap (`planner.proofs`)."""
+    goal = {(symbol.situation, key_of(symbol.arguments)): value for symbol, value in problem.goal.items()}
+    segments = Segments(Program(problem), Table(problem.domain.situations, problem.initial), goal)
+    return unattainable(segments) or contested(segments)
 
 
 def solve(call: Call, level: int, start: Values, goal: Goal) -> list[Step] | None:
