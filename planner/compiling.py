@@ -194,7 +194,7 @@ class Program:
 
         # Hard: tests on what is bound, and enumeration of what isn't.
         while True:
-            ready = [c for c in waiting if self._static(c, kinds, behavior) and not _terms(c) - hard]
+            ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentioned(c) - hard]
             for condition in ready:
                 waiting.remove(condition)
                 tests.append(self.expression(condition, hard, kinds, behavior.name))
@@ -471,12 +471,22 @@ def _kinds(behavior: Behavior) -> dict[str, str]:
     return {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
 
 
-def _terms(condition: Condition) -> set[str]:
-    """Return the variables of a condition, those that it determines included."""
-    found = needs(condition)
-    if isinstance(condition, ValueCondition) and condition.value.startswith("?"):
-        found = found | {condition.value}
-    return found
+def mentioned(condition: Condition) -> set[str]:
+    """Return all outer variables that occur in a condition, also those that it could determine itself."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            found = {*arguments, value}
+        case RelationCondition(_, arguments):
+            found = set(arguments)
+        case ClassCondition(term):
+            found = {term}
+        case EqualityCondition(left, right):
+            found = {left, right}
+        case Witness(variable, _, conditions):
+            found = set().union(*map(mentioned, conditions)) - {variable}
+        case AnyOf(alternatives):
+            found = set().union(*(mentioned(c) for group in alternatives for c in group))
+    return {term for term in found if term.startswith("?")}
 
 
 _COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.behaviors import needs
+from planner.compiling import mentioned
 from planner.plan import Step
 from reasoner.symbols import (
     FALSE,
@@ -88,7 +89,7 @@ class Space:
 
     problem: Problem
     level: int
-    most_operators: int = 20_000
+    most_operators: int = 5_000
     operators: list[Operator] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -112,6 +113,7 @@ class Space:
         for symbol in sorted(self.values):
             self.shift[symbol], self.width[symbol] = total, max(1, (len(self.values[symbol]) - 1).bit_length())
             total += self.width[symbol]
+        self.bits = total
         if total > 63:
             raise TooLargeError(f"a state takes {total} bits, more than 63")
         for operator in self.operators:
@@ -273,7 +275,8 @@ class Space:
         parts: list[Formula] = []
         waiting = list(waiting)
         while True:
-            ready = [c for c in waiting if not needs(c) - env.keys() and not _binds(c, env)]
+            pending = {c.value for c in waiting if isinstance(c, ValueCondition) and _binds(c, env)}
+            ready = [c for c in waiting if not needs(c) - env.keys() and not mentioned(c) & pending]
             for condition in ready:
                 waiting.remove(condition)
                 part = self.formula(condition, env, kinds)
@@ -298,7 +301,7 @@ class Space:
         size = 1
         for members in choices:
             size *= len(members)
-        if size > 50 * self.most_operators:
+        if size > 20 * self.most_operators:
             raise TooLargeError(f"{behavior.name} has {size} quantifications")
         for arguments in product(*choices):
             for env, parts in self._grounded(
@@ -318,7 +321,11 @@ class Space:
 
 
 def _binds(condition: Condition, env: Mapping[str, str]) -> bool:
-    return isinstance(condition, ValueCondition) and condition.value.startswith("?") and condition.value not in env
+    return isinstance(condition, ValueCondition) and not condition.negated and _is_unbound(condition.value, env)
+
+
+def _is_unbound(term: str, env: Mapping[str, str]) -> bool:
+    return term.startswith("?") and term not in env
 
 
 def _not(formula: Formula, negated: bool = True) -> Formula:

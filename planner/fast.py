@@ -1,52 +1,40 @@
-"""The fast planner: goals one after the other, each by a few relevant steps, each step refined by what refining taught.
+"""The fast planner: proofs first, then goals in series, then every state, then flat search; what is found is shortened.
 
-One table of values is changed in place. A goal is tried in one step first; what stands in its way puts it to sleep until that
-changes. When none is attainable in one step, longer segments are searched, then segments on the level below, then ones that
-may undo goals achieved before. Whatever that can't solve is left to flat search of the lowest level, which is complete.
+Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
+never that there is no plan.
+
+======================  ==============================================  ==============================
+stage                   decides                                         module
+======================  ==============================================  ==============================
+static proofs           that a goal lacks a static fact                 `planner.proofs`
+goals in series         most problems, in time linear in their size     `planner.serialise`
+relaxed reachability    that a goal can't be reached                    `planner.grounding`
+exhaustion              small problems, both ways                       `planner.exhaust`
+flat search             the rest, until a limit comes                   `planner.flat`
+======================  ==============================================  ==============================
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
 from time import perf_counter
 
-from planner.compiling import Program
 from planner.exhaust import Space, TooLargeError
 from planner.flat import plan_level
 from planner.improve import Improver
-from planner.lifted import Done, Refiner, Template
-from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
+from planner.plan import Limits, Outcome, Plan, Reason, Status
 from planner.proofs import contested, unattainable
-from planner.segments import Advice, Effort, Forbidden, LimitError, Segments
-from planner.table import Cell, Table, arguments_of, key_of
-from reasoner.symbols import FALSE, Problem
+from planner.segments import Advice, LimitError
+from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled
+from reasoner.symbols import Problem
 
-EASY = Effort(depth=1, expansions=10)
-SHORT = Effort(depth=3, expansions=150)
-LONG = Effort(depth=4, expansions=200)
-WIDE = Effort(depth=5, expansions=1000, slack=1, breadth=3)
-
+__all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 4
+"""So many shapes of clusters are planned anew by default."""
 STATES_PER_EXPANSION = 10
 """Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
-
-
-@dataclass
-class Compiled:
-    """What can be kept between calls on problems with the same domain, individuals and static facts."""
-
-    program: Program
-    templates: dict[str, list[Template]] = field(default_factory=dict)
-    shapes: dict[object, Template | None] = field(default_factory=dict)
-
-
-def compiled(problem: Problem) -> Compiled:
-    """Compile the behaviours of a problem, for use in any number of calls with other initial states and goals."""
-    return Compiled(Program(problem))
+SMALL = 36
+"""Bits of a state up to which exhaustion comes before flat search."""
 
 
 def plan(
@@ -89,6 +77,8 @@ def plan(
             if improve:
                 call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
             return outcome(Status.SOLVED, call.tree())
+    except UnsolvableError as proof:
+        return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
         return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
     call.fallbacks += 1
@@ -99,199 +89,17 @@ def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tup
     """Decide a problem on its lowest level alone: every state if they are few enough to be counted, else flat search."""
     level = problem.domain.levels[-1]
     try:
-        found = Space(problem, level).search(limits.expansions * STATES_PER_EXPANSION, deadline)
-        if found.steps is not None:
-            return Status.SOLVED, Plan(found.steps), None
-        states = f"all {found.states} states of level {level} that can be reached were looked at"
-        return Status.UNSOLVABLE, None, Reason(f"no state with the goal's facts can be reached; {states}")
+        space = Space(problem, level)
+        if space.bits <= SMALL:
+            found = space.search(limits.expansions * STATES_PER_EXPANSION, deadline)
+            if found.steps is not None:
+                return Status.SOLVED, Plan(found.steps), None
+            states = f"all {found.states} states of level {level} that can be reached were looked at"
+            return Status.UNSOLVABLE, None, Reason(f"no state with the goal's facts can be reached; {states}")
     except TimeoutError:
         return Status.GAVE_UP, None, Reason("stopped at the limit: the time limit")
     except TooLargeError:
-        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-        flat = plan_level(problem, level, limits=Limits(limits.expansions, left))
-        return flat.status, flat.plan, flat.reason
-
-
-class Call:
-    """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
-
-    def __init__(
-        self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None, most: int
-    ) -> None:
-        self.problem = problem
-        self.using = using
-        self.program = using.program
-        self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
-        self.table = Table(problem.domain.situations, problem.initial)
-        self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
-        self.refiner = Refiner(self.segments, using.templates)
-        self.kept: dict[Cell, str] = {}
-        self.steps: list[Done] = []
-        self.fallbacks = 0
-        self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
-        self.moved = False
-        upper, lowest = self.program.levels[:-1] or self.program.levels, self.program.levels[-1:]
-        self.efforts = (
-            *product(upper, (SHORT, LONG)),
-            *product(upper, (WIDE,)),
-            *product(lowest, (SHORT, LONG, WIDE)),
-        )
-
-    def serialise(self) -> bool:
-        """Achieve the goals one after the other; whether all are."""
-        first = self.program.levels[0]
-        active: deque[Cell] = deque()
-        asleep: dict[Cell, None] = {}
-        waiting: dict[Cell, list[Cell]] = {}
-        for cell, value in self.goal.items():
-            if self.met(cell):
-                self.kept[cell] = value
-        before = self.order()
-        active.extend(cell for cell in self.goal if cell not in self.kept)
-
-        def sleep(cell: Cell, until: Sequence[Cell]) -> None:
-            asleep[cell] = None
-            for other in until:
-                waiting.setdefault(other, []).append(cell)
-
-        def wake(mark: int) -> None:
-            for situation, key, _ in self.table.trail[mark:]:
-                for cell in waiting.pop((situation, key), ()):
-                    if cell in asleep:
-                        del asleep[cell]
-                        active.append(cell)
-                        self.failed.pop(cell, None)
-                cell = situation, key
-                if cell in self.kept:
-                    asleep.pop(cell, None)
-                    if not self.met(cell):
-                        del self.kept[cell]
-                        active.append(cell)
-                elif cell in asleep:
-                    del asleep[cell]
-                    active.append(cell)
-
-        while active or asleep:
-            mark = len(self.table.trail)
-            while active:
-                cell = active.popleft()
-                self.segments.check_time()
-                if self.met(cell):
-                    self.kept[cell] = self.goal[cell]
-                    continue
-                unmet = [other for other in before.get(cell, ()) if other not in self.kept]
-                if unmet:
-                    sleep(cell, unmet)
-                elif self.achieve(first, cell, EASY):
-                    wake(mark)
-                    mark = len(self.table.trail)
-                else:
-                    sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
-            if asleep and not self.harder(asleep, before):
-                return False
-            wake(mark)
-        return True
-
-    def harder(self, asleep: dict[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
-        """Achieve one of the sleeping goals by a longer segment, or by one on a lower level."""
-        for level, effort in self.efforts:
-            for cell in asleep:
-                if (level, effort) in self.failed.get(cell, ()) or any(
-                    other not in self.kept for other in before.get(cell, ())
-                ):
-                    continue
-                if self.achieve(level, cell, effort):
-                    self.fallbacks += level != self.program.levels[0]
-                    return True
-                self.failed.setdefault(cell, []).append((level, effort))
-        if self.moved:  # something was done since some of these attempts failed
-            self.failed.clear()
-            self.moved = False
-            return self.harder(asleep, before)
-        return False
-
-    def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
-        """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
-        forbidden: set[Forbidden] = set()
-        mark = len(self.table.trail)
-        while True:
-            search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
-            found = search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
-            if found is None:
-                return False
-            done: list[Done] = []
-            for name, arguments in found:
-                step = self.refiner.do(level, name, arguments)
-                if step is None:
-                    forbidden.add(((name, arguments), frozenset(self.table.since(mark).items())))
-                    break
-                done.append(step)
-            if len(done) == len(found):
-                self.steps.extend(done)
-                self.moved = True
-                self.kept[cell] = self.goal[cell]
-                return True
-            self.table.undo(mark)
-
-    def met(self, cell: Cell) -> bool:
-        """Whether a goal holds now."""
-        return self.table.now[cell[0]].get(cell[1], FALSE) == self.goal[cell]
-
-    def order(self) -> dict[Cell, list[Cell]]:
-        """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""
-        by_individual: dict[str, list[Cell]] = {}
-        for cell in self.goal:
-            if cell not in self.kept:
-                for individual in {*arguments_of(cell[1]), self.goal[cell]}:
-                    by_individual.setdefault(individual, []).append(cell)
-        before: dict[Cell, list[Cell]] = {}
-        known: dict[tuple[str, str, int], bool] = {}
-        for cells in by_individual.values():
-            for cell in cells:
-                for other in cells:
-                    if cell is not other:
-                        pattern = cell[0], other[0], self.program.alike.sort.get(arguments_of(cell[1])[0], -1)
-                        if pattern not in known:
-                            known[pattern] = self.rules_out(other, cell)
-                        if known[pattern]:
-                            before.setdefault(other, []).append(cell)
-        return before
-
-    def rules_out(self, first: Cell, then: Cell) -> bool:
-        """Whether with goal `first` achieved, no behaviour of the first level could achieve goal `then` any more."""
-        level = self.program.levels[0]
-        mark = len(self.table.trail)
-        self.table.put(*first, self.goal[first])
-        try:
-            dead = False
-            for achiever in self.program.achievers.get((level, then[0]), ()):
-                achieve = self.segments.achieve[achiever.behavior, achiever.effect]
-                for _, unmet, env in achieve(*arguments_of(then[1]), self.goal[then]):
-                    if all(self.attainable(level, achiever.soft[number], achiever, env) for number in unmet):
-                        return False
-                    dead = True
-            return dead
-        finally:
-            self.table.undo(mark)
-
-    def attainable(self, level: int, condition: object, achiever: object, env: Mapping[str, str | None]) -> bool:
-        """Whether some behaviour of a level has an effect that could bring an unmet condition about."""
-        for situation, key, values in self.segments.wants.of(achiever, condition, env or {}, level):  # type: ignore[arg-type]
-            for other in self.program.achievers.get((level, situation), ()):
-                for value in values:
-                    achieve = self.segments.achieve[other.behavior, other.effect]
-                    if next(achieve(*arguments_of(key), value), None) is not None:
-                        return True
-        return False
-
-    def tree(self) -> Plan:
-        """Return the steps done as a plan."""
-        id_of, variables = self.program.id_of, self.program.variables
-
-        def step(done: Done, path: tuple[int, ...]) -> Step:
-            level, name, arguments, bindings, below = done
-            bound = dict(zip(variables[name], bindings, strict=True)) if bindings else {}
-            inner = tuple([step(child, (*path, i)) for i, child in enumerate(below)])
-            return Step(path, id_of(name, arguments), level, name, arguments, bound, None, inner)
-
-        return Plan(tuple([step(done, (i,)) for i, done in enumerate(self.steps)]))
+        pass
+    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+    flat = plan_level(problem, level, limits=Limits(limits.expansions, left))
+    return flat.status, flat.plan, flat.reason

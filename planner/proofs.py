@@ -111,12 +111,13 @@ def _missing(
             rows = program.problem.relations.get(condition.relation, frozenset())
             if any(all(b.startswith("?") or b == r for b, r in zip(bound, row, strict=True)) for row in rows):
                 continue
-            names = [f"no {kinds[b]}" if b.startswith("?") else b for b in bound]
-            if any(b.startswith("?") for b in bound):
-                text = " ".join((names[0], condition.relation, *names[1:]))
+            # Said of all individuals of the first argument's class where it is true of all of them.
+            if all(row[1:] != tuple(bound[1:]) for row in rows) and condition.arguments[0] in kinds:
+                names = [f"no {kinds[condition.arguments[0]]}", *bound[1:]]
             else:
-                text = f"not {bound[0]} {condition.relation} {' '.join(bound[1:])}"
-            found.append((text, (condition.relation, *(b for b in bound if not b.startswith("?")))))
+                names = [f"not {bound[0]}", *bound[1:]]
+            text = " ".join((names[0], condition.relation, *names[1:]))
+            found.append((text, (condition.relation, *(b for b in names[1:] if not b.startswith("?")))))
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TypeAlias
 
-from planner.compiling import FEW, Achiever, Program
+from planner.compiling import FEW, Achiever, Program, mentioned
 from planner.table import Cell, Key, Table, arguments_of, key_of, representatives
 from reasoner.symbols import (
     FALSE,
@@ -89,7 +89,7 @@ class Wants:
         """Yield wants for other values of the symbols that determine a condition's variables."""
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
-        for term in sorted(_variables(condition)):
+        for term in sorted(mentioned(condition)):
             if term in achiever.determined:
                 situation, arguments = achiever.determined[term]
                 key = self._key(arguments, env)
@@ -192,21 +192,3 @@ def _fluent(condition: Condition) -> bool:
 
 def _negation(condition: ValueCondition) -> ValueCondition:
     return ValueCondition(condition.situation, condition.arguments, condition.value, not condition.negated)
-
-
-def _variables(condition: Condition) -> set[str]:
-    """Return all variables that occur in a condition."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            found = {*arguments, value}
-        case RelationCondition(_, arguments):
-            found = set(arguments)
-        case ClassCondition(term):
-            found = {term}
-        case EqualityCondition(left, right):
-            found = {left, right}
-        case Witness(variable, _, conditions):
-            found = set().union(*map(_variables, conditions)) - {variable}
-        case AnyOf(alternatives):
-            found = set().union(*(_variables(c) for group in alternatives for c in group))
-    return {term for term in found if term.startswith("?")}
