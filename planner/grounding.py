@@ -206,15 +206,17 @@ class Reached:
         """Yield the schema's rows that use at least one fact of the last round, each combination of facts once."""
         fluent = [i for i, atom in enumerate(schema.atoms) if atom.fluent]
         if not fluent and first:
-            yield from self._join(schema, None, {})
+            yield from self.joined(schema, None, {})
         for position, start in enumerate(fluent):
             key = schema.atoms[start].table
             ranges = {start: (before[key], size[key])}
             ranges |= {i: (0, before[schema.atoms[i].table]) for i in fluent[:position]}
             if all(low < high for low, high in ranges.values()):
-                yield from self._join(schema, start, ranges)
+                yield from self.joined(schema, start, ranges)
 
-    def _join(self, schema: Schema, start: int | None, ranges: Mapping[int, tuple[int, int]]) -> Iterator[Ints]:
+    def joined(
+        self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
+    ) -> Iterator[Ints]:
         """Yield the rows of a schema's terms, at most once, that match every atom inside its range of rows."""
         if self.deadline is not None and perf_counter() > self.deadline:
             raise OutOfTimeError("the time limit came first")
@@ -224,7 +226,7 @@ class Reached:
             i = start if start in waiting else min(waiting, key=lambda i: self._fan_out(schema.atoms[i], columns))
             assert i is not None
             waiting.remove(i)
-            columns, count = self._step(schema.atoms[i], columns, count, ranges.get(i))
+            columns, count = self._step(schema.atoms[i], columns, count, (ranges or {}).get(i))
             ready = [f for f in filters if self._variables(f, schema) <= columns.keys()]
             filters = [f for f in filters if f not in ready]
             for condition in ready:
