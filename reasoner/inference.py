@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.graph import BASE, CORE, KnowledgeError, KnowledgeGraph
+from reasoner.graph import BASE, CORE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import local_name
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
@@ -40,6 +40,10 @@ ASK {
 CHANGING = "SELECT DISTINCT ?property WHERE { ?situation :valueProperty ?property }"
 RELATIONS = "SELECT DISTINCT ?property WHERE { ?property a/rdfs:subClassOf* :Relation }"
 CLASSES = "SELECT DISTINCT ?class WHERE { ?class a owl:Class . FILTER(isIRI(?class)) }"
+PARTS_OF_DEFINITIONS = """
+SELECT DISTINCT ?class ?part WHERE {
+  ?class owl:equivalentClass/owl:intersectionOf/rdf:rest*/rdf:first ?part . FILTER(isIRI(?class) && isIRI(?part))
+}"""
 TYPED_BY_FACTS = """
 SELECT DISTINCT ?individual ?class WHERE {
   ?situation :valueProperty ?property . ?subject ?property ?object .
@@ -82,6 +86,7 @@ def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
             _refuse_merging(graph, subject, value)
         if (predicate in (TYPE.value, SUBCLASS) and value in classes) or predicate in relations:
             found.append((subject, predicate, value))
+    found += [(text(kind), SUBCLASS, text(part)) for kind, part in graph.select(PARTS_OF_DEFINITIONS, GIVEN)]
     new = [triple for triple in found if not _stated(graph, triple) and triple[0] != triple[2]]
     graph.add("inferred", new)
     return len(new)

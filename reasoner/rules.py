@@ -113,7 +113,7 @@ def individuals_not_different(case: Case) -> Iterator[Fault]:
     groups = _all_different(case)
     apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
     members: dict[str, set[str]] = defaultdict(set)
-    for individual, its_class in case.graph.select(MERGEABLE, SCENE):
+    for individual, its_class in case.graph.select(MERGEABLE, ["asserted"]):
         members[text(its_class)].add(text(individual))
     for kind, individuals in sorted(members.items()):
         if len(individuals) < 2 or any(individuals <= group for group in groups):
@@ -238,6 +238,10 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     problem, names = case.reading.problem, case.reading.names
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
+    changed = {effect.situation for behavior in problem.domain.behaviors.values() for effect in behavior.effects}
+    for situation in problem.domain.situations.values():  # what no behaviour changes, somebody else does
+        if situation.name not in changed:
+            there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
     waiting = dict(problem.domain.behaviors)
     while True:
         ready = [b for b in waiting.values() if all(_possible(c, b, problem, there) for c in b.preconditions)]

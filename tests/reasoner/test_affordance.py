@@ -1,0 +1,113 @@
+"""What an object affords depends on the situation, and the graph says so by SPARQL."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from planner.behaviors import Model, ground
+from reasoner.affordance import SITUATION, affordances, applicable_query, write_situation
+from reasoner.graph import KnowledgeGraph, load
+from reasoner.inference import infer
+from reasoner.reading import Reading, read
+from reasoner.symbols import State, Symbol
+from tests.ontology.faults import skeleton
+
+
+@cache
+def scene(name: str | Path) -> tuple[KnowledgeGraph, Reading]:
+    graph = load(name)
+    infer(graph)
+    return graph, read(graph)
+
+
+def afforded(name: str | Path, **changes: str) -> set[tuple[str, ...]]:
+    """Return (object, behaviour, arguments …) in the initial situation with some changes, written ``object__SITUATION=value``."""
+    graph, reading = scene(name)
+    state = dict(reading.problem.initial)
+    for key, value in changes.items():
+        about, situation = key.split("__")
+        state[Symbol(situation, (about,))] = value
+    return {(found.object, found.behavior, *found.arguments) for found in affordances(graph, reading, state)}
+
+
+def test_a_cup_affords_pouring_when_a_drink_is_asked_for() -> None:
+    assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room")
+    assert ("cup1", "POUR", "bottle1", "cup1") in afforded("living-room", anna__WISH="juice")
+    assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room", anna__WISH="tea")
+    assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room", anna__WISH="juice", cup1__CONTENT="juice")
+
+
+def test_the_living_room_cup_goes_to_the_kitchen_unless_a_drink_was_asked_for() -> None:
+    cleared = ("cup1", "CLEAR_AWAY", "cup1", "counter_right")
+    assert cleared in afforded("living-room")
+    assert cleared not in afforded("living-room", anna__WISH="juice")
+    assert cleared not in afforded("living-room", cup1__PLACE="counter_right")
+    assert cleared not in afforded("living-room", bread2__PLACE="counter_right")
+
+
+def test_bread_on_the_floor_does_not_afford_eating() -> None:
+    assert ("bread1", "EAT", "bread1") not in afforded("living-room")
+    assert ("bread2", "EAT", "bread2") in afforded("living-room")
+    assert ("bread1", "EAT", "bread1") in afforded("living-room", bread1__PLACE="counter_right")
+    assert ("bread2", "EAT", "bread2") not in afforded("living-room", bread2__REST_OF_FOOD="eaten")
+
+
+def test_owl_inference_says_which_places_are_in_the_living_room() -> None:
+    graph, reading = scene("living-room")
+    assert reading.problem.classes["LivingRoomPlace"] == ("floor", "table_left", "table_right")
+    graph = load("living-room")
+    assert "LivingRoomPlace" not in read(graph).problem.classes or not read(graph).problem.classes["LivingRoomPlace"]
+
+
+def test_an_affordance_is_object_situation_behaviour_and_effect() -> None:
+    graph, reading = scene("living-room")
+    found = next(a for a in affordances(graph, reading) if a.behavior == "CLEAR_AWAY")
+    assert [str(fact) for fact in found.situation] == ["cup1 CONTENT empty", "cup1 PLACE table_left"]
+    assert [str(fact) for fact in found.effect] == ["cup1 PLACE counter_right"]
+
+
+def states(reading: Reading, level: int) -> list[State]:
+    """Return some states that behaviours of a level lead to."""
+    model = Model(reading.problem)
+    grounds = ground(reading.problem, level)
+    values = [model.values(reading.problem.initial)]
+    for _ in range(4):
+        values += [applied.after for applied in list(model.successors(grounds, values[-1]))[:1]]
+    return [model.state(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("name", "level"), [("beverage-serving", 1), ("beverage-serving", 2), ("beverage-serving", 3), ("living-room", 1)]
+)
+def test_sparql_and_the_planner_agree_on_what_can_be_done(name: str, level: int) -> None:
+    graph, reading = scene(name)
+    model, grounds = Model(reading.problem), ground(reading.problem, level)
+    for state in states(reading, level):
+        write_situation(graph, reading, state)
+        wanted = {(g.behavior, *g.arguments) for g in grounds if model.apply(g, model.values(state)) is not None}
+        found = set()
+        for behavior in reading.problem.domain.at_level(level):
+            for row in graph.select(applicable_query(graph, reading, behavior), ("asserted", "inferred", "reach")):
+                arguments = [reading.names.short(term.value) for term in row[: len(behavior.parameters)] if term]
+                found.add((behavior.name, *arguments))
+        assert found == wanted
+
+
+def test_the_query_can_be_read_and_names_the_graph_it_asks() -> None:
+    graph, reading = scene("beverage-serving")
+    query = applicable_query(graph, reading, reading.problem.domain.behaviors["B2_PICK"])
+    assert f"GRAPH <{SITUATION}>" in query
+    assert "canReach" in query
+
+
+def test_a_class_that_was_added_yesterday_is_quantified_over(tmp_path: Path) -> None:
+    path = skeleton(tmp_path)
+    text = path.read_text()
+    added = (
+        'd:Bowl a owl:Class ; rdfs:subClassOf d:Item ; rdfs:label "bowl"@en . '
+        ':bowl1 a owl:NamedIndividual, d:Bowl ; c:index 3 ; rdfs:label "bowl 1"@en ; d:isAt :sink ; d:cleanliness d:dirty .'
+    )
+    path.write_text(text + added)
+    assert ("bowl1", "B1_WASH", "bowl1") in afforded(path)
+    assert read(load(path)).problem.id_of("B1_WASH", ("bowl1",)) == 11
