@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sim.kinematics import Arm, link_transforms
+from reasoner.embodiment import Fixture
+from sim.kinematics import Arm, link_transforms, turn
 from sim.urdf import Array, Model, Spheres
 
 
@@ -104,6 +105,12 @@ class Mover:
             gaps = np.linalg.norm(centers[:, :, None] - around.centers[own], axis=-1)
             found[owner] = (gaps - radii[:, None] - around.radii[own]).min((1, 2))
         return found
+
+
+def box(fixture: Fixture) -> Solid:
+    """Return a piece of furniture as a solid."""
+    turned = turn(np.array([0.0, 0.0, 1.0]), np.array(fixture.yaw))
+    return Solid(fixture.name, "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
 
 
 def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:

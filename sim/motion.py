@@ -26,6 +26,10 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 JUMP = 0.35
 """Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
 
+YAWS = np.linspace(-np.pi, np.pi, 48, endpoint=False)
+SWIVELS = np.linspace(-1.6, 1.6, 17)
+"""Headings of a hand and swivels of an elbow that are tried at a point."""
+
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
@@ -81,6 +85,28 @@ class Reacher:
 def rotations(poses: Array) -> Array:
     """Return the hand's rotation matrices (n, 3, 3) of poses."""
     return turn(Z, poses[:, 3]) @ turn(X, poses[:, 4])
+
+
+def poses_at(points: Array, yaw: Array, roll: Array | float, swivel: Array) -> Array:
+    """Return poses (n, 6) at points (n, 3), or all at one point (3,)."""
+    columns = [
+        np.broadcast_to(part, yaw.shape) for part in (*np.broadcast_to(points, (len(yaw), 3)).T, yaw, roll, swivel)
+    ]
+    return np.stack(columns, -1)
+
+
+def turned_near(start: Array, goal: Array) -> Array:
+    """Return the goal pose with its yaw, modulo a turn, nearest to the start's."""
+    near = goal.copy()
+    near[3] = start[3] + np.angle(np.exp(1j * (goal[3] - start[3])))
+    return near
+
+
+def beyond(arm: Arm, poses: Array) -> float:
+    """Return by how many metres the nearest of some poses exceeds the arm's length; 0 if only joint limits forbid it."""
+    wrists = poses[:, :3] + (rotations(poses) @ arm.tip_rotation.T) @ (arm.wrist - arm.tip)
+    distance = float(np.linalg.norm(wrists - arm.shoulder, axis=-1).min())
+    return max(distance - arm.upper_length - arm.lower_length, 0.0)
 
 
 def pose_of(arm: Arm, q: Array) -> Array:

@@ -34,6 +34,12 @@ class Verdict:
     measured: Mapping[str, float] = field(default_factory=dict)
     message: str = ""
 
+    def __str__(self) -> str:
+        """Return one line, e.g. ``tracking error: hidden wall (joint_lag_rad 0.084)``."""
+        numbers = ", ".join(f"{name} {value:.3g}" for name, value in self.measured.items())
+        head = "done" if self.ok else f"{self.code}: {', '.join(self.objects) or self.message}"
+        return head + (f" ({numbers})" if numbers else "")
+
     def as_json(self) -> dict[str, Any]:
         """Return it as `confab verify --json` prints it."""
         return {

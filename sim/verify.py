@@ -36,7 +36,7 @@ class Rollout:
     ok: bool
     steps: tuple[StepReport, ...]
     poured: tuple[float, ...]
-    cpu_seconds: float
+    cpu_seconds: float = field(compare=False)
     simulated_seconds: float
     state: State = field(default_factory=dict)
     clock: Clock = field(default_factory=Clock, compare=False)
@@ -108,7 +108,7 @@ def verify(
     prepare : callable, optional
         Called with the world before the first step: plants a fault, say.
     watch : callable, optional
-        Called with the world after every simulation step: a camera, say.
+        Called with the world after every simulation step: a `sim.film.Film`, say.
     progress : callable, optional
         Called with the number of steps done and the step that is done next.
 

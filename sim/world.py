@@ -19,7 +19,7 @@ import pybullet
 from reasoner.embodiment import Embodiment, Fixture, Shape
 from reasoner.symbols import State, Symbol
 from sim.bodies import KINDS, center_height, height_of, inner_radius, outer_radius, outline, packed, vessel_height
-from sim.collision import Solid, Surroundings, column
+from sim.collision import Solid, Surroundings, box, column
 from sim.perception import Draft, perceiver
 from sim.robot import Manipulator, load
 from sim.skills import skill
@@ -31,6 +31,9 @@ RATE = 240.0
 
 SETTLING = 120
 """Steps in which bodies and beads come to rest before anything is done."""
+
+SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
+"""A triangle too small to see: `sim.picture` draws the beads, PyBullet would draw them at great cost."""
 
 LAG = 0.08
 """Radians that a joint may stay behind its command."""
@@ -129,8 +132,9 @@ class World:
     ) -> None:
         self.embodiment, self.symbols = embodiment, [s for s in initial if s.situation in embodiment.perceivers]
         self.rng = np.random.default_rng(seed)
-        self.perturb, self.noise, self.watch = perturb, noise, watch
-        self.steps, self.clock, self.doing = 0, Clock(), ""
+        self.perturb, self.noise = perturb, noise
+        self.watch: Callable[[World], None] | None = None
+        self.steps, self.current, self.clock = 0, -1, Clock()
         self.bodies: dict[str, Thing] = {}
         self.beads: list[Bead] = []
         self.spilled: set[int] = set()
@@ -156,7 +160,7 @@ class World:
             self.hands |= {hand.hand.name: hand for hand in hands}
         self._fill(self._draft(initial), beads)
         self.run(SETTLING)
-        self.steps = 0
+        self.steps, self.watch = 0, watch
 
     def __enter__(self) -> World:
         return self
@@ -226,18 +230,14 @@ class World:
         count = round(kind.serving * self.embodiment.bodies[name].servings * share)
         rotation, base = self.truth(name)
         collision = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=kind.radius, physicsClientId=self.client)
-        visual = pybullet.createVisualShape(
-            pybullet.GEOM_SPHERE,
-            radius=kind.radius,
-            rgbaColor=kind.color,
-            specularColor=[0.3, 0.3, 0.3],
-            physicsClientId=self.client,
+        speck = pybullet.createVisualShape(
+            pybullet.GEOM_MESH, vertices=SPECK, indices=[0, 1, 2], physicsClientId=self.client
         )
         for spot in packed(self.bodies[name].shape, count, kind.radius):
             bead = pybullet.createMultiBody(
                 kind.mass,
                 collision,
-                visual,
+                speck,
                 basePosition=(base + rotation @ spot).tolist(),
                 useMaximalCoordinates=True,
                 physicsClientId=self.client,
@@ -257,7 +257,7 @@ class World:
 
     def run(self, steps: int) -> None:
         """Simulate a number of steps with the motors' targets as they are."""
-        begin = time.process_time()
+        begin, rendering = time.process_time(), self.clock.rendering
         hands = [hand for hand in self.hands.values() if hand.closing]
         for _ in range(steps):
             for hand in hands:
@@ -268,7 +268,7 @@ class World:
                 self.disturb(self)
             if self.watch is not None:
                 self.watch(self)
-        self.clock.stepping += time.process_time() - begin
+        self.clock.stepping += time.process_time() - begin - (self.clock.rendering - rendering)
 
     def follow(self, hand: Manipulator, positions: Array, velocities: Array) -> None:
         """Drive an arm along timed postures; raise `SkillError` if it stays behind its command."""
@@ -376,7 +376,7 @@ class World:
 
     def surroundings(self, mover: str, held: str | None = None) -> Surroundings:
         """Return what a hand must not touch: furniture, bodies as perceived, the robots' trunks and other arms."""
-        solids = [_solid(fixture) for fixture in self.embodiment.fixtures]
+        solids = [box(fixture) for fixture in self.embodiment.fixtures]
         for name, thing in self.bodies.items():
             if name != held:
                 rotation, base = self.sense(name)
@@ -437,18 +437,12 @@ class World:
         roles = dict(zip(use.parameters, step.arguments, strict=True))
         bound = {name.lstrip("?"): value for name, value in step.bindings.items()}
         roles |= {role: bound[name] for name, role in use.variables.items() if name in bound}
-        self.doing = " ".join((step.behavior, *step.arguments))
+        self.current += 1
         try:
             measured = skill(use.skill)(self, roles, use.numbers)
         except SkillError as failure:
             return failure.verdict
         return Verdict(True, measured=measured)
-
-
-def _solid(fixture: Fixture) -> Solid:
-    cos, sin = np.cos(fixture.yaw), np.sin(fixture.yaw)
-    rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return Solid(fixture.name, "box", np.array(fixture.size) / 2, np.array(fixture.position), rotation)
 
 
 def _make_fixture(client: int, fixture: Fixture) -> int:

@@ -1,0 +1,274 @@
+"""A skill at work: the hand, what it holds, how everything stood when it began; choosing poses, moving, and common checks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.motion import (
+    SWIVELS,
+    YAWS,
+    Limits,
+    Reacher,
+    beyond,
+    comfort,
+    connect,
+    line,
+    polyline,
+    poses_at,
+    smooth,
+    timed,
+    turned_near,
+)
+from sim.perception import tilt_of
+from sim.robot import Manipulator
+from sim.urdf import Array
+from sim.verdict import SkillError
+
+if TYPE_CHECKING:
+    from sim.world import World
+
+Numbers = Mapping[str, float]
+
+MARGIN = 0.008
+"""Metres kept off everything."""
+
+CLOSE = 0.002
+"""Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
+
+BATCH, ENOUGH = 24, 6
+"""Candidates checked for collisions at a time, and how many good ones end the search."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Poses (n, 6) that all candidates must allow, and what may be touched there."""
+
+    poses: Array
+    ignored: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One execution of a skill: the world, the hand, what it holds, and bodies' positions and stray beads before it."""
+
+    world: World
+    hand: Manipulator
+    held: str | None
+    before: Mapping[str, Array]
+    stray: int
+
+    @classmethod
+    def begin(cls, world: World, hand: str) -> Attempt:
+        """Return an attempt that begins now."""
+        before = {name: world.truth(name)[1] for name in world.bodies}
+        return cls(world, world.hands[hand], world.held(hand), before, world.stray())
+
+    def released(self) -> Attempt:
+        """Return the attempt with nothing in the hand any more."""
+        return replace(self, held=None)
+
+    def body(self, name: str) -> str:
+        """Return the name of a body, or raise if the world has no such body any more."""
+        if name not in self.world.bodies:
+            raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen")
+        return name
+
+    @contextmanager
+    def planning(self) -> Iterator[None]:
+        """Count the CPU time inside as planning."""
+        begin = time.process_time()
+        try:
+            yield
+        finally:
+            self.world.clock.planning += time.process_time() - begin
+
+    # ------------------------------------------------------------------------------------------------- where to
+
+    def reacher(self, *ignored: str, margin: float = MARGIN) -> Reacher:
+        """Return the arm, with what it holds, among its surroundings less the `ignored` things."""
+        mover = self.hand.mover()
+        if self.held is not None:
+            mover = mover.holding(self.world.load_spheres(self.hand, self.held))
+        around = self.world.surroundings(self.hand.hand.name, self.held).without(*ignored)
+        return Reacher(mover, around, margin)
+
+    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...]) -> list[int]:
+        """Return candidates for which every stage is reachable and free, the most comfortable first.
+
+        Raises
+        ------
+        SkillError
+            There is none: `unreachable` with the missing metres, or `goal in collision` with what is in the way.
+        """
+        with self.planning():
+            reacher = self.reacher()
+            solved = [reacher.solve(stage.poses) for stage in stages]
+            valid = np.all([ok for _, ok in solved], axis=0)
+            if not valid.any():
+                missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
+                raise SkillError("unreachable", objects, beyond_m=missing)
+            cost = self._discomfort(stages[0].poses, [q for q, _ in solved])
+            order = np.argsort(np.where(valid, cost, np.inf), kind="stable")[: int(valid.sum())]
+            return _free(reacher, stages, [q for q, _ in solved], order, objects)
+
+    def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
+        """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""
+        arm, now = self.hand.arm, self.hand.pose
+        ahead = np.arctan2(*(poses[:, :2] - arm.shoulder[:2]).T[::-1])
+        cost: Array = np.sum([comfort(arm, q) for q in postures], axis=0)
+        cost += 0.25 * np.abs(np.angle(np.exp(1j * (poses[:, 3] - ahead)))) + 0.3 * np.abs(poses[:, 5] - now[5])
+        cost += 0.15 * np.abs(np.angle(np.exp(1j * (poses[:, 3] - now[3]))))
+        return cost
+
+    # ------------------------------------------------------------------------------------------------- moving
+
+    @property
+    def limits(self) -> Limits:
+        """How fast the hand moves: gently with something in it."""
+        limits = self.hand.limits
+        return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
+
+    def follow(self, q: Array) -> None:
+        """Drive the arm along sampled postures, from where it is."""
+        with self.planning():
+            q = np.concatenate([self.hand.posture[None], q[1:]])
+            positions, velocities = timed(self.hand.arm, smooth(q), self.limits, self.world.rate)
+        self.world.follow(self.hand, positions, velocities)
+
+    def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str) -> int:
+        """Move to the first goal pose that a free path leads to; return its position in the sequence."""
+        with self.planning():
+            found, reacher = None, self.reacher(*ignored)
+            start = self.hand.pose
+            near = [turned_near(start, goal) for goal in goals]
+            for attempts in (0, 150):
+                for i, goal in enumerate(near):
+                    corners = connect(reacher, start, goal, self.world.rng, attempts)
+                    if corners is not None:
+                        found = i, reacher.solve(polyline(corners))[0]
+                        break
+                if found is not None:
+                    break
+            if found is None:
+                blame = reacher.blame(line(start, near[0]))
+                raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
+        self.follow(found[1])
+        return found[0]
+
+    def straight(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
+        """Move along the straight line to a pose; raise if it isn't free."""
+        with self.planning():
+            poses, reacher = line(self.hand.pose, goal), self.reacher(*ignored, margin=CLOSE)
+            q = reacher.follow(poses)
+            if q is None:
+                blame = reacher.blame(poses)
+                raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)
+        self.follow(q)
+
+    def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
+        """Go up in a line, the elbow turning as it must."""
+        start = self.hand.pose
+        if goal[2] - start[2] < 1e-3:
+            return
+        with self.planning():
+            reacher = self.reacher(*ignored, margin=CLOSE)
+            for turn in sorted(SWIVELS, key=abs):
+                bent = goal.copy()
+                bent[5] = start[5] + turn
+                q = reacher.follow(line(start, bent))
+                if q is not None:
+                    break
+        if q is None:
+            self.go([goal], objects, *ignored)
+        else:
+            self.follow(q)
+
+    # ------------------------------------------------------------------------------------------------- checks
+
+    def check_others(self, numbers: Numbers, *moved: str) -> None:
+        """Raise if something other than the `moved` objects and the held one was disturbed or toppled."""
+        for name, position in self.before.items():
+            if name in moved or name == self.held or name not in self.world.bodies:
+                continue
+            rotation, now = self.world.truth(name)
+            shift = float(np.linalg.norm(now - position))
+            if tilt_of(rotation) > 0.5:
+                raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
+            if shift > numbers["disturbance"]:
+                raise SkillError("object disturbed", (name,), moved_m=shift)
+
+    def check_grip(self, numbers: Numbers) -> dict[str, float]:
+        """Return how far the held object slipped in the hand since it was grasped; raise if too far or if it's lost."""
+        if self.held is None or self.hand.grasp is None:
+            return {}
+        rotation, base = self.world.in_hand(self.hand, self.held)
+        first_rotation, first_base = self.hand.grasp
+        slip = float(np.linalg.norm(base - first_base))
+        turned = float(np.arccos(np.clip((np.trace(first_rotation.T @ rotation) - 1) / 2, -1, 1)))
+        if self.world.held(self.hand.hand.name) != self.held or slip > numbers["slip"]:
+            raise SkillError("slip or drop", (self.held,), slip_m=slip, turned_rad=turned)
+        return {"slip_m": slip, "turned_rad": turned}
+
+    def check_arrival(self, goal: Array, numbers: Numbers) -> dict[str, float]:
+        """Return how far the hand is from a pose (6,) where it should be; raise if too far."""
+        error = float(np.linalg.norm(self.hand.frame()[1] - goal[:3]))
+        if error > numbers["tolerance"]:
+            raise SkillError("tracking error", self.world.touching(self.hand), tip_error_m=error)
+        return {"tip_error_m": error}
+
+
+def _free(
+    reacher: Reacher,
+    stages: Sequence[Stage],
+    postures: Sequence[Array],
+    order: NDArray[np.intp],
+    objects: tuple[str, ...],
+) -> list[int]:
+    """Return the first few candidates, in `order`, that touch nothing at any stage; raise if none does."""
+    chosen: list[int] = []
+    gaps: dict[str, float] = {}
+    for start in range(0, len(order), BATCH):
+        batch = order[start : start + BATCH]
+        free = np.ones(len(batch), dtype=bool)
+        for stage, q in zip(stages, postures, strict=True):
+            for name, gap in reacher.mover.clearances(q[batch], reacher.around.without(*stage.ignored)).items():
+                free &= gap > reacher.margin
+                gaps[name] = max(gaps.get(name, -np.inf), float(gap.max()))
+        chosen += [int(i) for i in batch[free]]
+        if len(chosen) >= ENOUGH:
+            break
+    if not chosen:
+        blocking = sorted(gaps, key=gaps.__getitem__)
+        blocking = [name for name in blocking if gaps[name] <= reacher.margin] or blocking[:1]
+        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=gaps[blocking[0]])
+    return chosen
+
+
+def named(*objects: str) -> tuple[str, ...]:
+    """Return each object once, in order."""
+    return tuple(dict.fromkeys(objects))
+
+
+def fan() -> tuple[Array, Array]:
+    """Return yaws and swivels (n,) of all the ways to be at a point that are considered."""
+    yaw, swivel = np.meshgrid(YAWS, SWIVELS)
+    return yaw.ravel(), swivel.ravel()
+
+
+def grip_stages(grip: Array, numbers: Numbers, ignored: tuple[str, ...] = ()) -> tuple[Stage, Stage, Stage]:
+    """Return the stages of a grasp at point `grip` (3,): around it, before it, and raised above it, for the whole `fan`."""
+    yaw, swivel = fan()
+    heading = np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
+    raised = np.array([0.0, 0.0, numbers["raised"]])
+    return (
+        Stage(poses_at(grip, yaw, 0.0, swivel), ignored),
+        Stage(poses_at(grip - numbers["approach"] * heading, yaw, 0.0, swivel)),
+        Stage(poses_at(grip + raised, yaw, 0.0, swivel), ignored),
+    )

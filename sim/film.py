@@ -1,0 +1,163 @@
+"""A film of a rollout: frames with a caption and a strip of the plan, as MP4 or GIF, and one still per primitive."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import imageio.v2 as imageio
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from sim.picture import Camera, hide_vessels, picture, view_of
+from sim.urdf import Array
+
+if TYPE_CHECKING:
+    from sim.world import Step, World
+
+SIZES = (17, 15, 13, 11)
+"""Font sizes of the caption; the first that fits is used."""
+
+BAR = 46
+"""Pixels at the bottom that hold caption and plan strip."""
+
+DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
+
+
+class Film:
+    """Records a world that it watches: give it to `verify` as `watch`, and close it, or use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.mp4`` or ``.gif``; its folder must exist.
+    steps : sequence of Step
+        The primitives, for the plan strip.
+    titles : mapping of path to text
+        What to write for the steps above the primitives, by their position in the plan's tree.
+    camera : Camera, optional
+        By default one that looks at the table, with pictures of `width` by `height` pixels (divisible by 16).
+    frames : int
+        Frames per second of the film.
+    speed : float
+        How much faster than the simulated time it runs.
+    stills : str or Path, optional
+        Folder for a PNG per primitive, taken at its end.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        steps: Sequence[Step],
+        titles: Mapping[tuple[int, ...], str] | None = None,
+        camera: Camera | None = None,
+        frames: int = 20,
+        speed: float = 2.0,
+        stills: str | Path | None = None,
+        width: int = 960,
+        height: int = 544,
+    ) -> None:
+        self.path, self.steps, self.titles = Path(path), steps, titles or {}
+        self.camera, self.frames, self.speed = camera, frames, speed
+        self.width, self.height = width, height
+        self.stills = None if stills is None else Path(stills)
+        self._writer: Any = None
+        self._number = -1
+        self._latest: Array | None = None
+
+    def __enter__(self) -> Film:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __call__(self, world: World) -> None:
+        """Take a frame if it is time for one."""
+        if world.current != self._number:
+            if self._number < 0:
+                hide_vessels(world)
+            self._keep()
+            self._number = world.current
+        if world.steps % max(1, round(world.rate * self.speed / self.frames)) == 0:
+            self._latest = self.frame(world)
+            self._write(self._latest)
+
+    def frame(self, world: World) -> Array:
+        """Return the picture of now, captioned."""
+        self.camera = self.camera or view_of(world.embodiment, self.width, self.height)
+        begin = time.process_time()
+        image = picture(world, self.camera)
+        world.clock.rendering += time.process_time() - begin
+        return self._caption(image, world.current)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._keep()
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    def _keep(self) -> None:
+        """Keep the latest frame as the still of the primitive that has ended."""
+        if self.stills is None or self._latest is None or not 0 <= self._number < len(self.steps):
+            return
+        self.stills.mkdir(parents=True, exist_ok=True)
+        step = self.steps[self._number]
+        name = "-".join((f"{self._number + 1:02d}", step.behavior, *step.arguments))
+        Image.fromarray(self._latest).save(self.stills / f"{name}.png")
+
+    def _write(self, image: Array) -> None:
+        if self._writer is None:
+            options: dict[str, Any] = {"duration": 1000 / self.frames, "loop": 0}
+            if self.path.suffix != ".gif":
+                options = {"fps": self.frames, "codec": "libx264", "quality": 8, "macro_block_size": 16}
+            self._writer = imageio.get_writer(self.path, **options)
+        self._writer.append_data(image)
+
+    def _caption(self, image: Array, number: int) -> Array:
+        """Write what is done, with the steps above it, and the strip of primitives below the picture."""
+        height, width = image.shape[:2]
+        canvas = Image.fromarray(image)
+        draw = ImageDraw.Draw(canvas)
+        draw.rectangle((0, height - BAR, width, height), fill=(250, 251, 253))
+        if 0 <= number < len(self.steps):
+            step = self.steps[number]
+            above = [self.titles[step.path[:n]] for n in range(1, len(step.path)) if step.path[:n] in self.titles]
+            own = " ".join((str(step.id), step.behavior, *step.arguments))
+            _write_row(draw, [*above, own], width, height - BAR + 7)
+        self._strip(draw, width, height, number)
+        return np.asarray(canvas)
+
+    def _strip(self, draw: ImageDraw.ImageDraw, width: int, height: int, number: int) -> None:
+        """Draw a small bar per primitive, with a gap wherever a step of the top level begins."""
+        tops = [step.path[0] for step in self.steps]
+        gaps = [i for i in range(1, len(tops)) if tops[i] != tops[i - 1]]
+        unit = (width - 28 - 10 * len(gaps)) / max(len(self.steps), 1)
+        x = 14.0
+        for i in range(len(self.steps)):
+            x += 10 if i in gaps else 0
+            color = DONE if i < number else DOING if i == number else TODO
+            draw.rectangle((x, height - 13, x + unit - 2, height - 7), fill=color)
+            x += unit
+
+
+def _write_row(draw: ImageDraw.ImageDraw, texts: Sequence[str], width: int, y: float) -> None:
+    """Write texts side by side, the last one dark, in the largest size that fits."""
+    gap = 26
+    for size in SIZES:
+        font = ImageFont.load_default(size)
+        lengths = [draw.textlength(text, font=font) for text in texts]
+        if sum(lengths) + gap * len(texts) < width:
+            break
+    x = 14.0
+    for text, length in zip(texts, lengths, strict=True):
+        own = text is texts[-1]
+        draw.text((x, y), text, font=font, fill=(30, 36, 46) if own else (120, 130, 145))
+        if not own:
+            draw.text((x + length + 9, y), "›", font=font, fill=(170, 178, 190))
+        x += length + gap

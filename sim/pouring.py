@@ -1,0 +1,240 @@
+"""Pouring: a held vessel is rolled about its lip, which stays over the other vessel, until a serving has flown.
+
+The robot watches the flow, as one who pours does: it turns on slowly while nothing comes, waits while it flows, and takes the
+vessel back when enough has left. What is left behind stays behind the vessel's shoulder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.attempt import CLOSE, Attempt, Numbers, Stage, fan, named
+from sim.bodies import height_of
+from sim.motion import poses_at, rotations
+from sim.perception import tilt_of
+from sim.robot import Manipulator
+from sim.urdf import Array
+from sim.verdict import SkillError
+
+if TYPE_CHECKING:
+    from sim.world import World
+
+SIDES = (1.0, -1.0)
+"""Directions of roll: to the hand's right, to its left."""
+
+LONGEST = 2400
+"""Steps after which turning gives up."""
+
+PATIENCE = 6
+"""Steps between looks at the arm's lag and at the flow."""
+
+
+def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
+    """Carry a vessel over another one, to where it can be tilted with its lip over the other's opening."""
+    source = attempt.held or ""
+    yaw, swivel = (np.tile(part, len(SIDES)) for part in fan())
+    side = np.repeat(SIDES, len(yaw) // len(SIDES))
+    angles = np.linspace(0.0, numbers["pour_angle"], 5)
+    stages = [
+        Stage(_poses(attempt, source, target, yaw, side, swivel, np.full(len(yaw), angle), numbers)) for angle in angles
+    ]
+    chosen = attempt.choose(stages, (target, source))
+    start = stages[0].poses
+    best = attempt.go([start[i] for i in chosen], (target, source))
+    return attempt.check_arrival(start[chosen[best]], numbers)
+
+
+def tilt(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
+    """Pour a serving: roll about the lip until it has left the source, then roll back so far that no more flows."""
+    attempt = Attempt.begin(world, roles["hand"])
+    source, target = roles["source"], attempt.body(roles["target"])
+    if attempt.held != source:
+        raise SkillError("slip or drop", (source,), "it isn't in the hand")
+    filling = _filling(world, source)
+    serving = world.embodiment.fillings[filling].serving if filling is not None else 1
+    servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
+    had, got = world.inside(source), world.inside(target)
+    servo.turn(numbers["hold_back"], numbers["fast"])
+    if world.beads:
+        servo.meter(numbers, lambda: (had - world.inside(source)) / serving)
+    else:
+        servo.turn(numbers["pour_angle"], numbers["fast"])
+    steepest = servo.angle
+    servo.turn(numbers["hold_back"], numbers["fast"])
+    world.run(round(numbers["settle"] * world.rate))
+    measured = {"steepest_rad": steepest, "tilt_rad": tilt_of(attempt.hand.frame()[0])} | attempt.check_grip(numbers)
+    if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
+        raise SkillError("tracking error", world.touching(attempt.hand), **measured)
+    if world.beads:
+        measured["poured"] = (world.inside(target) - got) / serving
+        measured["spilled"] = (world.stray() - attempt.stray) / serving
+        _check_pour(source, target, measured, numbers)
+    elif filling is not None:
+        world.contents[target] = filling
+    attempt.check_others(numbers)
+    return measured
+
+
+def _check_pour(source: str, target: str, measured: Mapping[str, float], numbers: Numbers) -> None:
+    """Raise if too little arrived or too much went beside."""
+    if measured["spilled"] > numbers["most_spilled"]:
+        raise SkillError("spill", (source, target), **measured)
+    if measured["poured"] < numbers["least_poured"]:
+        raise SkillError("under-pour", (source, target), **measured)
+
+
+def stand_upright(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
+    """Roll a tilted hand back about the lip of what it holds."""
+    attempt = Attempt.begin(world, roles["hand"])
+    hand, now = attempt.hand, attempt.hand.pose
+    side, angle = float(np.sign(now[4])), abs(float(now[4]))
+    angles = np.linspace(0.0, angle, 48)
+    poses = np.repeat(now[None], len(angles), axis=0)
+    poses[:, 4] = side * angles
+    if attempt.held is not None:
+        height, lip = _lip(attempt, attempt.held, np.array([side]))
+        tips = rotations(poses) @ lip[0]
+        poses[:, :3] += tips[-1] - tips
+        poses[:, 2] += height * (np.maximum(np.cos(angles), 0) - max(np.cos(angle), 0))
+    servo = _Servo(world, hand, _way(attempt, angles, poses, ()), angle)
+    servo.turn(0.0, numbers["fast"])
+    world.run(2 * PATIENCE)
+    measured = {"tilt_rad": tilt_of(hand.frame()[0])} | attempt.check_grip(numbers)
+    if measured["tilt_rad"] > numbers["upright_angle"]:
+        raise SkillError("tracking error", world.touching(hand), **measured)
+    serving = max((filling.serving for filling in world.embodiment.fillings.values()), default=1)
+    measured["spilled"] = (world.stray() - attempt.stray) / serving
+    if measured["spilled"] > numbers["most_spilled"]:
+        raise SkillError("spill", (attempt.held or hand.hand.name,), **measured)
+    attempt.check_others(numbers)
+    return measured
+
+
+def _filling(world: World, vessel: str) -> str | None:
+    """Return what there is most of in a vessel, or None if it's empty."""
+    amounts = {name: world.amount(vessel, name) for name in world.embodiment.fillings}
+    best = max(amounts, key=amounts.__getitem__, default=None)
+    return best if best is not None and amounts[best] > 0 else None
+
+
+# ----------------------------------------------------------------------------------------------- geometry
+
+
+def _lip(attempt: Attempt, vessel: str, side: Array) -> tuple[float, Array]:
+    """Return a held vessel's height, and for each `side` (n,) its lip (n, 3) in the hand's frame."""
+    shape = attempt.world.bodies[vessel].shape
+    rotation, base = attempt.world.in_hand(attempt.hand, vessel)
+    height, radius = shape.profile[-1] if shape.profile else (height_of(shape), 0.0)
+    return height, base + rotation[:, 2] * height - side[:, None] * np.array([0.0, radius, 0.0])
+
+
+def _poses(
+    attempt: Attempt,
+    source: str,
+    target: str,
+    yaw: Array,
+    side: Array,
+    swivel: Array,
+    angle: Array,
+    numbers: Numbers,
+) -> Array:
+    """Return hand poses (n, 6) that hold the source tilted by `angle` with its lip over the target.
+
+    The lip stays over the target, `clearance` above its rim, and so much higher that the source's base keeps above it as well.
+    """
+    poses = poses_at(np.zeros(3), yaw, side * angle, swivel)
+    height, lip = _lip(attempt, source, side)
+    flow = np.stack([np.sin(yaw) * side, -np.cos(yaw) * side, 0 * yaw], -1)
+    aim = attempt.world.top(target) - numbers["short"] * flow
+    aim[:, 2] += numbers["clearance"] + height * np.maximum(np.cos(angle), 0.0)
+    poses[:, :3] = aim - np.einsum("nij,nj->ni", rotations(poses), lip)
+    return poses
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Postures (n, 7) by tilt angle (n,), ascending."""
+
+    angles: Array
+    q: Array
+
+    def at(self, angle: float) -> Array:
+        """Return the posture at a tilt angle."""
+        return np.array([np.interp(angle, self.angles, joint) for joint in self.q.T])
+
+
+def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
+    """Plan the roll about the lip from where the hand is, to the side to which the hand has brought the lip."""
+    now, angles = attempt.hand.pose, np.linspace(0.0, numbers["pour_angle"], 64)
+    ways = []
+    for side in SIDES:
+        yaw, sides, swivel = (np.full(len(angles), value) for value in (now[3], side, now[5]))
+        poses = _poses(attempt, source, target, yaw, sides, swivel, angles, numbers)
+        ways.append((float(np.linalg.norm(poses[0, :3] - now[:3])), side, poses))
+    return _way(attempt, angles, min(ways, key=lambda way: way[0])[2], (source, target))
+
+
+def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]) -> _Way:
+    """Return the postures of poses by angle; raise if they can't be followed."""
+    with attempt.planning():
+        reacher = attempt.reacher(margin=CLOSE)
+        q = reacher.follow(poses)
+        if q is None:
+            blame = reacher.blame(poses)
+            raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)
+    return _Way(angles, q)
+
+
+# ----------------------------------------------------------------------------------------------- control
+
+
+class _Servo:
+    """Moves a hand along a way by its tilt angle, at a bounded rate and acceleration (radians, seconds)."""
+
+    ACCELERATION = 14.0
+
+    def __init__(self, world: World, hand: Manipulator, way: _Way, angle: float = 0.0) -> None:
+        self.world, self.hand, self.way, self.angle, self.rate = world, hand, way, angle, 0.0
+        self.tick = 1 / world.rate
+
+    def turn(self, goal: float, speed: float) -> None:
+        """Turn to an angle, braking in time."""
+        for step in range(LONGEST):
+            if self.angle == goal:
+                return
+            self._approach(goal, speed)
+            if step % PATIENCE == 0:
+                self.world.check_lag(self.hand)
+        raise SkillError("timeout", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+
+    def meter(self, numbers: Numbers, poured: Callable[[], float]) -> None:
+        """Turn on slowly while nothing flows and wait while it does, until enough is `poured` or patience ends."""
+        before, flowing, still = 0.0, 0, 0
+        for step in range(LONGEST):
+            now = poured() if step % 4 == 3 else before
+            flowing = round(numbers["flow"] / self.tick) if now > before else flowing - 1
+            before, still = now, still + 1 if flowing <= 0 and self.angle == numbers["pour_angle"] else 0
+            if now >= numbers["cut_off"] or still > numbers["wait"] / self.tick:
+                return
+            self._approach(numbers["pour_angle"], numbers["slow"] if flowing <= 0 else 0.0)
+            if step % PATIENCE == 0:
+                self.world.check_lag(self.hand)
+        raise SkillError("timeout", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+
+    def _approach(self, goal: float, speed: float) -> None:
+        """Advance for one step towards an angle, at most at `speed`."""
+        gap, most = goal - self.angle, self.ACCELERATION * self.tick
+        wanted = np.sign(gap) * min(speed, np.sqrt(2 * self.ACCELERATION * abs(gap)))
+        self.rate += float(np.clip(wanted - self.rate, -most, most))
+        advance = self.rate * self.tick
+        if abs(gap) < 1e-4 or (advance * gap > 0 and abs(advance) >= abs(gap)):
+            self.angle, self.rate = goal, 0.0
+        else:
+            self.angle += advance
+        q = self.way.at(float(np.clip(self.angle, self.way.angles[0], self.way.angles[-1])))
+        self.hand.command(q, (q - self.hand.posture) / self.tick)
+        self.world.run(1)

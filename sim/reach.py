@@ -1,0 +1,87 @@
+"""Which places a hand reaches, from geometry alone: URDF, table and shapes, without a physics engine.
+
+A hand reaches a place if, for every height at which the scene's bodies are grasped, some posture takes it there, lets it come
+from before and go up, within all joints' limits and without touching furniture or the robot's own trunk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from reasoner.embodiment import Embodiment, Hand, Place, Robot
+from sim.attempt import MARGIN, Numbers, grip_stages
+from sim.collision import Surroundings, box, fixed_spheres, read_mover
+from sim.kinematics import read_arm
+from sim.motion import Reacher
+from sim.urdf import Model, read_urdf
+
+VERSION = "1"
+"""Counts changes of the method, so that results of an older one aren't taken for current."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Pairs of hand and place, and a hash of everything that they were computed from."""
+
+    pairs: frozenset[tuple[str, str]]
+    inputs: str
+
+
+def reach(embodiment: Embodiment) -> Reach:
+    """Return which places each hand reaches.
+
+    Raises
+    ------
+    ValueError
+        No behaviour uses the skill that reaches, so there are no settings to go by.
+    """
+    settings = [use.numbers for use in embodiment.skills.values() if use.skill == "reach"]
+    if not settings:
+        raise ValueError("no behaviour is carried out by the skill 'reach': what a hand reaches isn't defined")
+    numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
+    heights = sorted({body.shape.grasp_height for body in embodiment.bodies.values()}) or [settings[0]["empty_height"]]
+    pairs = set()
+    for robot in embodiment.robots:
+        model = read_urdf(robot.urdf, robot.position, robot.yaw)
+        for hand in robot.hands:
+            reacher = _reacher(embodiment, robot, hand, model)
+            found = [p for p in embodiment.places.values() if all(_reaches(reacher, p, h, numbers) for h in heights)]
+            pairs |= {(hand.name, place.name) for place in found}
+    return Reach(frozenset(pairs), fingerprint(embodiment))
+
+
+def fingerprint(embodiment: Embodiment) -> str:
+    """Return a SHA-256 hash of what reach depends on: files by content, numbers by value."""
+    parts = [VERSION]
+    for robot in embodiment.robots:
+        values = asdict(robot)
+        values["urdf"] = hashlib.sha256(Path(robot.urdf).read_bytes()).hexdigest()
+        parts.append(repr(values))
+    parts += [repr(fixture) for fixture in embodiment.fixtures]
+    parts += [repr(place) for _, place in sorted(embodiment.places.items())]
+    parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
+    parts += [repr(sorted(use.numbers.items())) for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model) -> Reacher:
+    """Return an open hand among the furniture and the robot's own trunk."""
+    arms = [read_arm(model, other.arm, other.tip) for other in robot.hands]
+    arm = arms[robot.hands.index(hand)]
+    around = Surroundings(tuple(box(fixture) for fixture in embodiment.fixtures))
+    around = around.plus(robot.name, fixed_spheres(model, arms))
+    return Reacher(read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening)), around, MARGIN)
+
+
+def _reaches(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> bool:
+    """Tell whether some posture at a grasp height above the place passes all stages."""
+    grip = np.array(place.position) + np.array([0.0, 0.0, height])
+    solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, numbers)]
+    valid = np.all([ok for _, ok in solved], axis=0)
+    if not valid.any():
+        return False
+    return bool(np.any(np.all([reacher.free(q[valid]) for q, _ in solved], axis=0)))
