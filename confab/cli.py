@@ -115,6 +115,12 @@ def query(
     scene: SceneName,
     sparql: Annotated[str | None, typer.Argument(metavar="QUERY", help="SPARQL text, or a .rq file.")] = None,
     show: Annotated[str | None, typer.Option(metavar="BEHAVIOR", help="Print the query that quantifies it.")] = None,
+    applicable: Annotated[
+        bool, typer.Option("--applicable", help="With --show: the query with its preconditions, where it can be done.")
+    ] = False,
+    affords: Annotated[
+        str | None, typer.Option(metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
+    ] = None,
     form: Annotated[str, typer.Option("--format", help="table, csv or json.")] = "table",
     as_json: AsJson = False,
 ) -> None:
@@ -125,12 +131,16 @@ def query(
     if show is not None:
         from reasoner.quantify import behavior_named, query_for
 
-        print(query_for(loaded.reading, behavior_named(loaded.reading, show)))
+        behavior = behavior_named(loaded.reading, show)
+        print(loaded.applicable_query(show) if applicable else query_for(loaded.reading, behavior))
         return
+    if sparql is None and affords is None:
+        raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
     if sparql is None:
-        raise KnowledgeError("no query; give SPARQL text, a .rq file, or --show BEHAVIOR")
-    text = Path(sparql).read_text(encoding="utf-8") if sparql.endswith(".rq") and Path(sparql).is_file() else sparql
-    table = loaded.query(text)
+        table = loaded.affordances(affords)
+    else:
+        is_file = sparql.endswith(".rq") and Path(sparql).is_file()
+        table = loaded.query(Path(sparql).read_text(encoding="utf-8") if is_file else sparql)
     form = "json" if as_json else form
     if form == "csv":
         print(table.csv(), end="")

@@ -18,9 +18,9 @@ from reasoner.graph import KnowledgeError, KnowledgeGraph
 from reasoner.graph import load as load_graph
 from reasoner.inference import infer
 from reasoner.links import Links
-from reasoner.names import Names
+from reasoner.names import Names, nearest
 from reasoner.reading import Reading, read, with_goals
-from reasoner.symbols import Problem
+from reasoner.symbols import Fact, Problem
 
 if TYPE_CHECKING:
     import networkx
@@ -111,8 +111,42 @@ class Scene:
         KnowledgeError
             The query isn't SPARQL, or has no rows as its answer.
         """
+        from reasoner.affordance import SITUATION, write_situation
+
+        if SITUATION in sparql:
+            write_situation(self.knowledge, self.reading)
         columns, rows = self.knowledge.table(sparql)
         return Table(columns, tuple(tuple(self._cell(term) for term in row) for row in rows))
+
+    def applicable_query(self, behavior: str) -> str:
+        """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
+        from reasoner.affordance import applicable_query
+        from reasoner.quantify import behavior_named
+
+        return applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
+
+    def affordances(self, of: str | None = None) -> Table:
+        """Return what objects afford in the initial situation: object, behaviour, arguments, situation, effect.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no object of that name; ``all`` and None stand for every object.
+        """
+        from reasoner.affordance import affordances
+
+        known = {name for members in self.problem.classes.values() for name in members}
+        if of not in (None, "all", *known):
+            raise KnowledgeError(f"unknown object '{of}'{nearest(str(of), known)}")
+        found = affordances(self.knowledge, self.reading)
+        return Table(
+            ("object", "behavior", "arguments", "situation", "effect"),
+            tuple(
+                (a.object, a.behavior, " ".join(a.arguments), _sentence(a.situation), _sentence(a.effect))
+                for a in found
+                if of in (None, "all", a.object)
+            ),
+        )
 
     def _cell(self, term: Any) -> str | None:
         if term is None:
@@ -239,6 +273,10 @@ class Result:
         from confab.show import plan_html, summary
 
         return f"<p>{summary(self.outcome)}</p>" + (plan_html(self.plan) if self.solved else "")
+
+
+def _sentence(facts: Iterable[Fact]) -> str:
+    return "; ".join(map(str, facts))
 
 
 def load(source: str | Path) -> Scene:

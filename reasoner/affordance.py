@@ -184,7 +184,7 @@ class _Writer:
         names = self.names(behavior, when)
         kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
         conditions = (*behavior.preconditions, *when)
-        lines = [self.typed(name, kinds[name]) for name in names]
+        lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]
         head = f"# {behavior.name}: where its preconditions hold in the graph {SITUATION}\n"
         chosen = " ".join(names) or "(1 AS ?once)"
@@ -225,9 +225,9 @@ class _Writer:
             case EqualityCondition(left, right):
                 yield f"FILTER({self.term(left)} = {self.term(right)})"
             case Witness(variable, kind, conditions):
-                yield self.typed(variable, kind)
                 for inner in conditions:
                     yield from self.pattern(inner)
+                yield self.typed(variable, kind)
             case AnyOf(alternatives):
                 groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)
                 yield "FILTER(" + " || ".join(f"EXISTS {{ {group} }}" for group in groups) + ")"
