@@ -15,20 +15,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
+from functools import partial
 from time import perf_counter
 
-from planner.fast import EASY, Call, Compiled, compiled
 from planner.fast import plan as fast_plan
 from planner.lifted import Done
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
-from planner.proofs import contested, unattainable
+from planner.proofs import unattainable
 from planner.segments import Effort, LimitError
+from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled
 from planner.table import Cell, arguments_of, key_of
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)
 CLOSE = 1.1
 """A repair within this factor of the least that its goals can cost is taken without comparing it with replanning."""
+
+MOST = 5_000
+"""So many expansions a repair may take, before the whole is planned anew."""
 
 Planner = Callable[[Problem], Outcome]
 
@@ -85,7 +89,8 @@ def mend(
     repaired = repair(problem, rest, planned, using, in_progress, limits)
     if repaired is not None and repaired.cost <= CLOSE * repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
-    anew, outcome = replan(problem, planner, using, limits)
+    quick = partial(fast_plan, limits=limits, using=using, improve=0) if repaired is not None else planner
+    anew, outcome = replan(problem, quick, using, limits)
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
     return Mended("replan", anew, cost(problem, anew or ()), perf_counter() - begin, outcome)
@@ -101,7 +106,8 @@ def repair(
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
-    call = _call(problem, using, limits)
+    call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
+    call.proved = True  # what is impossible is proved by replanning
     pending = list(rest)
     try:
         if not _at_rest(call):
@@ -111,12 +117,13 @@ def repair(
                 del pending[:1]
             settle(call)
         begun = len(call.steps) if rest and touched.isdisjoint(rest[0].arguments) else 0
-        settled = len(call.steps)
-        _replay(call, pending, wanted)
-        kept = range(settled, len(call.steps))
+        _restore(call, pending)
+        restored = len(call.steps)
+        whole = _replay(call, pending, wanted)
+        kept = range(restored, len(call.steps)) if whole else ()  # where nothing is dropped, all has its purpose
         settle(call)
         solved = not unattainable(call.segments) and call.serialise()
-    except LimitError:
+    except (LimitError, UnsolvableError):
         solved = False
     if not solved:
         return None
@@ -140,25 +147,18 @@ def replan(
     problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
     """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
-    begin = perf_counter()
+    first: tuple[Step, ...] = ()
     call = _call(problem, using, limits)
-    impossible = unattainable(call.segments) or contested(call.segments)
-    if impossible:
-        return None, Outcome(Status.UNSOLVABLE, None, impossible, seconds=perf_counter() - begin)
-    try:
-        settle(call)
-        solved = planner is None and call.serialise()
-    except LimitError:
-        solved = False
-    first = call.tree().steps
-    if solved:
-        counts = call.segments.counts
-        return first, Outcome(Status.SOLVED, Plan(first), None, counts, call.fallbacks, perf_counter() - begin)
-    at_rest = replace(problem, initial=call.table.state()) if planner is not None else problem
-    outcome = planner(at_rest) if planner is not None else fast_plan(problem, limits=limits, using=using)
+    if not _at_rest(call):
+        try:
+            settle(call)
+        except LimitError as limit:
+            return None, Outcome(Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}"))
+        first, problem = call.tree().steps, replace(problem, initial=call.table.state())
+    outcome = planner(problem) if planner is not None else fast_plan(problem, limits=limits, using=using)
     if outcome.plan is None:
         return None, outcome
-    return renumbered((*(first if planner is not None else ()), *outcome.plan.steps)), outcome
+    return renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps, outcome
 
 
 def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
@@ -254,9 +254,19 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
     del pending[:1]
 
 
-def _replay(call: Call, pending: list[Step], wanted: State) -> None:
-    """Do as many of the pending steps as can be done, in their order where that is possible."""
-    progress = True
+def _restore(call: Call, pending: Sequence[Step]) -> None:
+    """Achieve first, where one step does it, the open goals that no pending step is for: something happened to them."""
+    planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
+    orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
+    before = call.order() if len(orphans) > 1 else {}
+    for cell in orphans:
+        if not any(other in orphans for other in before.get(cell, ())):
+            call.achieve(call.program.levels[0], cell, EASY)
+
+
+def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
+    """Do as many of the pending steps as can be done, in their order where that is possible; whether none was dropped."""
+    progress, whole = True, True
     while progress and pending:
         progress, put_off, waiting = False, list[Step](), set[str]()
         for step in pending:
@@ -265,10 +275,12 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> None:
                 put_off.append(step)
                 continue
             effects = _effects(call, step.behavior, step.arguments, step.bindings)
-            if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
-                continue
             if _useless(call, effects, wanted):
                 _achieve_instead(call, effects)
+                whole = False
+                continue
+            if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
+                whole = False
                 continue
             done = _redo(call, step) or call.refiner.do(step.level, step.behavior, step.arguments)
             if done is None:
@@ -278,6 +290,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> None:
                 call.steps.append(done)
                 progress = True
         pending[:] = put_off
+    return whole and not pending
 
 
 def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
@@ -355,14 +368,25 @@ def _cost(call: Call, done: Done) -> float:
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of the steps that are the last to give a goal that was open its value."""
-    start, variables = call.problem.initial, call.program.variables
+    """Return the positions of the steps that are the last to give a goal that was open its value.
+
+    Steps below the first level that follow each other serve one purpose.
+    """
+    start, variables, first = call.problem.initial, call.program.variables, call.program.levels[0]
     last: dict[Cell, int] = {}
-    for position, (_, name, arguments, bindings, _) in enumerate(call.steps):
+    together: dict[int, set[int]] = {}
+    before: set[int] = set()
+    for position, (level, name, arguments, bindings, _) in enumerate(call.steps):
         for cell in _effects(call, name, arguments, dict(zip(variables[name], bindings, strict=False))):
             last[cell] = position
-    cells = {(s.situation, key_of(s.arguments)): start.get(s, FALSE) != value for s, value in call.problem.goal.items()}
-    return {position for cell, position in last.items() if cells.get(cell)}
+        before = {*before, position} if level > first else set()
+        together[position] = before or {position}
+    found: set[int] = set()
+    for symbol, value in call.problem.goal.items():
+        cell = symbol.situation, key_of(symbol.arguments)
+        if cell in last and start.get(symbol, FALSE) != value:
+            found |= together[last[cell]]
+    return found
 
 
 def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
