@@ -8,6 +8,7 @@ from pathlib import Path
 
 from confab.memory import Memory
 from confab.physics import Report, progress_bar
+from confab.reaching import with_reach
 from confab.scene import Result, Scene, load
 from planner.plan import Status
 from reasoner.files import write_whole
@@ -37,7 +38,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     if findings:
         console.print("\n".join(map(str, findings)), markup=False, highlight=False)
         return NO
-    scene = load(name)
+    scene = with_reach(load(name))
     remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
     result = scene.plan(memory=remembered.links, mode=mode)
     if result.outcome.plan is None:
