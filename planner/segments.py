@@ -44,13 +44,15 @@ class Effort:
     """How hard to try.
 
     `depth` is the most steps of a segment or a chain, `expansions` the most of one search; `slack` is by how much a chain may
-    be longer than the shortest, `breadth` how many taken values of a sort are proposed where none is free.
+    be longer than the shortest, `breadth` how many taken values of a sort are proposed where none is free; `questions` is the
+    most values that chains towards one symbol may lead through.
     """
 
     depth: int
     expansions: int
     slack: int = 0
     breadth: int = 1
+    questions: int = 200
 
 
 @dataclass
@@ -275,7 +277,7 @@ class Segments:
     def nearest(self, level: int, cell: Cell, value: str, effort: Effort, found: dict[Ground, None]) -> int:
         """Add the behaviours that start the shortest chains to a value, or hardly longer ones; return the shortest length."""
         shortest = effort.depth + 1
-        for length, ground in self.chains(level, cell, value):
+        for length, ground in self.chains(level, cell, value, effort.questions):
             if length > min(shortest + effort.slack, effort.depth):
                 break
             if ground is not None:
@@ -283,7 +285,7 @@ class Segments:
                 shortest = min(shortest, length)
         return shortest
 
-    def chains(self, level: int, cell: Cell, value: str) -> Iterator[tuple[int, Ground | None]]:
+    def chains(self, level: int, cell: Cell, value: str, questions: int = 1000) -> Iterator[tuple[int, Ground | None]]:
         """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
 
         Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer.
@@ -291,7 +293,7 @@ class Segments:
         asked: set[tuple[str, Key, str]] = set()
         wants: Iterable[Want] = [(*cell, (value,))]
         length = 0
-        while wants:
+        while wants and len(asked) < questions:
             length += 1
             yield length, None
             blocked = []

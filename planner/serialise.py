@@ -28,8 +28,8 @@ from reasoner.symbols import FALSE, Condition, Problem
 
 EASY = Effort(depth=1, expansions=10)
 SHORT = Effort(depth=3, expansions=150)
-LONG = Effort(depth=4, expansions=200)
-WIDE = Effort(depth=5, expansions=1000, slack=1, breadth=3)
+LONG = Effort(depth=16, expansions=200, questions=150)
+WIDE = Effort(depth=16, expansions=1000, slack=1, breadth=3, questions=500)
 
 
 class UnsolvableError(Exception):

@@ -1,0 +1,220 @@
+"""The fast planner solves what can be solved, proves what can't, and never says the wrong one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import pytest
+
+from planner.behaviors import Model, ground
+from planner.exhaust import Space
+from planner.fast import compiled, plan
+from planner.plan import Limits, Status
+from planner.validation import validate
+from reasoner.symbols import Problem, Symbol
+from tests.planner.families import FAMILIES, family, random_table, table, tabletop
+from tests.planner.rooms import rooms
+
+EASY = [name for name in FAMILIES if name != "packed"]
+
+
+def paper_table() -> Problem:
+    return table(
+        8,
+        2,
+        2,
+        2,
+        [4, 3, 2, 1],
+        {"bottle1": 4, "bottle2": 3, "cup1": 7, "cup2": 5},
+        {"cup1": "beverage1", "cup2": "beverage2"},
+        [{1, 2, 3, 5, 6, 7}, {3, 4, 6, 7, 8}],
+    )
+
+
+def test_the_papers_task_takes_4_steps_10_steps_and_32_steps() -> None:
+    outcome = plan(paper_table())
+    assert outcome.plan is not None
+    assert outcome.plan.length == {1: 4, 2: 10, 3: 32}
+    assert validate(paper_table(), outcome.plan) == []
+
+
+@pytest.mark.parametrize("n", [4, 10, 20, 50])
+@pytest.mark.parametrize("name", EASY)
+def test_every_family_is_solved_without_falling_back(name: str, n: int) -> None:
+    problem = family(name, n)
+    outcome = plan(problem, limits=Limits(seconds=60))
+    assert outcome.status is Status.SOLVED
+    assert outcome.plan is not None
+    assert outcome.fallbacks == 0
+    assert validate(problem, outcome.plan) == []
+
+
+@pytest.mark.parametrize("hands", [1, 4, 8])
+def test_other_numbers_of_hands_are_served(hands: int) -> None:
+    problem = family("served" if hands > 1 else "swap", 20, hands=hands)
+    outcome = plan(problem, limits=Limits(seconds=60))
+    if hands == 1:
+        assert outcome.status is not Status.GAVE_UP
+    else:
+        assert outcome.plan is not None
+        assert validate(problem, outcome.plan) == []
+
+
+def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
+    small, large = plan(family("served", 100), improve=0), plan(family("served", 1000), improve=0)
+    assert large.plan is not None
+    assert large.plan.length[3] > 9000
+    assert large.search[1].expanded < 13 * small.search[1].expanded
+    assert large.search[2].expanded + large.search[3].expanded < 60  # refinements are searched once, then replayed
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_random_tables_agree_with_exhaustive_search(part: int) -> None:
+    for seed in range(20_000 + 25 * part, 20_000 + 25 * (part + 1)):
+        problem = random_table(seed)
+        outcome = plan(problem)
+        truth = Space(problem, 3).search(3_000_000)
+        assert (outcome.status is Status.SOLVED) == (truth.steps is not None), seed
+        assert outcome.status is not Status.GAVE_UP, seed
+        if outcome.plan is not None:
+            assert validate(problem, outcome.plan) == [], seed
+
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_exhaustion_reaches_exactly_the_states_that_the_papers_model_reaches(level: int) -> None:
+    for seed in range(30_000, 30_012):
+        problem = random_table(seed)
+        nowhere = replace(problem, goal={Symbol("BEVERAGE", ("cup1",)): "never"})
+        model = Model(nowhere)
+        grounds = ground(nowhere, level)
+        seen = {model.values(nowhere.initial)}
+        queue = list(seen)
+        while queue:
+            for applied in model.successors(grounds, queue.pop()):
+                if applied.after not in seen:
+                    seen.add(applied.after)
+                    queue.append(applied.after)
+        assert Space(nowhere, level).search(10**6).states == len(seen), seed
+
+
+def test_a_place_that_no_hand_reaches_is_named() -> None:
+    problem = table(8, 2, 1, 1, [1, 2], {"cup1": 8}, {}, [{1, 2, 3}, {2, 3, 4}])
+    outcome = plan(problem)
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None
+    assert outcome.reason.text == "cup1 LOCATION location8: no Hand canReach location8"
+    assert {"cup1", "LOCATION", "location8", "canReach"} <= set(outcome.reason.terms)
+
+
+def test_two_goals_for_one_place_are_named() -> None:
+    problem = table(8, 2, 2, 1, [1, 2, 3], {"cup1": 4, "cup2": 4}, {}, [{1, 2, 3, 4}, {2, 3, 4}])
+    outcome = plan(problem)
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None
+    assert "exclude each other" in outcome.reason.text
+    assert {"cup1", "cup2", "location4"} <= set(outcome.reason.terms)
+
+
+def test_a_full_table_is_solved_on_the_level_below() -> None:
+    problem = table(3, 2, 3, 0, [1, 2, 3], {"cup1": 2, "cup2": 1, "cup3": 3}, {}, [{1, 2, 3}, {1, 2, 3}])
+    outcome = plan(problem)
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
+    assert outcome.fallbacks > 0
+
+
+def test_a_goal_that_holds_already_needs_no_step() -> None:
+    problem = replace(paper_table(), goal={Symbol("LOCATION", ("cup1",)): "location2"})
+    outcome = plan(problem)
+    assert outcome.plan is not None
+    assert outcome.plan.steps == ()
+
+
+@pytest.mark.parametrize("seconds", [0.2, 1.0])
+def test_the_time_limit_is_obeyed(seconds: float) -> None:
+    problem = family("packed", 30, seed=3)
+    using = compiled(problem)
+    begin = perf_counter()
+    outcome = plan(problem, limits=Limits(seconds=seconds), using=using)
+    assert outcome.status is Status.SOLVED or perf_counter() - begin < 1.1 * seconds + 0.1
+    assert outcome.status is not Status.UNSOLVABLE
+
+
+def test_a_limit_of_expansions_is_obeyed_and_said() -> None:
+    outcome = plan(family("packed", 30, seed=3), limits=Limits(expansions=50))
+    assert outcome.status is Status.GAVE_UP
+    assert outcome.reason is not None
+    assert "50 expansions" in outcome.reason.text
+
+
+def test_improving_never_lengthens_and_stays_valid() -> None:
+    for name in ("full", "rotate", "blocked", "swap"):
+        problem = family(name, 10, seed=1)
+        first, improved = plan(problem, improve=0).plan, plan(problem, improve=20).plan
+        assert first is not None
+        assert improved is not None
+        assert len(improved.primitives) <= len(first.primitives)
+        assert validate(problem, improved) == []
+
+
+def test_put_down_and_picked_up_again_is_dropped() -> None:
+    problem = table(4, 2, 2, 0, [1, 2], {"cup1": 2, "cup2": 1}, {}, [{1, 2, 3, 4}, {1, 2, 3, 4}])
+    improved = plan(problem).plan
+    assert improved is not None
+    assert len(improved.primitives) == 12  # both in hand at once; 18 with a place to put one aside
+    assert validate(problem, improved) == []
+
+
+def test_the_same_input_gives_the_same_plan_in_any_process() -> None:
+    code = (
+        "from tests.planner.families import family\nfrom planner.fast import plan\n"
+        "for f in ('served', 'full', 'blocked'):\n"
+        "    print([(str(s), sorted(s.bindings.items())) for s in plan(family(f, 12)).plan.walk()])"
+    )
+    root = Path(__file__).parents[2]
+    printed = {
+        subprocess.run(
+            [sys.executable, "-c", code], cwd=root, env={"PYTHONHASHSEED": seed}, capture_output=True, check=True
+        ).stdout
+        for seed in ("0", "1", "2")
+    }
+    assert len(printed) == 1
+
+
+def test_what_was_compiled_and_learned_serves_another_goal() -> None:
+    problem = family("served", 10)
+    using = compiled(problem)
+    plan(problem, using=using)
+    other = replace(problem, goal={Symbol("LOCATION", ("cup1",)): "location20"})
+    outcome = plan(other, using=using)
+    assert outcome.plan is not None
+    assert validate(other, outcome.plan) == []
+    assert outcome.search[3].expanded == 0
+
+
+def test_advice_changes_the_order_and_never_the_answer() -> None:
+    for seed in range(40_000, 40_020):
+        problem = random_table(seed)
+        backwards = plan(problem, advice=lambda level, table, found: list(found)[::-1])
+        assert backwards.status is plan(problem).status, seed
+        if backwards.plan is not None:
+            assert validate(problem, backwards.plan) == [], seed
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_domain_with_booleans_disjunction_and_keys_is_planned(seed: int) -> None:
+    problem = rooms(6, seed)
+    outcome = plan(problem)
+    truth = Space(problem, 1).search(10**6)
+    assert (outcome.status is Status.SOLVED) == (truth.steps is not None)
+    assert outcome.status is not Status.GAVE_UP
+    if outcome.plan is not None:
+        assert validate(problem, outcome.plan) == []
+
+
+def test_the_shipped_scene_is_the_table_that_the_families_build_on() -> None:
+    assert set(tabletop().domain.behaviors) == set(paper_table().domain.behaviors)
