@@ -13,8 +13,8 @@ from reasoner.symbols import Problem
 from reasoner.turtle import turtle
 
 
-def import_pddl(domain: Path, problem: Path, out: Path) -> Problem:
-    """Write a PDDL domain and problem as a scene in Turtle.
+def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Problem:
+    """Write a PDDL domain and problem as a scene in Turtle, its behaviours on one level.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def import_pddl(domain: Path, problem: Path, out: Path) -> Problem:
     """
     try:
         pddl = parse_files(domain, problem)
-        found = imported(pddl, out.stem)
+        found = imported(pddl, out.stem, level)
     except PddlError as error:
         raise KnowledgeError(str(error)) from error
     title = f"{pddl.problem} ({pddl.domain})"

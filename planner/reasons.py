@@ -39,8 +39,10 @@ def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str,
     found = []
     for schema in reached.schemas:
         for _, effect in schema.effects:
+            if effect.situation != name:
+                continue
             terms = _unified(reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value))
-            if effect.situation == name and terms is not None:
+            if terms is not None:
                 found.append((schema, _core(reached, schema, terms)))
     if not found:
         return f"no behaviour of level {reached.level} makes it so", ()

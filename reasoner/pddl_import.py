@@ -103,7 +103,7 @@ class Imported:
         return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
 
 
-def imported(pddl: Pddl, scene: str | None = None) -> Imported:
+def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
     """Return the planning problem that a PDDL domain and problem describe.
 
     Parameters
@@ -111,13 +111,15 @@ def imported(pddl: Pddl, scene: str | None = None) -> Imported:
     pddl : Pddl
     scene : str, optional
         Last part of the scene's IRI; the problem's name if not given.
+    level : int
+        The level of the behaviours: more than 1 leaves room for abstract ones above them.
 
     Raises
     ------
     PddlError
         An action's cost takes too many different values, or adds up several functions.
     """
-    table = _Import(pddl, scene or pddl.problem)
+    table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
     return Imported(problem, {ours: theirs.split(" = ")[0] for (_, theirs), ours in table.names.items()})
 
@@ -126,6 +128,7 @@ def imported(pddl: Pddl, scene: str | None = None) -> Imported:
 class _Import:
     pddl: Pddl
     scene: str
+    level: int
     names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to ours
     taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
     places: dict[str, Place] = field(default_factory=dict)
@@ -274,7 +277,7 @@ class _Import:
         action, variables = Action(REACH_GOAL, (), self.pddl.goal, None, Word("", 0, 0)), _Variables(self)
         conditions = tuple(c for part in parts for c in variables.condition(part, {}))
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
-        reach = Behavior(self.name("action", action.name, "REACH_GOAL"), 1, (), (), conditions, (effect,), 0.0)
+        reach = Behavior(self.name("action", action.name, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
         return {Symbol(name, (THE_WORLD,)): TRUE}, reach
 
     # --------------------------------------------------------------------------------------------- invariants
@@ -451,7 +454,7 @@ class _Import:
         conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form, types))
         conditions = tuple(dict.fromkeys(conditions))
         effects = self.value_effects(name, variables, types, conditions)
-        behavior = Behavior(self.name("action", name, name.upper()), 1, parameters, (), conditions, effects)
+        behavior = Behavior(self.name("action", name, name.upper()), self.level, parameters, (), conditions, effects)
         constant, functions = 0.0, []
         for amount in _increases(action.effect):
             if isinstance(amount, Word):

@@ -37,6 +37,7 @@ HEADER = """\
 <{scene}> a owl:Ontology ;
   owl:imports <https://w3id.org/confab/core> ;
   owl:versionIRI <{scene}/1> ;
+  c:symbolicOnly true ;
   dcterms:title {title}@en ;
   dcterms:description {description}@en .
 """

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
+from reasoner.graph import load
+from reasoner.reading import read
 from reasoner.symbols import (
     FALSE,
-    TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -19,6 +21,9 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+
+REACH = {"left_hand": (1, 2, 3, 5, 6, 7), "right_hand": (3, 4, 6, 7, 8)}
+"""What the hands of the shipped scene reach (PAPER.md section 4), whatever geometry says at the moment."""
 
 Terms = Mapping[str, str]
 Facts = dict[Symbol, str]
@@ -33,6 +38,13 @@ def complete(problem: Problem) -> Facts:
         for arguments in product(*(problem.classes[kind] for kind in s.arguments))
     }
     return state | dict(problem.initial)
+
+
+def tabletop() -> Problem:
+    """Return the shipped scene with the reach of the paper's plan."""
+    problem = read(load("beverage-serving")).problem
+    pairs = frozenset((hand, f"location{i}") for hand, places in REACH.items() for i in places)
+    return replace(problem, relations={**problem.relations, "canReach": pairs})
 
 
 def mentioned(conditions: Sequence[Condition]) -> set[str]:
@@ -117,6 +129,3 @@ def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tupl
 
 def wanted(problem: Problem, state: Facts) -> bool:
     return all(state.get(symbol, FALSE if value == FALSE else None) == value for symbol, value in problem.goal.items())
-
-
-__all__ = ["TRUE", "complete", "results", "wanted"]

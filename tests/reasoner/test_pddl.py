@@ -23,6 +23,7 @@ from reasoner.reading import read
 from reasoner.symbols import Problem
 from reasoner.turtle import turtle
 from reasoner.validate import validate
+from tests.planner.naive import tabletop
 
 TRUCKS = (
     """(define (domain trucks) (:requirements :strips :typing)
@@ -267,7 +268,7 @@ def test_a_hundred_thousand_objects_are_read_in_seconds(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("level", [1, 2, 3])
 def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tmp_path: Path) -> None:
-    problem = read(load("beverage-serving")).problem
+    problem = tabletop()
     domain, task = export_pddl(problem, level, tmp_path)
     exported = to_pddl(problem, level)
     second = imported(parse(domain.read_text(), task.read_text()))
@@ -284,4 +285,4 @@ def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tm
 
 def test_an_unknown_level_is_refused(tmp_path: Path) -> None:
     with pytest.raises(KnowledgeError, match="no level 7; this scene has 1, 2, 3"):
-        export_pddl(read(load("beverage-serving")).problem, 7, tmp_path)
+        export_pddl(tabletop(), 7, tmp_path)

@@ -1,0 +1,5 @@
+(define (problem three-cars)
+  (:domain ferry-boat)
+  (:objects red green blue - car north south west - quay)
+  (:init (at red north) (at green north) (at blue south) (moored west) (empty-deck))
+  (:goal (and (at red south) (at green west) (at blue north))))

@@ -1,0 +1,124 @@
+"""The flat core: limits, proofs and reasons, plans without needless steps, and the compiled heuristic."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from time import perf_counter
+
+import pytest
+
+from planner.flat import plan_level, search, shortened
+from planner.grounding import TooLargeError, ground
+from planner.plan import Limits, Reason, Status
+from planner.relaxed import heuristic
+from planner.task import Task
+from planner.validation import validate
+from reasoner.symbols import TRUE, Problem, Symbol
+from tests.planner.naive import tabletop
+from tests.planner.test_grounding import corridor
+
+
+@pytest.fixture(scope="module", name="tabletop")
+def tabletop_fixture() -> Problem:
+    return tabletop()
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_every_level_of_the_tabletop_is_planned_flat(tabletop: Problem, level: int) -> None:
+    outcome = plan_level(tabletop, level)
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert validate(tabletop, outcome.plan) == []
+
+
+def without_reach(problem: Problem, place: str) -> Problem:
+    reach = frozenset(pair for pair in problem.relations["canReach"] if pair[1] != place)
+    return replace(problem, relations={**problem.relations, "canReach": reach})
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_an_unreachable_goal_is_proved_with_a_reason_in_the_ontologys_terms(tabletop: Problem, level: int) -> None:
+    outcome = plan_level(without_reach(tabletop, "location7"), level)
+    assert outcome.status is Status.UNSOLVABLE and outcome.reason is not None
+    assert outcome.reason.text.startswith("cup1 LOCATION location7 can't be reached: ")
+    assert outcome.reason.text.endswith("no Hand canReach location7")
+    assert {"cup1", "LOCATION", "location7", "canReach"} <= set(outcome.reason.terms)
+
+
+def test_a_goal_that_nothing_brings_about_is_said_to_be_so(tabletop: Problem) -> None:
+    wrong = replace(tabletop, goal={Symbol("BEVERAGE", ("cup1",)): "nothing"})
+    reason = plan_level(wrong).reason
+    assert reason == Reason(
+        "cup1 BEVERAGE nothing can't be reached: no behaviour of level 3 makes it so", ("cup1", "BEVERAGE", "nothing")
+    )
+
+
+def test_exhaustion_is_a_proof() -> None:
+    problem = corridor(4)  # back and forth is impossible: the way is one-way
+    places = problem.classes["Place"]
+    goal = {Symbol("LIT", (places[3],)): TRUE, Symbol("AT", ("x",)): places[0]}
+    outcome = plan_level(replace(problem, goal=goal))
+    assert outcome.status is Status.UNSOLVABLE and outcome.reason is not None
+    assert "no plan exists" in outcome.reason.text
+
+
+def test_limits_are_said_to_be_limits() -> None:
+    problem = corridor(60)
+    few = plan_level(problem, limits=Limits(expansions=3))
+    assert few.status is Status.GAVE_UP and few.reason is not None and "3 expansions" in few.reason.text
+    late = plan_level(problem, limits=Limits(seconds=0.0))
+    assert late.status is Status.GAVE_UP and late.reason is not None and "time limit" in late.reason.text
+
+
+def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
+    with pytest.raises(TooLargeError, match="more than the 10 allowed"):
+        ground(tabletop, 1, most=10)
+
+
+def test_a_time_limit_is_kept_to(tabletop: Problem) -> None:
+    begin = perf_counter()
+    plan_level(tabletop, limits=Limits(expansions=10**9, seconds=0.05))
+    assert perf_counter() - begin < 1.0
+
+
+def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
+    problem = corridor(5)
+    task = ground(problem)
+    assert isinstance(task, Task)
+    plan = list(search(task).plan)
+    light = next(o for o in plan if task.describe(o)[0] == "LIGHT")
+    doubled = [light, *plan] if task.applied(task.initial, light) is not None else [*plan, light]
+    assert len(shortened(task, doubled)) <= len(plan)
+
+
+def test_preferred_operators_are_ordered_by_the_function_passed_in(tabletop: Problem) -> None:
+    seen: list[list[int]] = []
+
+    def prefer(_: Task) -> object:
+        def order(state: int, operators: list[int]) -> list[int]:
+            seen.append(operators)
+            return sorted(operators, reverse=True)
+
+        return order
+
+    outcome = plan_level(tabletop, 2, prefer=prefer)  # type: ignore[arg-type]
+    assert outcome.status is Status.SOLVED and seen
+
+
+def test_the_compiled_heuristic_is_the_plain_one(tabletop: Problem) -> None:
+    kernel = pytest.importorskip("planner.kernel", reason="needs the extra 'fast'", exc_type=ImportError)
+    for problem in (tabletop, corridor(30)):
+        task = ground(problem)
+        assert isinstance(task, Task)
+        plain, compiled = heuristic(task), kernel.heuristic(task)
+        choice, state = random.Random(0), task.initial
+        for _ in range(40):
+            evaluation = plain(state)
+            assert compiled(state) == evaluation
+            assert evaluation is not None
+            after = task.applied(state, choice.choice(evaluation[2]))
+            assert after is not None
+            state = after
+            if plain(state) is None:
+                assert compiled(state) is None
+                break
