@@ -88,7 +88,7 @@ class Judge:
     ----------
     experience : Experience
     parents : mapping of class to its superclasses
-    roles : mapping of behaviour to the class of each of its roles
+    roles : mapping of behaviour to its roles, each a name and a class
         Where back-off ends.
     without : facts that are not looked at
         For explanations: what would be chosen without them?
@@ -98,20 +98,22 @@ class Judge:
         self,
         experience: Experience,
         parents: Mapping[str, tuple[str, ...]],
-        roles: Mapping[str, Sequence[str]],
+        roles: Mapping[str, Sequence[tuple[str, str]]],
         without: frozenset[str] = frozenset(),
     ) -> None:
-        self.parents, self.roles, self._without = parents, roles, without
+        self.parents = parents
+        self.roles = {behavior: [kind for _, kind in pairs] for behavior, pairs in roles.items()}
+        self.names = {behavior: [name for name, _ in pairs] for behavior, pairs in roles.items()}
         self.tallies: dict[str, Tallies] = {}
         for conclusion, patterns in experience.totals().items():
             if len(conclusion.classes) == len(roles.get(conclusion.behavior, ())):
                 self.tallies.setdefault(conclusion.behavior, {})[conclusion] = patterns
-        self.preferred = experience.preferences(DECAY)
+        self.liked = self._liked(experience.preferences(DECAY), without)
         self._chains: dict[Conclusion, tuple[tuple[str, ...], ...]] = {}
         self._sums: dict[tuple[str, tuple[str, ...]], Sums] = {}
         self.facts: dict[str, frozenset[str]] = {}
         for behavior in self.tallies:
-            top = self._raw(behavior, tuple(roles[behavior]))
+            top = self._raw(behavior, tuple(self.roles[behavior]))
             within = [self._raw(behavior, c.classes) for c in self.tallies[behavior]]
             self.facts[behavior] = frozenset(
                 fact
@@ -137,11 +139,7 @@ class Judge:
 
     def cogency(self, candidate: Candidate) -> float:
         """Return the candidate's odds, and what is preferred among its equals."""
-        return self.odds(candidate.conclusion, candidate.pattern) + self.preference(candidate)
-
-    def preference(self, candidate: Candidate) -> float:
-        """Return how much the individuals themselves are preferred to others in their roles."""
-        return sum(factor.weight for factor in self._preferences(candidate))
+        return sum(factor.weight for factor in self.factors(candidate))
 
     def factors(self, candidate: Candidate) -> list[Factor]:
         """Return the summands of a candidate's cogency, the facts in their order."""
@@ -189,14 +187,31 @@ class Judge:
         return found + self._preferences(candidate)
 
     def _preferences(self, candidate: Candidate) -> list[Factor]:
-        found = []
-        table = self.preferred.get(candidate.conclusion)
-        for role, individual in candidate.roles if table else ():
-            fact = f"{role} is"
-            rows = {who: pair for (of, who), pair in table.items() if of == fact}  # type: ignore[union-attr]
-            if individual in rows and fact not in self._without:
-                c, p = rows[individual]
-                found.append(Factor(fact, individual, relevance(list(rows.values())) * math.log((c + 0.5) / (p + 0.5))))
+        """Return how much the individuals themselves are preferred to others in their roles."""
+        liked = self.liked.get((candidate.conclusion.behavior, candidate.conclusion.classes), ())
+        return [
+            Factor(f"{role} is", individual, likes[individual])
+            for likes, (role, individual) in zip(liked, candidate.roles, strict=False)
+            if individual in likes
+        ]
+
+    def _liked(
+        self, preferred: Mapping[Conclusion, Mapping[tuple[str, str], tuple[float, float]]], without: frozenset[str]
+    ) -> dict[tuple[str, tuple[str, ...]], list[dict[str, float]]]:
+        """Return for each conclusion and role the individuals with how much each is preferred."""
+        found: dict[tuple[str, tuple[str, ...]], list[dict[str, float]]] = {}
+        for conclusion, table in preferred.items():
+            if len(conclusion.classes) != len(self.roles.get(conclusion.behavior, ())):
+                continue
+            likes: list[dict[str, float]] = []
+            for role in self.names[conclusion.behavior]:
+                rows = {
+                    who: pair for (fact, who), pair in table.items() if fact == f"{role} is" and fact not in without
+                }
+                weight = relevance(list(rows.values()))
+                likes.append({who: weight * math.log((c + 0.5) / (p + 0.5)) for who, (c, p) in rows.items() if weight})
+            if any(likes):
+                found[conclusion.behavior, conclusion.classes] = likes
         return found
 
     def _chain(self, conclusion: Conclusion) -> tuple[tuple[str, ...], ...]:

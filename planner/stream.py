@@ -2,7 +2,6 @@
 
 d          rank discrepancies along the path: 0 while always the most cogent candidate was done; the least d is expanded next,
            of equals the deepest
-sure       odds above which a candidate is done without looking for a better one
 focus      for each open goal, the most cogent candidate that works towards it; kept until something near it changes
 
 Every node that isn't exhausted stays on the heap, so that all relevant behaviours are tried in the end. Nothing is shared with
@@ -21,12 +20,11 @@ from planner.describing import Values
 from planner.judging import Judge
 from planner.table import Cell, Key, arguments_of
 from reasoner.experience import Conclusion
+from reasoner.symbols import FALSE
 
+WEIGHT = 1  # open goals that one discrepancy weighs
 SURE = 0.0  # ln odds: rather chosen than passed over
-NEAR, FAR = (
-    3,
-    6,
-)  # how many steps ahead a candidate may begin to work towards a goal; the second if the first gives none
+NEAR, FAR = 3, 6  # steps ahead from which a candidate may work towards a goal; the second if the first gives none
 
 Here: TypeAlias = "frozenset[tuple[Cell, str]]"
 
@@ -66,12 +64,13 @@ class Stream:
             name: [i for i, q in enumerate(schema.paths(name)[1]) if q.name in judge.facts[name]]
             for name in judge.facts
         }
-        self.expanded = self.generated = self.evaluated = 0
+        self.expanded = self.generated = self.evaluated = self.pushed = 0
         self.solution: list[Ground] | None = None
         self.best = len(field.unmet())
         self.fruitless = 0
         root = Node(None, None, 0)
-        self.heap: list[tuple[int, int, int, Node, Ground | None]] = [(0, 0, 0, root, None)]
+        self.heap: list[tuple[int, int, int, Node, Ground | None, int]] = []
+        self._push(root, None, 0, self.best)
         self.at, self.start = root, len(field.table.trail)
         self.seen: set[Here] = set()
         self.focus: dict[Cell, tuple[float, Ground]] = {}
@@ -91,60 +90,45 @@ class Stream:
         return not self.heap
 
     def expand(self) -> bool:
-        """Expand one node; whether the goal was reached."""
+        """Expand one node; whether the goal was reached on the way there."""
         while self.heap and self.solution is None:
-            d, _, _, node, ground = heapq.heappop(self.heap)
+            _, _, _, node, ground, d = heapq.heappop(self.heap)
             if ground is not None:
-                node = self._child(node, ground)  # type: ignore[assignment]
-                if node is None:
+                child = self._child(node, ground)
+                if child is None:
                     continue
+                node = child
             elif node is not self.at:
                 self._go(node)
-            if not self.field.unmet():
+            left = len(self.field.unmet())
+            if not left:
                 self.solution = node.path()
-                return True
-            self._expand(node, d)
-            return self._lucky()
+                break
+            self.fruitless = 0 if left < self.best else self.fruitless + 1
+            self.best = min(self.best, left)
+            self.expanded += 1
+            self._expand(node, d, left)
+            break
         return self.solution is not None
 
     def forbid(self, path: Sequence[Ground]) -> None:
         """Take back a solution because of its last step, which can't be refined where it stands: search on without it."""
         self.solution = None
-        self._rank(self._reached(path), 0)
+        self._rank(self._reached(path), 0, len(self.field.unmet()))
 
     # ------------------------------------------------------------------------------------------------------- expanding
 
-    def _lucky(self) -> bool:
-        """Go on to the child that was pushed last, if it is next, to see whether it reaches the goal."""
-        d, _, _, node, ground = self.heap[0] if self.heap else (0, 0, 0, None, None)
-        if node is not self.at or ground is None:
-            return False
-        child = self._child(node, ground)
-        heapq.heappop(self.heap)
-        if child is None:
-            return False
-        left = len(self.field.unmet())
-        self.fruitless = 0 if left < self.best else self.fruitless + 1
-        self.best = min(self.best, left)
-        if not left:
-            self.solution = child.path()
-            return True
-        heapq.heappush(self.heap, (d, -child.depth, self._count(), child, None))
-        return False
+    def _expand(self, node: Node, d: int, left: int) -> None:
+        ground = self._most_cogent() if node.quick else None
+        node.quick = False
+        if ground is None:
+            self._rank(node, d, left)
+        else:
+            node.tried.add(ground)
+            self._push(node, ground, d, left)
+            self._push(node, None, d + 1, left)
 
-    def _expand(self, node: Node, d: int) -> None:
-        self.expanded += 1
-        if node.quick:
-            node.quick = False
-            ground = self._most_cogent()
-            if ground is not None:
-                node.tried.add(ground)
-                heapq.heappush(self.heap, (d, -node.depth - 1, self._count(), node, ground))
-                heapq.heappush(self.heap, (d + 1, -node.depth, self._count(), node, None))
-                return
-        self._rank(node, d)
-
-    def _rank(self, node: Node, d: int) -> None:
+    def _rank(self, node: Node, d: int, left: int) -> None:
         """Push all candidates of a node that weren't tried, the most cogent with the least discrepancy."""
         scored: dict[Ground, float] = {}
         for reach in (NEAR, FAR):
@@ -158,25 +142,28 @@ class Stream:
         ranked = sorted(scored, key=lambda ground: (-scored[ground], ground))
         for rank, ground in enumerate(ranked):
             node.tried.add(ground)
-            heapq.heappush(self.heap, (d + rank, -node.depth - 1, self._count(), node, ground))
+            self._push(node, ground, d + rank, left)
 
     def _most_cogent(self) -> Ground | None:
-        """Return the most cogent candidate; a sure one if there is one where something changed."""
-        open_goals = self.field.unmet()
-        self.focus = {cell: self.focus[cell] for cell in open_goals if cell in self.focus}
-        for complete in (False, True):
-            for cell in open_goals:
-                if complete or cell in self.stale:
-                    self._look(cell)
-            self.stale.clear()
-            while self.focus:
-                cell = max(self.focus, key=lambda cell: self.focus[cell][0])
-                odds, ground = self.focus[cell]
-                if odds <= SURE and not complete:
-                    break
-                if complete or (self.field.roles(ground) is not None and self._odds(ground) >= odds - 1e-9):
-                    return ground
+        """Return the most cogent candidate of all goals, looking again only at those near which something changed."""
+        now, focus = self.field.table.now, self.focus
+        open_goals = [cell for cell, value in self.field.goal.items() if now[cell[0]].get(cell[1], FALSE) != value]
+        for cell in open_goals:
+            if cell in self.stale or cell not in focus:
                 self._look(cell)
+        self.stale.clear()
+        fresh: set[Cell] = set()
+        while looked := [(*focus[cell], cell) for cell in open_goals if cell in focus]:
+            odds, ground, cell = max(looked, key=lambda entry: entry[0])
+            if odds <= SURE and self.fruitless and len(fresh) < len(open_goals):
+                for other in open_goals:
+                    self._look(other)
+                fresh.update(open_goals)
+            elif cell in fresh or (self.field.roles(ground) is not None and abs(self._odds(ground) - odds) < 1e-9):
+                return ground
+            else:
+                self._look(cell)
+                fresh.add(cell)
         return None
 
     def _look(self, cell: Cell) -> None:
@@ -206,9 +193,12 @@ class Stream:
         if known is None:
             conclusion = Conclusion(*key[:2])
             known = self._known[key] = self.judge.odds(conclusion, view.pattern(name, values) if values else ())
-        if self.judge.preferred:
-            known += self.judge.preference(view.candidate(name, roles, values))
-        return known
+        liked = self.judge.liked.get(key[:2])
+        return (
+            known
+            if liked is None
+            else known + sum(likes.get(role, 0.0) for likes, role in zip(liked, roles, strict=False))
+        )
 
     # --------------------------------------------------------------------------------------------------------- moving
 
@@ -253,6 +243,7 @@ class Stream:
         self._go(node)
         return node
 
-    def _count(self) -> int:
-        self.generated += 1
-        return -self.generated
+    def _push(self, node: Node, ground: Ground | None, d: int, left: int) -> None:
+        self.pushed += 1
+        depth = node.depth + (ground is not None)
+        heapq.heappush(self.heap, (WEIGHT * d + left, -depth, -self.pushed, node, ground, d))
