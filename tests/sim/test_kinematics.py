@@ -1,0 +1,75 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ontology
+from sim.kinematics import Arm, hand_frames, inverse, read_arm, swivel_of, three_angles, turn
+from sim.urdf import Array, read_urdf
+
+URDF = str(ontology.ROOT / "robots" / "two-arms.urdf")
+JOINTS = ("shoulder_pitch", "shoulder_yaw", "shoulder_roll", "elbow", "wrist_yaw", "wrist_pitch", "wrist_roll")
+X, Y, Z = np.eye(3)
+
+
+def arm_of(side: str) -> Arm:
+    return read_arm(read_urdf(URDF), [f"{side}_{joint}" for joint in JOINTS], f"{side}_tool")
+
+
+def postures(arm: Arm, count: int) -> Array:
+    """Postures within the limits, middle joints of the spheres within a right angle."""
+    most = np.array([9.0, 1.5, 9.0, 9.0, 9.0, 1.5, 9.0])
+    return np.random.default_rng(0).uniform(np.maximum(arm.lower, -most), np.minimum(arm.upper, most), (count, 7))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_inverse_finds_the_posture_that_forward_came_from(side: str) -> None:
+    arm = arm_of(side)
+    q = postures(arm, 500)
+    found, valid = inverse(arm, *hand_frames(arm, q), swivel_of(arm, q))
+    assert valid.all()
+    np.testing.assert_allclose(found, q, atol=1e-9)
+
+
+def test_the_elbow_swivel_leaves_the_hand_where_it_is() -> None:
+    arm = arm_of("left")
+    swivel = np.linspace(-0.5, 1.0, 20)
+    where = np.broadcast_to([0.45, 0.2, 0.85], (20, 3))
+    q, valid = inverse(arm, np.broadcast_to(np.eye(3), (20, 3, 3)), where, swivel)
+    assert valid.sum() > 5
+    np.testing.assert_allclose(hand_frames(arm, q[valid])[1], where[valid], atol=1e-12)
+    np.testing.assert_allclose(swivel_of(arm, q[valid]), swivel[valid], atol=1e-9)
+    assert np.ptp(q[valid][:, 0]) > 0.1
+
+
+def test_what_is_out_of_the_arm_s_length_is_not_valid() -> None:
+    arm = arm_of("left")
+    _, valid = inverse(arm, np.eye(3)[None], np.array([[1.2, 0.2, 0.9]]), np.zeros(1))
+    assert not valid.any()
+
+
+@pytest.mark.parametrize("axes", [(Y, Z, X), (X, Y, Z), (Z, Y, X), (X, Y, X), (Z, Y, Z), (Z, Y, -X)])
+def test_three_angles_rebuild_any_rotation(axes: tuple[Array, Array, Array]) -> None:
+    draw = np.random.default_rng(1)
+    r = turn(X, draw.uniform(-3, 3, 100)) @ turn(Y, draw.uniform(-3, 3, 100)) @ turn(Z, draw.uniform(-3, 3, 100))
+    x, y, z = three_angles(r, np.array(axes)).T
+    np.testing.assert_allclose(turn(axes[0], x) @ turn(axes[1], y) @ turn(axes[2], z), r, atol=1e-9)
+
+
+def test_an_arm_whose_axes_do_not_meet_is_refused(tmp_path: Path) -> None:
+    text = Path(URDF).read_text(encoding="utf-8")
+    bent = tmp_path / "bent.urdf"
+    bent.write_text(text.replace('<origin xyz=".30 0 0"', '<origin xyz=".30 0 .05"', 1), encoding="utf-8")
+    read_arm(read_urdf(str(bent)), [f"left_{joint}" for joint in JOINTS], "left_tool")  # the elbow still bends it so
+    bent.write_text(
+        text.replace(
+            '<child link="left_palm"/>\n    <origin xyz="0 0 0"', '<child link="left_palm"/>\n    <origin xyz="0 .03 0"'
+        )
+    )
+    with pytest.raises(ValueError, match="no wrist"):
+        read_arm(read_urdf(str(bent)), [f"left_{joint}" for joint in JOINTS], "left_tool")
+
+
+def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"missing\.urdf"):
+        read_urdf(str(tmp_path / "missing.urdf"))

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from reasoner.embodiment import Embodiment
+from sim.attempt import MARGIN
+from sim.collision import Solid, Surroundings, box, read_mover
+from sim.kinematics import read_arm
+from sim.motion import Limits, Reacher, connect, line, polyline, pose_of, smooth, timed
+from sim.urdf import read_urdf
+
+from .conftest import Case
+
+START = np.array([0.40, 0.40, 0.90, 0.0, 0.0, 0.6])
+GOAL = np.array([0.50, 0.05, 0.90, -0.3, 0.0, 0.6])
+
+
+def reacher(embodiment: Embodiment, *solids: Solid) -> Reacher:
+    robot, hand = embodiment.hand("left_hand")
+    model = read_urdf(robot.urdf)
+    arm = read_arm(model, hand.arm, hand.tip)
+    mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))
+    return Reacher(mover, Surroundings((*map(box, embodiment.fixtures), *solids)), MARGIN)
+
+
+def pillar() -> Solid:
+    return Solid("pillar", "cylinder", np.array([0.03, 0.03, 0.2]), np.array([0.45, 0.22, 0.9]), np.eye(3))
+
+
+def test_a_free_line_is_taken_as_it_is(serving: Case) -> None:
+    corners = connect(reacher(serving.embodiment), START, GOAL, np.random.default_rng(0))
+    assert corners is not None
+    np.testing.assert_array_equal(corners, [START, GOAL])
+
+
+def test_a_path_leads_round_what_is_in_the_way(serving: Case) -> None:
+    blocked = reacher(serving.embodiment, pillar())
+    assert blocked.follow(line(START, GOAL)) is None
+    assert blocked.blame(line(START, GOAL)).objects == ("pillar",)
+    corners = connect(blocked, START, GOAL, np.random.default_rng(0))
+    assert corners is not None
+    q = blocked.follow(polyline(corners))
+    assert q is not None
+    gap = blocked.mover.clearances(q, blocked.around).get("pillar", np.array([1.0]))
+    assert gap.min() > MARGIN
+
+
+def test_the_same_seed_gives_the_same_path(serving: Case) -> None:
+    blocked = reacher(serving.embodiment, pillar())
+    first, second = (connect(blocked, START, GOAL, np.random.default_rng(3)) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_pose_can_be_read_back_from_its_posture(serving: Case) -> None:
+    free = reacher(serving.embodiment)
+    q, valid = free.solve(START[None])
+    assert valid.all()
+    np.testing.assert_allclose(pose_of(free.arm, q[0]), START, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [60.0, 240.0])
+def test_timing_keeps_the_limits_and_ends_at_rest(serving: Case, rate: float) -> None:
+    free = reacher(serving.embodiment)
+    q = free.follow(line(START, GOAL))
+    assert q is not None
+    limits = Limits(free.arm.velocity, 8.0, 1.0, 4.0)
+    positions, velocities = timed(free.arm, smooth(q), limits, rate)
+    np.testing.assert_allclose(positions[-1], q[-1])
+    assert np.all(velocities[-1] == 0)
+    assert np.all(np.abs(velocities) <= limits.velocity * 1.02)
+    assert np.abs(np.diff(velocities, axis=0)).max() * rate < 3 * limits.acceleration

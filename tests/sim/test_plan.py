@@ -1,0 +1,87 @@
+"""Plans in physics: the two of the paper, from their scenes, with beads."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.faults import hidden_wall
+from sim.film import Film
+from sim.picture import hide_vessels, picture, view_of
+from sim.verify import verify
+from sim.world import World
+
+from .conftest import Case
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.slow
+def test_the_paper_s_plan_verifies_and_both_cups_are_filled(serving: Case) -> None:
+    rollout = verify(serving.embodiment, serving.initial, serving.steps, serving.expected)
+    assert rollout.failure is None
+    assert (rollout.ok, len(rollout.steps)) == (True, 32)
+    assert min(rollout.poured) >= 0.8
+    assert rollout.simulated_seconds <= 45
+    assert rollout.clock.planning <= 2
+    assert dict(rollout.state) == dict(serving.expected[-1])
+
+
+@pytest.mark.slow
+def test_the_plan_after_the_user_moved_a_cup_verifies_with_the_same_result_in_another_process(moved: Case) -> None:
+    rollout = verify(moved.embodiment, moved.initial, moved.steps, moved.expected, seed=5)
+    assert (rollout.ok, len(rollout.steps)) == (True, 10)
+    script = """
+from tests.sim.conftest import case
+from sim.verify import verify
+c = case("beverage-serving-moved")
+rollout = verify(c.embodiment, c.initial, c.steps, c.expected, seed=5)
+print([(r.seconds, sorted(r.verdict.measured.items())) for r in rollout.steps])
+"""
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    here = [(report.seconds, sorted(report.verdict.measured.items())) for report in rollout.steps]
+    assert run.stdout.strip().splitlines()[-1] == str(here)
+
+
+def test_a_wall_that_the_robot_does_not_see_stops_it_and_is_named(serving: Case) -> None:
+    wall = hidden_wall("cup1")
+    rollout = verify(serving.embodiment, serving.initial, serving.steps, serving.expected, beads=False, prepare=wall)
+    assert not rollout.ok
+    (report,) = rollout.steps
+    assert report.step.behavior == "B3_REACH_HAND_OBJECT"
+    assert (report.verdict.code, report.verdict.objects) == ("tracking error", ("hidden wall",))
+    assert report.verdict.measured["joint_lag_rad"] > 0.05
+
+
+def test_a_step_whose_promise_the_world_does_not_keep_fails(serving: Case) -> None:
+    symbol = next(s for s in serving.initial if s.situation == "HOLDS" and s.arguments == ("left_hand",))
+    promised = [{**state, symbol: "cup2"} for state in serving.expected]
+    rollout = verify(serving.embodiment, serving.initial, serving.steps[:1], promised[:1], beads=False)
+    assert rollout.failure is not None
+    assert rollout.failure.verdict.code == "slip or drop"
+    assert rollout.failure.verdict.objects == ("left_hand", "cup2", "nothing")
+
+
+def test_a_new_world_is_perceived_as_the_facts_that_it_was_set_up_with(serving: Case, moved: Case) -> None:
+    for case in (serving, moved):
+        with World(case.embodiment, case.initial) as world:
+            assert dict(world.observe()) == dict(case.initial)
+
+
+def test_the_beverage_can_be_seen_through_the_glass(serving: Case) -> None:
+    images = []
+    for beads in (True, False):
+        with World(serving.embodiment, serving.initial, beads=beads) as world:
+            hide_vessels(world)
+            images.append(picture(world, view_of(serving.embodiment, 480, 272)).astype(int))
+    assert np.sum(np.abs(images[0] - images[1]).max(-1) > 40) > 60
+
+
+def test_a_film_has_a_frame_for_every_moment_and_a_still_per_primitive(serving: Case, tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    with Film(path, serving.steps, width=320, height=192, frames=10, stills=tmp_path / "stills") as film:
+        verify(serving.embodiment, serving.initial, serving.steps[:1], serving.expected[:1], beads=False, watch=film)
+    assert path.stat().st_size > 5000
+    assert [still.name for still in (tmp_path / "stills").iterdir()] == ["01-B3_REACH_HAND_OBJECT-left_hand-cup1.png"]
