@@ -105,7 +105,7 @@ def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         try:
             done = subprocess.run(
-                words, cwd=ROOT, capture_output=True, text=True, timeout=4 * SECONDS, preexec_fn=_limit, check=False
+                words, cwd=ROOT, capture_output=True, text=True, timeout=20 * SECONDS, preexec_fn=_limit, check=False
             )
             output = done.stdout + done.stderr
         except subprocess.TimeoutExpired:
