@@ -37,7 +37,7 @@ def test_a_result_shows_as_a_tree_and_is_a_networkx_graph(result: confab.Result)
     assert "B3_GRASP" in result._repr_html_()
     graph = result.graph()
     assert graph.number_of_nodes() == 4 + 10 + 32
-    refines = [edge for edge in graph.edges(data="kind") if edge[2] == "refines"]
+    refines = [edge for edge in graph.edges if graph.edges[edge]["kind"] == "refines"]
     assert len(refines) == 10 + 32
 
 

@@ -1,0 +1,73 @@
+"""The main job in physics: verified where it should be, and told where and why it isn't."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.physics import Report
+from reasoner.reach import reach_hash
+from sim.faults import hidden_wall
+from sim.reach import fingerprint, reach
+from sim.verify import Rollout
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def report(scene: confab.Scene) -> Report:
+    return scene.plan().verify(seed=0)
+
+
+def test_the_plan_verifies_and_both_cups_hold_most_of_the_beverage(report: Report) -> None:
+    assert report.verified, report.summary()
+    (rollout,) = report.rollouts
+    assert len(rollout.steps) == 32
+    assert len(rollout.poured) == 2
+    assert min(rollout.poured) >= 0.8
+
+
+def test_what_was_seen_in_the_end_is_the_goal(scene: confab.Scene, report: Report) -> None:
+    seen = report.rollouts[0].state
+    assert {symbol: seen[symbol] for symbol in scene.problem.goal} == scene.problem.goal
+
+
+def test_the_same_seed_gives_the_same_rollout(scene: confab.Scene, report: Report) -> None:
+    again = scene.plan().verify(seed=0).rollouts[0]
+    assert _without_clock(again) == _without_clock(report.rollouts[0])
+
+
+def test_a_wall_before_a_bottle_fails_at_its_step_with_code_object_and_number(scene: confab.Scene) -> None:
+    failed = scene.plan().verify(seed=0, prepare=hidden_wall("bottle1"))
+    assert not failed.verified
+    failure = failed.rollouts[0].failure
+    assert failure is not None
+    assert str(failure.step) == "8 B3_REACH_HAND_OBJECT right_hand bottle1"
+    assert (failure.verdict.code, failure.verdict.objects) == ("tracking error", ("hidden wall",))
+    assert failure.verdict.measured
+    assert json.loads(json.dumps(failed.json()))["status"] == "failed"
+    assert "hidden wall" in failed.notes()[failure.step.path]
+
+
+def test_the_committed_reach_facts_fit_the_geometry() -> None:
+    for name in ("beverage-serving", "beverage-serving-moved"):
+        shipped = confab.load(name)
+        assert reach_hash(shipped.knowledge) == fingerprint(shipped.embodiment)
+        assert shipped.problem.relations["canReach"] == reach(shipped.embodiment).pairs
+
+
+def test_a_scene_that_is_symbolic_only_is_refused_by_name(tmp_path: Path) -> None:
+    from reasoner.generate import write_scene
+
+    write_scene(tmp_path / "table.ttl", "served")
+    symbolic = confab.load(tmp_path / "table.ttl")
+    with pytest.raises(confab.KnowledgeError, match="symbolic only"):
+        symbolic.plan().verify()
+
+
+def _without_clock(rollout: Rollout) -> dict[str, object]:
+    return {key: value for key, value in rollout.as_json().items() if key != "cpu_seconds"}
