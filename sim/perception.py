@@ -28,7 +28,7 @@ class Draft:
     """A world to be built: where bodies stand (place names) and what vessels are filled with."""
 
     places: dict[str, str] = field(default_factory=dict)
-    contents: dict[str, str] = field(default_factory=dict)
+    contents: dict[str, list[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,10 @@ def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def observe_content(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return what the vessel contains at least `least` servings of (the most, if several), or `empty`."""
+    """Return which of the situation type's values the vessel contains at least `least` servings of (the most), or `empty`."""
     if arguments[0] not in world.bodies:
         return None
-    amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings}
+    amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings if name in use.choices}
     enough = {name: amount for name, amount in amounts.items() if amount >= use.numbers["least"]}
     return max(enough, key=enough.__getitem__) if enough else use.values["empty"]
 
@@ -85,7 +85,7 @@ def observe_content(world: World, use: PerceiverUse, arguments: tuple[str, ...])
 def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
     """Fill the vessel, unless the value is `empty`."""
     if value != use.values["empty"]:
-        draft.contents[arguments[0]] = value
+        draft.contents.setdefault(arguments[0], []).append(value)
 
 
 # ------------------------------------------------------------------------------------------ what a hand does

@@ -74,7 +74,7 @@ def tilt(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[st
         measured["spilled"] = (world.stray() - attempt.stray) / serving
         _check_pour(source, target, measured, numbers)
     elif filling is not None:
-        world.contents[target] = filling
+        world.contents.setdefault(target, []).append(filling)
     attempt.check_others(numbers)
     return measured
 

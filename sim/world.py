@@ -160,6 +160,7 @@ class World:
             self.hands |= {hand.hand.name: hand for hand in hands}
         self._fill(self._draft(initial), beads)
         self.run(SETTLING)
+        self._doze()
         self.steps, self.watch = 0, watch
 
     def __enter__(self) -> World:
@@ -199,9 +200,9 @@ class World:
             body = KINDS[shape.kind].make(self.client, shape, position, orientation)
             self.names[body] = name
             self.bodies[name] = Thing(body, shape)
-        self.contents = dict(draft.contents)
+        self.contents = {name: list(fillings) for name, fillings in draft.contents.items()}
         if beads:
-            for name, filling in draft.contents.items():
+            for name, filling in ((name, filling) for name, all_in in draft.contents.items() for filling in all_in):
                 self._pour_in(name, filling)
 
     def _vary(self, shape: Shape, place: str) -> tuple[Shape, Array, float]:
@@ -248,10 +249,16 @@ class World:
                 lateralFriction=kind.friction,
                 restitution=0.0,
                 linearDamping=0.02,
-                angularDamping=0.2,
+                angularDamping=0.5,
                 physicsClientId=self.client,
             )
             self.beads.append(Bead(bead, filling))
+
+    def _doze(self) -> None:
+        """Let what has come to rest sleep until something touches it: beads at rest cost nothing then."""
+        for body in [*[thing.body for thing in self.bodies.values()], *[bead.body for bead in self.beads]]:
+            for state in (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_SLEEP):
+                pybullet.changeDynamics(body, -1, activationState=state, physicsClientId=self.client)
 
     # ------------------------------------------------------------------------------------------------- stepping
 
@@ -365,7 +372,7 @@ class World:
     def amount(self, vessel: str, filling: str) -> float:
         """Return how many servings of a filling a vessel contains."""
         if not self.beads:
-            return float(self.contents.get(vessel) == filling)
+            return float(filling in self.contents.get(vessel, ()))
         return self.inside(vessel, filling) / self.embodiment.fillings[filling].serving
 
     def stray(self) -> int:
