@@ -121,12 +121,16 @@ class SkillUse:
 
 @dataclass(frozen=True)
 class PerceiverUse:
-    """Which perceiver reads a situation type off the world, with its thresholds and the values that mean something special."""
+    """Which perceiver reads a situation type off the world, with its thresholds and the values that mean something special.
+
+    `choices` are the values that the situation type has, in declared order.
+    """
 
     situation: str
     perceiver: str
     numbers: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, str] = field(default_factory=dict)
+    choices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

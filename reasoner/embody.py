@@ -364,7 +364,12 @@ def _perceivers(facts: _Facts, names: Callable[[str], str]) -> dict[str, Perceiv
             for name, values in facts.links[situation].items()
             if name.startswith("value_")
         }
+        choices = [node for node in facts.ordered(facts.classes) if situation in facts.nearest_first(node)]
         found[names(situation)] = PerceiverUse(
-            names(situation), local_name(perceiver), _settings(facts, perceiver, situation), special
+            names(situation),
+            local_name(perceiver),
+            _settings(facts, perceiver, situation),
+            special,
+            tuple(map(names, choices)),
         )
     return found
