@@ -77,9 +77,10 @@ class Places:
     @cached_property
     def _files(self) -> Mapping[str, Path]:
         files: dict[str, Path] = {}
-        for file in self.graph.files.values():
-            for subject in _declared(file):
-                files.setdefault(subject, file)
+        said = [_subjects(file) for file in self.graph.files.values()]
+        for part in ("typed", "other"):
+            for file, subjects in zip(self.graph.files.values(), said, strict=True):
+                files = dict.fromkeys(subjects[part], file) | files
         return files
 
 
@@ -97,14 +98,13 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(set(findings))
 
 
-def _declared(file: Path) -> list[str]:
-    """Return the IRIs that a file gives a type, then those that it says anything else about."""
-    typed: list[str] = []
-    other: list[str] = []
+def _subjects(file: Path) -> dict[str, list[str]]:
+    """Return the IRIs that a file gives a type, and those that it says anything else about."""
+    found: dict[str, list[str]] = {"typed": [], "other": []}
     for quad in ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.as_uri()):
         if isinstance(quad.subject, ox.NamedNode):
-            (typed if quad.predicate.value.endswith("#type") else other).append(quad.subject.value)
-    return typed + other
+            found["typed" if quad.predicate.value.endswith("#type") else "other"].append(quad.subject.value)
+    return found
 
 
 def _line(file: Path | None, node: str) -> int:

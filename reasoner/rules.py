@@ -238,9 +238,12 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     problem, names = case.reading.problem, case.reading.names
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
+    present = {symbol.situation for symbol in problem.initial}
     changed = {effect.situation for behavior in problem.domain.behaviors.values() for effect in behavior.effects}
-    for situation in problem.domain.situations.values():  # what no behaviour changes, somebody else does
-        if situation.name not in changed:
+    for situation in (
+        problem.domain.situations.values()
+    ):  # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
+        if situation.name not in changed or situation.name not in present:
             there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
     waiting = dict(problem.domain.behaviors)
     while True:
