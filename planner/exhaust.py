@@ -45,7 +45,14 @@ Env: TypeAlias = "dict[str, str]"
 
 
 class TooLargeError(Exception):
-    """The states don't fit: more bits than 63, more operators or more states than allowed."""
+    """The states don't fit: more bits than 63, more operators or more states than allowed.
+
+    `layers` of the search were finished before.
+    """
+
+    def __init__(self, message: str, layers: int = 0) -> None:
+        super().__init__(message)
+        self.layers = layers
 
 
 @dataclass
@@ -158,7 +165,7 @@ class Space:
             new = new[known[places] != new]
             known = np.sort(np.concatenate([known, new]), kind="stable")
             if len(known) > most:
-                raise TooLargeError(f"more than {most} states")
+                raise TooLargeError(f"more than {most} states", len(layers))
             layers.append(new)
 
     def _successors(self, codes: Codes, deadline: float | None = None) -> Iterator[tuple[Operator, Codes]]:

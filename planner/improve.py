@@ -77,6 +77,8 @@ class Improver:
             parts.extend((part, number) for part in self._parts(step))
         undone = self._undone([part for part, _ in parts])
         self.table.undo(0)
+        if not undone:
+            return list(steps)
         kept: list[tuple[Done, int]] = []
         k = 0
         while k < len(parts):
@@ -163,6 +165,8 @@ class Improver:
                 return list(steps)
             rest.append((step, *self._concern(step, mark)))
         self.table.undo(0)
+        if all(len(self._cluster(rest, position)) == 1 for position in range(len(rest))):
+            return list(steps)
         found: list[Done] = []
         position = 0
         while position < len(rest):

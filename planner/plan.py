@@ -101,6 +101,7 @@ class Outcome:
 
     `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
     calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it.
+    `bound` is what any plan costs at least on the lowest level, where that was proved.
     """
 
     status: Status
@@ -109,6 +110,7 @@ class Outcome:
     search: Mapping[int, Counts] = field(default_factory=dict)
     fallbacks: int = 0
     seconds: float = 0.0
+    bound: float | None = None
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,10 @@ Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
 """Orders what could be done, given the level and the state; may leave nothing out."""
 
 
+FIRST = 3
+"""Weight of the way to a target against the way back of what has to be restored, which grows while that is gone."""
+
+
 class LimitError(Exception):
     """A limit of the planning call has been reached; the message says which."""
 
@@ -158,7 +162,7 @@ class Segments:
     ) -> list[Ground] | None:
         """Return relevant steps to the same end as `find`, found best first, or None.
 
-        h is the sum over the symbols that are off of the length of the shortest chain that something applicable starts; a
+        h is the sum over the symbols that are off, targets weighing more, of the length of the shortest chain that something applicable starts; a
         node's successors are queued by its own h (deferred evaluation), so that each state's relevance is worked out once.
         The table is left as it was found.
         """
@@ -185,7 +189,7 @@ class Segments:
             found: dict[Ground, None] = {}
             h = 0
             for cell, value in off.items():
-                h += self.nearest(level, cell, value, effort, found)
+                h += self.nearest(level, cell, value, effort, found) * (FIRST if cell in targets else 1)
             mark = len(table.trail)
             for ground in found if self.advice is None else self.advice(level, table, list(found)):
                 if forbidden and (ground, here) in forbidden:

@@ -44,6 +44,8 @@ class Wants:
         self.table = table
         self.goal = goal
         self.breadth = 1
+        self._known: dict[tuple[object, ...], bool] = {}
+        self._conditions: dict[int, tuple[bool, tuple[str, ...], Condition]] = {}
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
             self.wanted.setdefault(situation, {})[value] = None
@@ -89,7 +91,7 @@ class Wants:
         """Yield wants for other values of the symbols that determine a condition's variables."""
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
-        for term in sorted(mentioned(condition)):
+        for term in self._about(condition)[1]:
             if term in achiever.determined:
                 situation, arguments = achiever.determined[term]
                 key = self._key(arguments, env)
@@ -98,10 +100,29 @@ class Wants:
                 values = tuple(
                     value
                     for value in self.candidates(situation, key, achiever.kinds[term])
-                    if value != env[term] and self.holds(condition, {**env, term: value})
+                    if value != env[term] and self._would_hold(condition, env, term, value)
                 )
                 if values:
                     yield situation, key, values
+
+    def _about(self, condition: Condition) -> tuple[bool, tuple[str, ...], Condition]:
+        """Return whether nothing can change a condition, its variables, and itself (so that its `id` stays its own)."""
+        found = self._conditions.get(id(condition))
+        if found is None:
+            found = _static(condition), tuple(sorted(mentioned(condition))), condition
+            self._conditions[id(condition)] = found
+        return found
+
+    def _would_hold(self, condition: Condition, env: Env, term: str, value: str) -> bool:
+        """Whether a condition would hold with another value for a variable; what is static is asked once."""
+        static, others, _ = self._about(condition)
+        if not static:
+            return self.holds(condition, {**env, term: value})
+        key = id(condition), term, value, *[env[other] for other in others if other in env]
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = self.holds(condition, {**env, term: value})
+        return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
         """Return values of a class for a symbol: its goal, and one of each sort, free ones first."""
@@ -192,3 +213,14 @@ def _fluent(condition: Condition) -> bool:
 
 def _negation(condition: ValueCondition) -> ValueCondition:
     return ValueCondition(condition.situation, condition.arguments, condition.value, not condition.negated)
+
+
+def _static(condition: Condition) -> bool:
+    match condition:
+        case ValueCondition():
+            return False
+        case Witness(_, _, conditions):
+            return all(map(_static, conditions))
+        case AnyOf(alternatives):
+            return all(_static(c) for group in alternatives for c in group)
+    return True
