@@ -364,7 +364,7 @@ def _perceivers(facts: _Facts, names: Callable[[str], str]) -> dict[str, Perceiv
             for name, values in facts.links[situation].items()
             if name.startswith("value_")
         }
-        choices = [node for node in facts.ordered(facts.classes) if situation in facts.nearest_first(node)]
+        choices = [node for node in facts.ordered(facts.classes) if situation in facts.nearest_first(node)[1:]]
         found[names(situation)] = PerceiverUse(
             names(situation),
             local_name(perceiver),
