@@ -131,7 +131,7 @@ def a_star(
     g = {task.initial: 0.0}
     came_from: dict[int, tuple[int, int]] = {}
     start = heuristic(task.initial)
-    queue = [(start, 0.0, 0, task.initial)]  # f, h, order of generation, state
+    queue = [(start, start, 0, task.initial)]  # f, h, order of generation, state
     lower, number = start, 0
     while queue:
         f, h, _, state = heapq.heappop(queue)
