@@ -9,7 +9,6 @@ import pyoxigraph as ox
 from confab.scene import Scene
 from reasoner.graph import BASE
 from reasoner.reach import reach_hash, reach_relation, save_reach
-from reasoner.reading import read
 
 log = logging.getLogger(__name__)
 
@@ -45,4 +44,4 @@ def with_reach(scene: Scene) -> Scene:
             log.info("wrote %s", path)
         except OSError as error:
             log.warning("%s: can't be written (%s); what was computed isn't kept", path, error.strerror)
-    return Scene(graph, read(graph), scene.seconds)
+    return Scene(graph, scene.seconds)

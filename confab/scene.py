@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -20,6 +20,7 @@ from reasoner.inference import infer
 from reasoner.links import Links
 from reasoner.names import Names, nearest
 from reasoner.reading import Reading, read, with_goals
+from reasoner.recognition import recognise
 from reasoner.symbols import Fact, Problem
 
 if TYPE_CHECKING:
@@ -27,7 +28,11 @@ if TYPE_CHECKING:
     import rdflib
     from rich.tree import Tree
 
+    from confab.execution import Execution
+    from confab.memory import Memory
     from confab.physics import Report
+    from planner.acting import Moment
+    from planner.episode import World
     from reasoner.embodiment import Embodiment
 
 MODES = ("guarded", "strict", "paper")
@@ -42,15 +47,20 @@ class Scene:
     ----------
     knowledge : KnowledgeGraph
         The store behind it.
-    reading : Reading
-        The planning problem, and the table that leads from its names back to IRIs.
     seconds : mapping of stage to seconds
-        What loading and reading took.
+        What loading took.
     """
 
     knowledge: KnowledgeGraph
-    reading: Reading
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def reading(self) -> Reading:
+        """The whole scene as the planner takes it, and the table that leads from its names back to IRIs.
+
+        `plan` does without it: it reads what the task can need.
+        """
+        return read(self.knowledge)
 
     @property
     def iri(self) -> str:
@@ -157,7 +167,7 @@ class Scene:
     def plan(
         self,
         goals: Iterable[str] = (),
-        memory: Links | None = None,
+        memory: Memory | Links | None = None,
         mode: str = DEFAULT_MODE,
         time_limit: float | None = None,
     ) -> Result:
@@ -167,7 +177,7 @@ class Scene:
         ----------
         goals : iterable of str
             Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
-        memory : Links, optional
+        memory : Memory, or Links alone in paper mode; optional
             What was learned before; none if left out.
         mode : str
             ``paper``: A* with eq. (5) on each level. ``guarded`` and ``strict``: the fast planner, and how far experience
@@ -182,24 +192,55 @@ class Scene:
         """
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
-        problem = with_goals(self.reading, goals)
         limits = Limits(seconds=time_limit)
-        begin = perf_counter()
+        begin, asked, goals = perf_counter(), self.knowledge.round_trips, list(goals)
+        problem = with_goals(recognise(self.knowledge, goals), goals)
         if mode == "paper":
+            from planner.behaviors import ground
             from planner.refinement import plan as paper_plan
-            from reasoner.quantify import quantify
 
-            grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
+            grounds = {level: ground(problem, level) for level in problem.domain.levels}
             quantified = perf_counter() - begin
-            outcome = paper_plan(problem, memory, limits=limits, grounds=grounds)
+            links = memory if isinstance(memory, Links) or memory is None else memory.links
+            outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
         else:
             from planner.fast import compiled
-            from planner.fast import plan as fast_plan
+            from planner.guided import plan as guided_plan
 
             using = compiled(problem)
             quantified = perf_counter() - begin
-            outcome = fast_plan(problem, limits=limits, using=using)
-        return Result(self, problem, outcome, {**self.seconds, "quantify": quantified})
+            advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
+            outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
+        queries = self.knowledge.round_trips - asked
+        return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
+
+    def execute(
+        self,
+        plan: Result | Plan | str | Path | None = None,
+        interventions: Iterable[str] = (),
+        world: str | World = "symbolic",
+        goals: Iterable[str] = (),
+        memory: Links | None = None,
+        mode: str = DEFAULT_MODE,
+        seed: int = 0,
+        tell: Callable[[Moment], None] | None = None,
+        **options: Any,
+    ) -> Execution:
+        """Carry the task out in a closed loop: see `confab.execution.execute`.
+
+        `plan` is what to begin with: a result, a plan, or the name of a file that ``confab plan --json`` wrote. In paper mode
+        replanning from scratch is the paper's, with `memory`.
+        """
+        from confab.execution import execute, planner_of
+        from confab.interchange import read_plan
+
+        problem = with_goals(self.reading, goals)
+        if isinstance(plan, Result):
+            problem, plan = plan.problem, plan.plan
+        elif isinstance(plan, str | Path):
+            plan = read_plan(Path(plan), problem)
+        planner = planner_of(mode, memory)
+        return execute(self, problem, plan, interventions, world, planner, seed, tell, **options)
 
     def __repr__(self) -> str:
         """Return what the scene is, in one line."""
@@ -209,12 +250,16 @@ class Scene:
 
 @dataclass
 class Result:
-    """What came of planning: the outcome, and the scene in which it holds."""
+    """What came of planning: the outcome, and the scene in which it holds.
+
+    `problem` has the individuals that the task can need; `queries` is how many the store was asked.
+    """
 
     scene: Scene
     problem: Problem
     outcome: Outcome
     seconds: dict[str, float]
+    queries: int = 0
 
     @property
     def plan(self) -> Plan:
@@ -228,6 +273,10 @@ class Result:
         """Carry out the plan in PyBullet: see `confab.physics.verify`."""
         return self.scene.verify(self.plan, rollouts, seed, **options)
 
+    def execute(self, interventions: Iterable[str] = (), **options: Any) -> Execution:
+        """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
+        return self.scene.execute(self, interventions, **options)
+
     @property
     def solved(self) -> bool:
         """Whether there is a plan."""
@@ -235,7 +284,7 @@ class Result:
 
     def json(self) -> dict[str, Any]:
         """Return the result as JSON data (docs/command-line.md)."""
-        return outcome_json(self.scene.iri, self.outcome, self.seconds)
+        return {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
 
     def graph(self) -> networkx.DiGraph[tuple[int, ...]]:
         """Return the plan as a directed graph: a node per step (by path), edges to sub-steps and to what follows."""
@@ -279,13 +328,19 @@ def _sentence(facts: Iterable[Fact]) -> str:
     return "; ".join(map(str, facts))
 
 
-def load(source: str | Path) -> Scene:
-    """Load a scene: a shipped name, or a file in Turtle, N-Triples or RDF/XML.
+def load(source: str | Path, scene: str | None = None) -> Scene:
+    """Load a scene: a shipped name, a file in Turtle, N-Triples or RDF/XML, or the URL of a SPARQL 1.1 endpoint.
+
+    Parameters
+    ----------
+    source : str or Path
+    scene : str, optional
+        IRI of the scene in an endpoint that holds several.
 
     Raises
     ------
     KnowledgeError
-        No such scene; broken syntax; an import that can't be found; a situated object without a value.
+        No such scene; broken syntax; an import that can't be found; an endpoint that is down, or slow, or none.
 
     Examples
     --------
@@ -293,7 +348,10 @@ def load(source: str | Path) -> Scene:
     ('bottle1', 'location4')
     """
     begin = perf_counter()
+    if str(source).startswith(("http://", "https://")):
+        from reasoner.stores import connect
+
+        return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
     graph = load_graph(source)
     infer(graph)
-    reading = read(graph)
-    return Scene(graph, reading, {"load": perf_counter() - begin})
+    return Scene(graph, {"load": perf_counter() - begin})
