@@ -111,6 +111,38 @@ def verify(
 
 
 @app.command()
+def execute(
+    scene: SceneName,
+    world: Annotated[str, typer.Option("--world", help="Where to act: symbolic or pybullet.")] = "symbolic",
+    intervene: Annotated[
+        list[str] | None,
+        typer.Option("--intervene", metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."),
+    ] = None,
+    plan: Annotated[Path | None, typer.Option("--plan", metavar="PLAN.json", help="What to begin with.")] = None,
+    goal: Goals = None,
+    memory: MemoryFile = None,
+    no_memory: NoMemory = False,
+    mode: Mode = "guarded",
+    seed: Seed = 0,
+    save: Annotated[Path | None, typer.Option("--save", metavar="EPISODE.ttl", help="Write the episode here.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Act in a closed loop: watch, be interrupted, repair, replan."""
+    from confab.live import spectator
+    from confab.scene import load
+
+    loaded = load(scene)
+    remembered = _memory(memory, no_memory, loaded)
+    links = remembered.links if remembered else None
+    with spectator() as tell:
+        execution = loaded.execute(plan, intervene or (), world, goal or (), links, mode, seed, tell)
+    if save is not None:
+        execution.save(save)
+    _print(execution.json() if as_json else execution)
+    raise typer.Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
+
+
+@app.command()
 def query(
     scene: SceneName,
     sparql: Annotated[str | None, typer.Argument(metavar="QUERY", help="SPARQL text, or a .rq file.")] = None,

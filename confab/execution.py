@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import html
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from confab.interchange import step_json
-from planner.episode import Change, Episode, Intervention
+from planner.acting import Moment, Patience, act
+from planner.episode import Change, End, Episode, Intervention, World
+from planner.plan import Plan
+from planner.repair import Planner
+from planner.symbolic import SymbolicWorld
 from reasoner.graph import KnowledgeError
+from reasoner.links import Links
 from reasoner.names import nearest
 from reasoner.reading import parse_fact
 from reasoner.symbols import Fact, Problem, Symbol
+
+if TYPE_CHECKING:
+    import networkx
+    from rich.tree import Tree
+
+    from confab.scene import Scene
+
+WORLDS = ("symbolic", "pybullet")
 
 FORMS = (
     "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "
@@ -163,3 +178,156 @@ def episode_json(episode: Episode) -> dict[str, Any]:
         "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
         "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
     }
+
+
+# ------------------------------------------------------------------------------------------------------------- at the front desk
+
+
+@dataclass(frozen=True)
+class Execution:
+    """What came of carrying a task out: an episode, and the scene in which it happened."""
+
+    scene: Scene
+    episode: Episode
+
+    @property
+    def reached(self) -> bool:
+        """Whether what was wanted was reached."""
+        return self.episode.status is End.REACHED
+
+    def json(self) -> dict[str, Any]:
+        """Return the episode as JSON data (docs/execution.md)."""
+        return episode_json(self.episode)
+
+    def notes(self) -> dict[tuple[int, ...], str]:
+        """Return what is to be said of each step, by its path: surprises, and where the plan changed."""
+        notes = {
+            event.step.path: "✗ " + (event.code or "; ".join(str(s.symbol) for s in event.surprises))
+            for event in self.episode.events
+            if not event.ok or event.surprises
+        }
+        for replan in self.episode.replans:
+            text = f"↻ {replan.kind} (−{replan.dropped} +{replan.added}): {replan.because}"
+            notes[replan.after] = " ".join((notes.get(replan.after, ""), text)).strip()
+        return notes
+
+    def summary(self) -> str:
+        """Return one line that says how it went."""
+        episode = self.episode
+        primitives = len(episode.done.primitives)
+        text = f"{episode.status.value}: {primitives} primitives done"
+        for count, word in (
+            (len(episode.interventions), "intervention"),
+            (len(episode.replans), "change of plan"),
+            (len(episode.failures), "failure"),
+        ):
+            text += (
+                f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
+            )
+        return text + "".join(f"; {reason.text}" for reason in episode.reasons)
+
+    def graph(self) -> networkx.DiGraph[int]:
+        """Return the partial order of what was done: an edge from each primitive to those that need it done before."""
+        from planner.schedule import partial_order
+
+        problem = replace(self.scene.problem, initial=self.episode.initial)
+        return partial_order(problem, self.episode.done.primitives)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the episode as Turtle (PROV-O), whole or not at all, and return where."""
+        from reasoner.episodes import save_episode
+
+        save_episode(Path(path), self.json(), self.scene.names)
+        return Path(path)
+
+    def __rich__(self) -> Tree:
+        """Return the plan as it was carried out, for rich."""
+        from confab.show import plan_tree
+
+        return plan_tree(self.episode.done, self.summary(), self.notes())
+
+    def __repr__(self) -> str:
+        """Return the summary."""
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        from confab.show import plan_html
+
+        return f"<p>{html.escape(self.summary())}</p>{plan_html(self.episode.done, self.notes())}"
+
+
+def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
+    """Return what plans from scratch in a mode; None stands for the fast planner.
+
+    Raises
+    ------
+    KnowledgeError
+        No such mode.
+    """
+    from confab.scene import MODES
+
+    if mode not in MODES:
+        raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
+    if mode != "paper":
+        return None
+    from planner.refinement import plan as paper_plan
+
+    return lambda problem: paper_plan(problem, memory)
+
+
+def execute(
+    scene: Scene,
+    problem: Problem,
+    plan: Plan | None = None,
+    interventions: Iterable[str | Intervention] = (),
+    world: str | World = "symbolic",
+    planner: Planner | None = None,
+    seed: int = 0,
+    tell: Callable[[Moment], None] | None = None,
+    prepare: Callable[[Any], None] | None = None,
+    patience: Patience = Patience(),  # noqa: B008 - frozen
+) -> Execution:
+    """Carry a task out in a closed loop.
+
+    Parameters
+    ----------
+    scene : Scene
+    problem : Problem
+        The scene's, or one with other goals.
+    plan : Plan, optional
+        What to begin with.
+    interventions : iterable of str or Intervention
+        Each like ``after=28 cup2 LOCATION location8``.
+    world : {'symbolic', 'pybullet'} or World
+    planner : callable, optional
+        Plans from scratch; the fast planner if left out.
+    seed : int
+        Of everything random in physics.
+    tell : callable, optional
+        Is told what happens, as it happens.
+    prepare : callable, optional
+        Called with the PyBullet world before it begins: plants a fault, say.
+    patience : Patience
+
+    Raises
+    ------
+    KnowledgeError
+        An intervention isn't of a known form; the scene has no geometry; no such world.
+    """
+    texts = list(interventions)
+    wanted = [i for i in texts if isinstance(i, Intervention)]
+    wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
+    if not isinstance(world, str):
+        return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell))
+    if world == "symbolic":
+        return Execution(scene, act(problem, SymbolicWorld(problem), plan, wanted, planner, patience, tell))
+    if world != "pybullet":
+        raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
+    from sim.live import LiveWorld
+    from sim.world import World as Physics
+
+    with Physics(scene.embodiment, problem.initial, seed) as physics:
+        if prepare is not None:
+            prepare(physics)
+        live = LiveWorld(physics, problem.classes)
+        return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell))

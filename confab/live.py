@@ -1,0 +1,134 @@
+"""The live view of an episode: plan, current step, expectation against observation, interventions and changes of plan."""
+
+from __future__ import annotations
+
+import html
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from planner.acting import Moment
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+Tell = Callable[[Moment], None]
+LOG = 6
+"""So many of the last happenings are shown."""
+
+
+@dataclass
+class View:
+    """What is shown of the last moment, and of what happened before."""
+
+    moment: Moment | None = None
+    log: list[str] = field(default_factory=list)
+
+    def take(self, moment: Moment) -> None:
+        """Take note of a moment."""
+        self.moment = moment
+        if moment.what == "intervention":
+            self.log.append(f"✋ {moment.text}")
+        elif moment.what in ("repair", "replan"):
+            self.log.append(f"↻ {moment.what}: {moment.text}")
+        elif moment.what == "over":
+            self.log.append(moment.text)
+        for surprise in moment.surprises:
+            self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
+
+    def notes(self) -> dict[tuple[int, ...], str]:
+        """Return what is to be said of each step: done, or being done."""
+        if self.moment is None:
+            return {}
+        notes = {step.path: "✓" for step in self.moment.plan.walk() if not step.steps and step.path in self.moment.done}
+        if self.moment.what == "begin" and self.moment.step is not None:
+            notes[self.moment.step.path] = "◀ " + "; ".join(map(str, self.moment.expected))
+        return notes
+
+    def headline(self) -> str:
+        """Return what is being done, in one line."""
+        if self.moment is None:
+            return "planning"
+        primitives = self.moment.plan.primitives
+        done = sum(step.path in self.moment.done for step in primitives)
+        return f"{done} of {len(primitives)} primitives" + (f": {self.moment.step}" if self.moment.step else "")
+
+    def __rich__(self) -> Group:
+        """Return the plan from the current step on, and the last happenings."""
+        from rich.console import Group
+        from rich.text import Text
+
+        from confab.show import plan_tree
+        from planner.plan import Plan
+
+        parts: list[Any] = [Text(line) for line in self.log[-LOG:]]
+        if self.moment is not None:
+            now = next((s for s in self.moment.plan.steps if not _is_done(s, self.moment)), None)
+            later = [s for s in self.moment.plan.steps if now is not None and s.path > now.path]
+            parts.insert(0, plan_tree(Plan((now,) if now else ()), self.headline(), self.notes()))
+            parts.insert(1, Text("then " + ", ".join(map(str, later)) if later else "then nothing more", style="dim"))
+        return Group(*parts)
+
+    def _repr_html_(self) -> str:
+        from confab.show import plan_html
+
+        happened = "".join(f"<li>{html.escape(line)}</li>" for line in self.log[-LOG:])
+        plan = plan_html(self.moment.plan, self.notes()) if self.moment is not None else ""
+        return f"<p>{html.escape(self.headline())}</p><ul>{happened}</ul>{plan}"
+
+
+@contextmanager
+def spectator() -> Iterator[Tell | None]:
+    """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither."""
+    if _in_notebook():
+        with in_notebook() as tell:
+            yield tell
+    elif sys.stderr.isatty():
+        with in_terminal() as tell:
+            yield tell
+    else:
+        yield None
+
+
+@contextmanager
+def in_terminal(console: Any = None) -> Iterator[Tell]:
+    """Show an episode on a rich console, stderr if none is given."""
+    from rich.console import Console
+    from rich.live import Live
+
+    view = View()
+    with Live(view, console=console or Console(stderr=True), refresh_per_second=8, transient=True) as live:
+
+        def tell(moment: Moment) -> None:
+            view.take(moment)
+            live.update(view, refresh=moment.what != "end")
+
+        yield tell
+
+
+@contextmanager
+def in_notebook() -> Iterator[Tell]:
+    """Show an episode in the output of a notebook's cell."""
+    from IPython.display import display
+
+    view = View()
+    handle = display(view, display_id=True)  # type: ignore[no-untyped-call]
+
+    def tell(moment: Moment) -> None:
+        view.take(moment)
+        handle.update(view)
+
+    yield tell
+
+
+def _is_done(step: Any, moment: Moment) -> bool:
+    return all(below.path in moment.done for below in step.walk() if not below.steps)
+
+
+def _in_notebook() -> bool:
+    """Whether this runs in a notebook's kernel."""
+    shell = sys.modules.get("IPython")
+    running = shell.get_ipython() if shell is not None else None
+    return running is not None and hasattr(running, "kernel")

@@ -1,0 +1,190 @@
+"""Both arms at once: the partial order that a plan really needs, and a schedule that keeps it.
+
+A plan is a sequence, but most of its order means nothing. One primitive must wait for an earlier one only if it wouldn't be
+applicable, or would do something else, had the earlier one not been done yet; or if the earlier one would, had it been done
+before. That is asked of the behaviours themselves, so that conditions of any form count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import networkx
+
+from planner.plan import Step
+from planner.validation import successor
+from reasoner.symbols import Problem, State, Symbol
+
+Order: TypeAlias = "networkx.DiGraph[int]"
+Apart = Callable[[Step, Step], bool]
+"""Whether two primitives leave each other enough room to be done at the same time."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A primitive in a schedule: who does it, from when to when, in seconds."""
+
+    step: Step
+    position: int
+    worker: str
+    begin: float
+    end: float
+
+
+def partial_order(problem: Problem, primitives: Sequence[Step]) -> Order:
+    """Return which primitives must be done before which: nodes are positions, edges as few as say the same.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its initial state is where the primitives begin.
+    primitives : sequence of Step
+
+    Raises
+    ------
+    ValueError
+        A primitive isn't applicable where it is done.
+    """
+    states: list[State] = [problem.initial]
+    writes: list[dict[Symbol, tuple[str | None, str]]] = []
+    for step in primitives:
+        after = _done(problem, step, states[-1])
+        if after is None:
+            raise ValueError(f"{step} isn't applicable where it is done")
+        before = states[-1]
+        writes.append({s: (before.get(s), v) for s, v in after.items() if before.get(s) != v})
+        states.append(after)
+    order: Order = networkx.DiGraph()
+    for j, step in enumerate(primitives):
+        order.add_node(j, label=str(step))
+        for i in range(j - 1, -1, -1):
+            if not networkx.has_path(order, i, j) and _needs(problem, primitives, states, writes, i, j):
+                order.add_edge(i, j)
+    reduced: Order = networkx.transitive_reduction(order)
+    reduced.add_nodes_from(order.nodes(data=True))
+    return reduced
+
+
+def workers_of(problem: Problem) -> frozenset[str]:
+    """Return the individuals that have a state of rest: those that do one thing at a time."""
+    kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None}
+    return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
+
+
+def schedule(
+    problem: Problem,
+    primitives: Sequence[Step],
+    seconds_of: Mapping[int, float] | None = None,
+    apart: Apart = lambda one, other: True,
+) -> list[Slot]:
+    """Return when each primitive begins and ends if every hand works as soon as it can.
+
+    Parameters
+    ----------
+    problem : Problem
+    primitives : sequence of Step
+    seconds_of : mapping of position to seconds, optional
+        How long each takes; a second if left out.
+    apart : callable
+        Says of two primitives whether there is room for both at once.
+
+    Returns
+    -------
+    list of Slot
+        In the order of their beginning.
+    """
+    seconds = {i: 1.0 if seconds_of is None else seconds_of[i] for i in range(len(primitives))}
+    order = partial_order(problem, primitives)
+    urgency = _urgency(order, seconds)
+    workers = workers_of(problem)
+    slots: dict[int, Slot] = {}
+    running: list[Slot] = []
+    now = 0.0
+    while len(slots) < len(primitives):
+        for i in ready(order, primitives, workers, slots.keys(), [s.position for s in running], urgency, apart):
+            slot = Slot(primitives[i], i, worker_of(primitives[i], workers), now, now + seconds[i])
+            slots[i] = slot
+            running.append(slot)
+        now = min(slot.end for slot in running)
+        running = [slot for slot in running if slot.end > now]
+    return sorted(slots.values(), key=lambda slot: (slot.begin, slot.position))
+
+
+def ready(
+    order: Order,
+    primitives: Sequence[Step],
+    workers: Iterable[str],
+    begun: Iterable[int],
+    running: Sequence[int],
+    urgency: Mapping[int, float],
+    apart: Apart,
+) -> list[int]:
+    """Return the primitives that can begin now, the most urgent first, no two of them in each other's way."""
+    started, chosen = set(begun), list(running)
+    busy = {worker_of(primitives[i], workers) for i in running}
+    found = []
+    open_ = [
+        i for i in order if i not in started and all(p in started and p not in chosen for p in order.predecessors(i))
+    ]
+    for i in sorted(open_, key=lambda i: (-urgency[i], i)):
+        worker = worker_of(primitives[i], workers)
+        if worker not in busy and all(apart(primitives[i], primitives[other]) for other in chosen):
+            found.append(i)
+            chosen.append(i)
+            busy.add(worker)
+    return found
+
+
+def urgency_of(order: Order) -> dict[int, float]:
+    """Return for each primitive how many must still follow it, one after the other."""
+    return _urgency(order, dict.fromkeys(order, 1.0))
+
+
+def worker_of(step: Step, workers: Iterable[str]) -> str:
+    """Return who does a step: the first of its arguments that is a worker; nobody in particular if there is none."""
+    known = workers if isinstance(workers, frozenset) else frozenset(workers)
+    return next((argument for argument in step.arguments if argument in known), "")
+
+
+def makespan(slots: Sequence[Slot]) -> float:
+    """Return when the last primitive ends."""
+    return max((slot.end for slot in slots), default=0.0)
+
+
+def _urgency(order: Order, seconds: Mapping[int, float]) -> dict[int, float]:
+    """Return for each primitive how long it and the longest chain behind it take."""
+    found: dict[int, float] = {}
+    for i in reversed(list(networkx.topological_sort(order))):
+        found[i] = seconds[i] + max((found[j] for j in order.successors(i)), default=0.0)
+    return found
+
+
+def _done(problem: Problem, step: Step, state: State) -> dict[Symbol, str] | None:
+    return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
+
+
+def _needs(
+    problem: Problem,
+    primitives: Sequence[Step],
+    states: Sequence[State],
+    writes: Sequence[Mapping[Symbol, tuple[str | None, str]]],
+    i: int,
+    j: int,
+) -> bool:
+    """Whether primitive `j` must wait for the earlier `i`."""
+    if writes[i].keys() & writes[j].keys():
+        return True
+    live = {s: old for s, (old, new) in writes[i].items() if not any(s in writes[k] for k in range(i + 1, j))}
+    without = {s: v for s, v in {**states[j], **live}.items() if v is not None}
+    if not _same(problem, primitives[j], without, writes[j]):
+        return True
+    before = {**states[i], **{s: new for s, (_, new) in writes[j].items()}}
+    return not _same(problem, primitives[i], before, writes[i])
+
+
+def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:
+    """Whether a primitive is applicable in a state and has the effects that it has in the plan."""
+    after = _done(problem, step, state)
+    return after is not None and all(after.get(s) == new for s, (_, new) in writes.items())

@@ -1,0 +1,203 @@
+"""A physical world in which people interfere: the world that the executive acts in (`planner.acting`).
+
+Rule 1: an intervention acts on bodies: a cup that is moved is taken out of the hand, and what is in it goes with it.
+Rule 2: a primitive is stopped where it is as soon as something happens to what it concerns.
+Rule 3: a hand that stands where no fact names its position stands upright and is lifted before anything is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pybullet
+
+from planner.episode import Change, Intervention
+from planner.plan import Step
+from reasoner.embodiment import PerceiverUse
+from reasoner.symbols import Fact, State, Symbol
+from sim.bodies import KINDS, center_height, inner_radius, vessel_height
+from sim.perception import tilt_of
+from sim.skills import skill
+from sim.urdf import Array
+from sim.verdict import SkillError, Verdict
+from sim.world import Bead, Thing, World
+
+PAUSE = 60
+"""Simulation steps in which what was moved comes to rest."""
+
+
+class LiveWorld:
+    """A `World` that can be disturbed.
+
+    Parameters
+    ----------
+    world : World
+    classes : mapping of class to individuals
+        To give an object that is added the shape of one of its class.
+    """
+
+    def __init__(self, world: World, classes: Mapping[str, Sequence[str]]) -> None:
+        self.world, self.classes = world, classes
+        self.waiting: list[Intervention] = []
+        self.concerned: set[str] = set()
+        world.disturb = self._each_step
+
+    @property
+    def seconds(self) -> float:
+        """Simulated seconds since the world began."""
+        return self.world.seconds
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of what shall happen at a time."""
+        self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
+
+    def observe(self) -> State:
+        """Return the facts that are perceived now."""
+        seen = self.world.observe()
+        lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
+        for hand in sorted(lost):
+            self.retreat(hand)
+        return self.world.observe() if lost else seen
+
+    def execute(self, step: Step) -> Verdict:
+        """Carry out a primitive, or stop it when something happens to what it concerns."""
+        self.concerned = {*step.arguments, *step.bindings.values()}
+        held = [self.world.held(hand) for hand in step.arguments if hand in self.world.hands]
+        self.concerned |= {body for body in held if body is not None}
+        try:
+            return self.world.execute(step)
+        finally:
+            self.concerned = set()
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention happen now, and what it moved come to rest."""
+        self._interfere(intervention)
+        self.world.run(PAUSE)
+
+    def retreat(self, hand: str) -> None:
+        """Bring a hand upright and up, as far as that is possible."""
+        uses = {use.skill: use for use in self.world.embodiment.skills.values()}
+        upright = tilt_of(self.world.hands[hand].frame()[0]) < 0.1
+        for name in ("lift",) if upright else ("stand_upright", "lift"):
+            try:
+                if name in uses:
+                    skill(name)(self.world, {"hand": hand}, uses[name].numbers)
+            except SkillError:
+                return
+
+    # ------------------------------------------------------------------------------------------------- interfering
+
+    def _each_step(self, world: World) -> None:
+        happened = False
+        while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
+            intervention = self.waiting.pop(0)
+            self._interfere(intervention)
+            happened = happened or self._concerns(intervention)
+        if happened:
+            raise SkillError("interrupted", tuple(sorted(self.concerned)), "somebody interfered with what it concerns")
+
+    def _concerns(self, intervention: Intervention) -> bool:
+        named = {intervention.individual, *(f.symbol.arguments[0] for f in intervention.facts)}
+        named |= {fact.value for fact in intervention.facts}
+        return not named.isdisjoint(self.concerned)
+
+    def _interfere(self, intervention: Intervention) -> None:
+        if intervention.change is Change.REMOVE:
+            take_away(self.world, intervention.individual)
+        elif intervention.change is Change.ADD:
+            self._add(intervention)
+        else:
+            for fact in intervention.facts:
+                self._make_true(fact)
+
+    def _make_true(self, fact: Fact) -> None:
+        use = self.world.embodiment.perceivers.get(fact.symbol.situation)
+        if use is None or use.perceiver not in DISTURBERS:
+            raise ValueError(f"nobody can make {fact} true in this world by hand")
+        DISTURBERS[use.perceiver](self.world, use, fact.symbol, fact.value)
+
+    def _add(self, intervention: Intervention) -> None:
+        world, name = self.world, intervention.individual
+        models = [one for one in self.classes.get(intervention.kind, ()) if one in world.embodiment.bodies]
+        if not models:
+            raise ValueError(f"no {intervention.kind} of this scene has a shape that {name} could take")
+        model = world.embodiment.bodies[models[0]]
+        bodies = {**world.embodiment.bodies, name: replace(model, name=name)}
+        world.embodiment = replace(world.embodiment, bodies=bodies)
+        somewhere, upright = np.array([0.0, 0.0, -5.0]), np.array([0.0, 0.0, 0.0, 1.0])
+        body = KINDS[model.shape.kind].make(world.client, model.shape, somewhere, upright)
+        world.names[body], world.bodies[name] = name, Thing(body, model.shape)
+        world.symbols = [*world.symbols, *(fact.symbol for fact in intervention.facts)]
+        for fact in intervention.facts:
+            self._make_true(fact)
+
+
+def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+    """Put an object, and what is in it, at a place; a hand that holds it lets it go."""
+    name = symbol.arguments[0]
+    if value not in world.embodiment.places:
+        raise ValueError(f"{name} can't be put at '{value}': it has no position")
+    for hand in world.hands:
+        if world.held(hand) == name:
+            world.hands[hand].open()
+    beads = contents(world, name)
+    rotation, base = world.truth(name)
+    inside = [(world_position(world, bead) - base) @ rotation for bead in beads]
+    place = np.array(world.embodiment.places[value].position)
+    thing = world.bodies[name]
+    _set(world, thing.body, np.array([*place[:2], place[2] + center_height(thing.shape)]))
+    for bead, local in zip(beads, inside, strict=True):
+        _set(world, bead.body, place + local)
+
+
+def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+    """Empty a vessel, and fill it with something else unless that is nothing."""
+    for bead in contents(world, symbol.arguments[0]):
+        pybullet.removeBody(bead.body, physicsClientId=world.client)
+        world.beads.remove(bead)
+    if value != use.values.get("empty"):
+        world._pour_in(symbol.arguments[0], value)
+
+
+def take_away(world: World, name: str) -> None:
+    """Take an object, and what is in it, out of the world."""
+    for bead in contents(world, name):
+        pybullet.removeBody(bead.body, physicsClientId=world.client)
+        world.beads.remove(bead)
+    for hand in world.hands:
+        if world.held(hand) == name:
+            world.hands[hand].open()
+    thing = world.bodies.pop(name)
+    del world.names[thing.body]
+    pybullet.removeBody(thing.body, physicsClientId=world.client)
+
+
+def contents(world: World, vessel: str) -> list[Bead]:
+    """Return the beads inside a vessel."""
+    shape = world.bodies[vessel].shape
+    if shape.kind != "vessel" or not world.beads:
+        return []
+    rotation, base = world.truth(vessel)
+    local = (np.array([world_position(world, bead) for bead in world.beads]) - base) @ rotation
+    within = np.hypot(local[:, 0], local[:, 1]) < inner_radius(shape, local[:, 2]) + 0.001
+    within &= (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)
+    return [bead for bead, inside in zip(world.beads, within, strict=True) if inside]
+
+
+def world_position(world: World, bead: Bead) -> Array:
+    """Return where a bead is."""
+    return np.array(pybullet.getBasePositionAndOrientation(bead.body, physicsClientId=world.client)[0])
+
+
+def _set(world: World, body: int, position: Array) -> None:
+    pybullet.resetBasePositionAndOrientation(body, position.tolist(), [0, 0, 0, 1], physicsClientId=world.client)
+    pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], physicsClientId=world.client)
+
+
+DISTURBERS: Mapping[str, Callable[[World, PerceiverUse, Symbol, str], None]] = {
+    "perceive_place": move,
+    "perceive_content": fill,
+}
+"""By the perceiver that reads a situation type off the world: how a person makes a value true."""
