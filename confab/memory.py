@@ -1,40 +1,60 @@
-"""The memory at the front desk: load it, learn into it, save it, look at it."""
+"""The memory at the front desk: load it, learn into it, save it, merge it, look at it.
+
+One file holds both kinds of experience: the counts of lifted facts, from which the planner plans (`reasoner.experience`), and the
+paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.links`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.table import Table
 from planner.learning import LearningError
 from planner.learning import learn as learn_plan
-from planner.plan import Plan
+from planner.plan import Plan, Step
+from reasoner.experience import Decision, Experience
+from reasoner.files import write_whole
 from reasoner.graph import KnowledgeError
 from reasoner.links import Links
-from reasoner.memory import load_links, memory_names, save_links
+from reasoner.memory import links_text, load_links, memory_names
 from reasoner.names import Names
+from reasoner.remembering import FORMAT, new_replica, parse, probability, pull, push, turtle
 
 if TYPE_CHECKING:
     from confab.scene import Scene
+    from planner.guided import Memory as Advisor
+    from reasoner.symbols import Problem
+
+ENDPOINTS = ("http://", "https://")
 
 
 @dataclass
 class Memory:
-    """The paper's confabulation memory: links p(situated object instance | quantified behaviour).
+    """A confabulation memory.
 
     Attributes
     ----------
     links : Links
+        The paper's p(situated object instance | quantified behaviour).
     names : Names
-        Leads from the links' short names to IRIs.
+        Leads short names to IRIs.
     scene : str
         IRI of the scene that the memory file imports.
+    experience : Experience
+        Counts of what was chosen, passed over and failed, by lifted facts.
+    trusted : set of replica
+        Whose experience may lead: by default the replica that learns here. With any other, planning is strict.
     """
 
     links: Links
     names: Names
     scene: str
+    experience: Experience = field(default_factory=lambda: Experience(new_replica()))
+    trusted: set[str] = field(default_factory=set)
 
     @classmethod
     def of(cls, scene: Scene) -> Memory:
@@ -42,19 +62,46 @@ class Memory:
         return cls(Links(), scene.names, scene.iri)
 
     @classmethod
-    def load(cls, path: str | Path, scene: Scene | None = None) -> Memory:
-        """Read a memory file; with a scene, its terms go by the scene's short names.
+    def load(cls, source: str | Path, scene: Scene | None = None, trust: bool = False) -> Memory:
+        """Read a memory file, or the memories at a SPARQL endpoint.
+
+        Parameters
+        ----------
+        source : str or Path
+            File, or URL of an endpoint.
+        scene : Scene, optional
+            Its short names are used for the memory's terms.
+        trust : bool
+            Whether the experience of every replica may lead, not only of the one that learns into this file.
 
         Raises
         ------
         KnowledgeError
-            The file is missing or no memory.
+            The memory is missing, broken or newer than this program; the message says what to do.
         """
-        iri, names = (scene.iri, scene.names) if scene is not None else memory_names(Path(path))
-        return cls(load_links(Path(path), names), names, iri)
+        if str(source).startswith(ENDPOINTS):
+            names, iri = (scene.names, scene.iri) if scene is not None else (Names(()), str(source))
+            found = cls(Links(), names, iri, pull(str(source), names))
+        else:
+            path = Path(source)
+            iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path)
+            found = cls(load_links(path, names), names, iri)
+            text = path.read_text(encoding="utf-8")
+            if ":memoryFormat" in text or "core#memoryFormat" in text:
+                found.experience = parse(text, str(path), names)
+        if trust:
+            found.trusted.update(found.experience.episodes)
+        return found
 
-    def learn(self, scene: Scene, plan: Plan) -> None:
-        """Reinforce every behaviour of a plan that was carried out from the scene's initial situation (eq. 2).
+    def learn(self, scene: Scene, plan: Plan, failed: tuple[int, ...] | None = None) -> None:
+        """Learn from a plan that was carried out from the scene's initial situation.
+
+        Parameters
+        ----------
+        scene : Scene
+        plan : Plan
+        failed : path of a step, optional
+            The step that failed; what came before it worked, what comes after it wasn't tried.
 
         Raises
         ------
@@ -62,17 +109,38 @@ class Memory:
             The plan can't be done in that situation; nothing is learned then.
         """
         try:
-            self.links = learn_plan(scene.problem, plan, self.links)
+            lived = decisions_of(scene.problem, plan, failed)
+            if failed is None:
+                self.links = learn_plan(scene.problem, plan, self.links)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
+        self.experience.learn(lived)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the memory as Turtle, whole or not at all, and return where."""
-        save_links(Path(path), self.links, self.names, self.scene)
-        return Path(path)
+    def merge(self, other: Memory, trust: bool = False) -> None:
+        """Take in another memory's counts; with `trust`, they may lead. The paper's links can't be merged and stay as they are."""
+        self.experience.merge(other.experience)
+        if trust:
+            self.trusted.update(other.experience.episodes)
+
+    def save(self, target: str | Path) -> Path:
+        """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters."""
+        if str(target).startswith(ENDPOINTS):
+            push(str(target), self.experience, self.names, self.scene)
+            return Path(str(target))
+        links = [links_text(self.links, self.names, self.scene)] if len(self.links) else []
+        write_whole(Path(target), chain(turtle(self.experience, self.names, self.scene), links))
+        return Path(target)
+
+    @property
+    def advisor(self) -> Advisor:
+        """The memory as the fast planner takes it."""
+        from planner.guided import Memory as Advisor
+
+        mine = {self.experience.replica, *self.trusted}
+        return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
 
     def table(self, most: int | None = None) -> Table:
-        """Return the links, the most probable first."""
+        """Return the paper's links, the most probable first."""
         rows = [
             (f"{behavior} {' '.join(arguments)}", str(symbol), value, f"{p:.3f}")
             for (behavior, arguments), symbols in self.links.tables.items()
@@ -82,9 +150,65 @@ class Memory:
         rows.sort(key=lambda row: (-float(row[3]), row))
         return Table(("behaviour", "symbol", "value", "p(value | behaviour)"), tuple(rows[:most]))
 
+    def counts(self, most: int | None = None) -> Table:
+        """Return what was counted of single facts, what tells chosen from passed over first."""
+        from planner.judging import Sums
+
+        rows: list[tuple[float, tuple[str, ...]]] = []
+        behaviors: dict[str, Sums] = {}
+        for conclusion, patterns in self.experience.totals().items():
+            sums = behaviors.setdefault(conclusion.behavior, Sums())
+            for pattern, tally in patterns.items():
+                sums.add(pattern, tally.chosen, tally.passed_over + tally.failed)
+        for behavior, sums in behaviors.items():
+            for fact, values in sums.facts.items():
+                for value, (c, p) in values.items():
+                    share = (
+                        f"{c / sums.chosen if sums.chosen else 0:.2f}",
+                        f"{p / sums.passed if sums.passed else 0:.2f}",
+                    )
+                    rows.append((sums.relevance(fact), (behavior, fact, value, f"{c:g}", f"{p:g}", *share)))
+        rows.sort(key=lambda row: (-row[0], row[1]))
+        columns = ("behaviour", "fact", "value", "chosen", "not", "p(value | chosen)", "p(value | not)", "relevance")
+        return Table(columns, tuple((*row, f"{relevance:.2f}") for relevance, row in rows[:most]))
+
     def __repr__(self) -> str:
         """Return how much was learned."""
-        return f"Memory({len(self.links)} links of {len(self.links.tables)} behaviours in {self.scene})"
+        episodes = sum(self.experience.episodes.values())
+        return (
+            f"Memory({len(self.links)} links of {len(self.links.tables)} behaviours, {len(self.experience)} counters of "
+            f"{episodes} episodes by {len(self.experience.episodes)} replicas, in {self.scene})"
+        )
 
     def _repr_html_(self) -> str:
-        return f"<p>{self!r}</p>" + self.table(20)._repr_html_()
+        return f"<p>{self!r}</p>" + self.counts(20)._repr_html_() + self.table(20)._repr_html_()
+
+
+def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = None) -> list[Decision]:
+    """Return the decisions of a plan: of its first level, and of the next one seen as a problem of its own.
+
+    Raises
+    ------
+    LearningError
+        A step's preconditions don't hold where it is done.
+    """
+    from planner.compiling import Program
+    from planner.deciding import Ground, decisions, single_level
+
+    found: list[Decision] = []
+    tops: Sequence[Step] = plan.steps
+    for level in problem.domain.levels[:2]:
+        steps = [step for step in plan.walk() if step.level == level]
+        if any(step.level > level for step in tops):
+            continue  # part of the plan was made without this level
+        at = None
+        if failed is not None:
+            at = next((i for i, step in enumerate(steps) if failed[: len(step.path)] == step.path), None)
+        grounds: list[Ground] = [(step.behavior, step.arguments) for step in steps]
+        within = single_level(problem, level)
+        if grounds:
+            found += decisions(Program(within), within, level, grounds, at)
+    return found
+
+
+__all__ = ["FORMAT", "Memory", "decisions_of", "probability"]

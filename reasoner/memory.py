@@ -13,18 +13,20 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph import CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into, text
+from reasoner.graph import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, text
 from reasoner.links import Links
 from reasoner.names import Names
+from reasoner.remembering import LINE
 from reasoner.symbols import FALSE, TRUE, Symbol
 
 ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
 ASSERTED = """
 SELECT DISTINCT ?node ?property ?value WHERE {
-  VALUES ?kind { :GroundBehavior :SituatedObjectInstance } ?node a ?kind ; ?property ?value
+  VALUES ?kind { :GroundBehavior :SituatedObjectInstance :Counter } ?node a ?kind ; ?property ?value
 } ORDER BY ?node ?property ?value"""
 ANNOTATED = """
 SELECT ?behavior ?fact ?probability WHERE {
+  ?behavior a :GroundBehavior .
   ?axiom owl:annotatedProperty :associatedWith ; owl:annotatedSource ?behavior ; owl:annotatedTarget ?fact ;
     :probability ?probability .
 } ORDER BY ?behavior ?fact"""
@@ -97,11 +99,25 @@ def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
     write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
 
+def links_text(links: Links, names: Names, scene: str) -> str:
+    """Return the links as N-Triples, without the head of a file of their own."""
+    iri = f"{scene.rstrip('#/')}.memory"
+    triples = [t for t in _triples(links, names, scene, iri) if t.subject != ox.NamedNode(iri)]
+    return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
+
+
 def _graph(path: Path) -> KnowledgeGraph:
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
-    graph = KnowledgeGraph("")
-    read_into(graph, path, "memory")
+    graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
+    try:
+        rest = LINE.sub("", path.read_text(encoding="utf-8"))  # without the links of the counts
+        triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
+        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
+    except (SyntaxError, UnicodeDecodeError) as error:
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+    except OSError as error:
+        raise KnowledgeError(f"{path}: can't be read: {error.strerror or error}") from error
     return graph
 
 

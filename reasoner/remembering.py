@@ -29,6 +29,7 @@ from reasoner.names import Names
 FORMAT = 2
 SPACE = "https://w3id.org/confab/memory#"
 ROLES = ("about", *(f"argument{position}" for position in range(2, 10)))
+TALLY = ("chosen", "passedOver", "failed")
 PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
 
 HEAD = """@prefix : <{core}> .
@@ -188,9 +189,11 @@ def _experience(
         for node in nodes.values():
             if "episodes" in node:
                 experience.episodes[node["replica"]] = int(node["episodes"])
-            if "annotatedSource" in (node := {key.rsplit("#", 1)[-1]: value for key, value in node.items()}):
-                tally = Tally(*(int(node.get(key, "0")) for key in ("chosen", "passedOver", "failed")))
-                links.append((_local(node["annotatedSource"]), _local(node["annotatedTarget"]), tally))
+            if "chosen" in node:  # the paper's links have a probability alone
+                counter, pattern = (
+                    _local(node[PREFIXES["owl"] + end]) for end in ("annotatedSource", "annotatedTarget")
+                )
+                links.append((counter, pattern, Tally(*(int(node.get(key, "0")) for key in TALLY))))
         counters = {key: _meaning(node, names) for key, node in nodes.items() if "epoch" in node}
         patterns = {key: _facts(node["facts"]) for key, node in nodes.items() if "facts" in node}
         for counter, pattern, tally in links:
