@@ -29,7 +29,7 @@ from reasoner.symbols import Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
-IMPROVEMENTS = 4
+IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
 STATES_PER_EXPANSION = 10
 """Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""

@@ -42,11 +42,15 @@ class UnsolvableError(Exception):
 
 @dataclass
 class Compiled:
-    """What can be kept between calls on problems with the same domain, individuals and static facts."""
+    """What can be kept between calls on problems with the same domain, individuals and static facts.
+
+    `replay` can be switched off, to see what templates are worth.
+    """
 
     program: Program
     templates: dict[str, list[Template]] = field(default_factory=dict)
     shapes: dict[object, Template | None] = field(default_factory=dict)
+    replay: bool = True
 
 
 def compiled(problem: Problem) -> Compiled:
@@ -67,6 +71,7 @@ class Call:
         self.table = Table(problem.domain.situations, problem.initial)
         self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
         self.refiner = Refiner(self.segments, using.templates)
+        self.refiner.use_templates = using.replay
         self.kept: dict[Cell, str] = {}
         self.steps: list[Done] = []
         self.fallbacks = 0

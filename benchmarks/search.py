@@ -1,0 +1,358 @@
+"""The fast planner: scale, peers, lengths, random tables against exhaustion, and what each part contributes.
+
+    python -m benchmarks search
+    CONFAB_SEARCH=scale,random …     some of: scale, peers, lengths, random, parts, hands
+    CONFAB_TABLES=2000 …             so many random tables (200 if not given)
+
+Seconds are CPU seconds, which a busy machine changes little; medians of several runs. Nothing here was looked at while the
+planner was developed with other seeds than those below 60,000: random tables come from seeds 1,000,000 on, families from 100 on.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import log
+from pathlib import Path
+from statistics import mean, median
+from time import process_time
+from typing import Any
+
+from benchmarks.pddl import peers, planners, run
+from planner.exhaust import Space, TooLargeError
+from planner.fast import Compiled, compiled, plan
+from planner.flat import plan_level
+from planner.plan import Limits, Outcome, Status
+from planner.segments import Ground, Segments
+from planner.validation import validate
+from reasoner.generate import write_scene
+from reasoner.graph import load
+from reasoner.pddl_export import to_pddl
+from reasoner.reading import read
+from reasoner.symbols import Domain, Problem
+from tests.planner.families import random_table
+
+FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
+SEED, TABLES = 100, 1_000_000
+LENGTHS = Path(__file__).with_name("lengths.json")
+
+
+def main() -> None:
+    """Print the tables; exit with an error if a family falls back, a plan is wrong or a proof false."""
+    sections: dict[str, Callable[[], None]] = {
+        "scale": scale,
+        "hands": hands,
+        "peers": beside_peers,
+        "lengths": lengths,
+        "random": random_tables,
+        "parts": parts,
+    }
+    for name in os.environ.get("CONFAB_SEARCH", ",".join(sections)).split(","):
+        print(f"\n### {name}\n", flush=True)
+        sections[name]()
+
+
+def scene(family: str, n: int, hands: int = 2, seed: int = SEED) -> tuple[Problem, float]:
+    """Return a generated scene as a problem, and the seconds that reading it takes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{family}-{n}.ttl"
+        write_scene(path, family, n, hands, 0, seed)
+        begin = process_time()
+        problem = read(load(str(path))).problem
+        return problem, process_time() - begin
+
+
+def timed(function: Callable[[], Any], runs: int = 5) -> tuple[Any, float]:
+    """Return a function's result and the median seconds of some runs."""
+    seconds = []
+    for _ in range(runs):
+        gc.collect()
+        begin = process_time()
+        result = function()
+        seconds.append(process_time() - begin)
+    return result, median(seconds)
+
+
+def check(problem: Problem, outcome: Outcome, what: str, easy: bool = True) -> None:
+    """Stop the benchmark if a plan isn't one, or an easy family needed a lower level."""
+    if outcome.plan is None or validate(problem, outcome.plan):
+        sys.exit(f"{what}: {outcome.status.value}, not a valid plan: {outcome.reason}")
+    if easy and outcome.fallbacks:
+        sys.exit(f"{what}: {outcome.fallbacks} fallbacks, where there should be none")
+
+
+def scale() -> None:
+    """Plan served tables of growing size, in process; each plan from templates learned in the same call."""
+    python = peers_with_gtpyhop()
+    print(
+        "| n | read ms | compile ms | plan ms | improved ms | steps 1/2/3 | improved | expansions 1/2/3 | GTPyhop ms | its steps |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    plans: dict[int, float] = {}
+    for n in (4, 10, 20, 50, 100, 200, 1000, 10_000):
+        problem, reading = scene("served", n)
+        runs = 9 if n <= 200 else 3 if n <= 1000 else 1
+        program, compiling = timed(lambda problem=problem: compiled(problem), runs)
+        first, seconds = timed(
+            lambda problem=problem, program=program: plan(problem, improve=0, using=Compiled(program.program)), runs
+        )
+        better, improving = timed(
+            lambda problem=problem, program=program: plan(problem, using=Compiled(program.program)), runs
+        )
+        if n <= 1000:
+            check(problem, first, f"served {n}")
+            check(problem, better, f"served {n} improved")
+        plans[n] = seconds
+        peer_seconds, peer_steps = gtpyhop(python, problem) if n <= 1000 else ("", "")
+        steps = "/".join(str(first.plan.length[level]) for level in (1, 2, 3))
+        expansions = "/".join(str(count.expanded) for count in first.search.values())
+        print(
+            f"| {n} | {reading * 1e3:.0f} | {compiling * 1e3:.1f} | {seconds * 1e3:.2f} | {improving * 1e3:.1f} | {steps} | "
+            f"{len(better.plan.primitives)} | {expansions} | {peer_seconds} | {peer_steps} |",
+            flush=True,
+        )
+    exponent = log(plans[10_000] / plans[50]) / log(10_000 / 50)
+    print(f"\ngrowth exponent of planning from 50 to 10,000: {exponent:.2f}")
+
+
+def hands() -> None:
+    """Plan all families up to n = 50, and with more hands."""
+    print("| family | hands | n | plan ms | steps 1/2/3 | expansions 1/2/3 | fallbacks |")
+    print("|---|---|---|---|---|---|---|")
+    cases = [(family, 2, n) for family in FAMILIES for n in (4, 10, 20, 50)]
+    cases += [(family, number, n) for family in ("served", "swap", "rotate") for number in (4, 8) for n in (20, 50)]
+    for family, number, n in cases:
+        problem, _ = scene(family, n, number)
+        program = compiled(problem)
+        outcome, seconds = timed(
+            lambda problem=problem, program=program: plan(problem, improve=0, using=Compiled(program.program)), 3
+        )
+        check(problem, outcome, f"{family} {n}", easy=family != "full")
+        steps = "/".join(str(outcome.plan.length.get(level, 0)) for level in (1, 2, 3))
+        expansions = "/".join(str(count.expanded) for count in outcome.search.values())
+        print(
+            f"| {family} | {number} | {n} | {seconds * 1e3:.1f} | {steps} | {expansions} | {outcome.fallbacks} |",
+            flush=True,
+        )
+
+
+# -------------------------------------------------------------------------------------------------------------- peers
+
+
+def peers_with_gtpyhop() -> str:
+    """Return the peers' Python, with gtpyhop in it."""
+    python = peers()
+    if subprocess.run([python, "-c", "import gtpyhop"], capture_output=True, check=False).returncode:
+        subprocess.run([python, "-m", "pip", "install", "-q", "gtpyhop"], check=True)
+    return python
+
+
+def gtpyhop(python: str, problem: Problem) -> tuple[str, str]:
+    """Return the milliseconds and steps that GTPyhop takes with hand-written methods."""
+    at = {s.arguments[0]: v for s, v in problem.initial.items() if s.situation == "LOCATION"}
+    drinks = {s.arguments[0]: v for s, v in problem.initial.items() if s.situation == "BEVERAGE"}
+    reach: dict[str, list[str]] = {}
+    for hand, place in sorted(problem.relations["canReach"]):
+        reach.setdefault(hand, []).append(place)
+    goals = {s.arguments[0]: v for s, v in problem.goal.items() if s.situation == "LOCATION"}
+    pours = {s.arguments[0]: v for s, v in problem.goal.items() if s.situation == "BEVERAGE"}
+    table = {
+        "at": at,
+        "drinks": {o: None if v == "no_beverage" else v for o, v in drinks.items()},
+        "reach": reach,
+        "goals": goals,
+        "pours": pours,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "table.json"
+        path.write_text(json.dumps(table))
+        script = Path(__file__).with_name("_gtpyhop_tabletop.py")
+        try:
+            done = subprocess.run(
+                [python, script, path], capture_output=True, text=True, timeout=120, check=False
+            ).stdout.split()[-2:]
+        except subprocess.TimeoutExpired:
+            done = []
+    return (f"{float(done[0]) * 1e3:.1f}", done[1]) if len(done) == 2 else ("–", "–")
+
+
+def beside_peers() -> None:
+    """Run whole processes on the flat primitive problem, 30 s of CPU each."""
+    commands = planners(peers_with_gtpyhop())
+    print("| n | confab plan | its steps | lama-first | its steps | pyperplan gbf hff | its steps |")
+    print("|---|---|---|---|---|---|---|")
+    for n in (4, 10, 20, 50, 100):
+        row = [str(n)]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"served-{n}.ttl"
+            write_scene(path, "served", n, 2, 0, SEED)
+            problem = read(load(str(path))).problem
+            ours = [sys.executable, "-m", "confab.cli", "plan", str(path), "--json"]
+            found = run(ours, path, path)
+            length = json.loads(found.output[found.output.index("{") :])["length"]["3"] if "{" in found.output else "–"
+            row += [f"{found.seconds:.2f} s", str(length)]
+            exported = to_pddl(problem)
+            domain, file = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
+            domain.write_text(exported.domain)
+            file.write_text(exported.problem)
+            for name in ("lama-first", "pyperplan"):
+                peer = run(commands[name], domain, file)
+                row += [f"{peer.seconds:.2f} s" if peer.plan else "–", str(len(peer.plan)) if peer.plan else "–"]
+        print(f"| {' | '.join(row)} |", flush=True)
+
+
+# ------------------------------------------------------------------------------------------------------------- lengths
+
+
+def lengths() -> None:
+    """Compare the primitives of the first and of the improved plan, with the best length known (`lengths.json`, with its source)."""
+    known: dict[str, dict[str, Any]] = json.loads(LENGTHS.read_text()) if LENGTHS.exists() else {}
+    print("| family | n | first | improved | improved ms | best known | source | ratio |")
+    print("|---|---|---|---|---|---|---|---|")
+    ratios = []
+    for family in FAMILIES:
+        for n in (4, 10, 20, 50):
+            problem, _ = scene(family, n)
+            program = compiled(problem)
+            first = plan(problem, improve=0, using=Compiled(program.program))
+            better, seconds = timed(
+                lambda problem=problem, program=program: plan(problem, using=Compiled(program.program)), 1
+            )
+            check(problem, better, f"{family} {n}", easy=False)
+            best = known.get(f"{family} {n}")
+            length = len(better.plan.primitives)
+            ratio = length / best["length"] if best else None
+            ratios += [ratio] if ratio else []
+            print(
+                f"| {family} | {n} | {len(first.plan.primitives) if first.plan else '–'} | {length} | {seconds * 1e3:.0f} | "
+                f"{best['length'] if best else '–'} | {best['source'] if best else '–'} | {f'{ratio:.2f}' if ratio else '–'} |",
+                flush=True,
+            )
+    if ratios:
+        print(f"\nmean ratio {mean(ratios):.3f}, largest {max(ratios):.2f}")
+
+
+# -------------------------------------------------------------------------------------------------------- random tables
+
+
+def random_tables() -> None:
+    """Plan random tables with at least a thousand reachable states, against exhaustive search of the primitive level."""
+    wanted = int(os.environ.get("CONFAB_TABLES", "200"))
+    found: Counter[str] = Counter()
+    seconds, sizes, over = [], [], []
+    for problem in tables(wanted):
+        begin = process_time()
+        outcome = plan(problem)
+        seconds.append(process_time() - begin)
+        truth = Space(problem, problem.domain.levels[-1]).search(10**6 + 1)
+        sizes.append(truth.states)
+        found[f"{'solvable' if truth.steps is not None else 'unsolvable'}, {outcome.status.value}"] += 1
+        if (outcome.status is Status.SOLVED) != (truth.steps is not None) and outcome.status is not Status.GAVE_UP:
+            sys.exit(f"a false answer: {outcome.status.value}, {outcome.reason}")
+        if outcome.plan is not None:
+            check(problem, outcome, "random table", easy=False)
+            over.append(len(outcome.plan.primitives) / max(len(truth.steps or ()), 1))
+    for what, number in sorted(found.items()):
+        print(f"{what}: {number}")
+    print(f"states searched for the truth: {min(sizes)} to {max(sizes)}, median {median(sizes):.0f}")
+    print(f"seconds per table: median {median(seconds):.4f}, largest {max(seconds):.2f}")
+    print(f"length over the shortest of the lowest level: mean {mean(over):.2f}, largest {max(over):.2f}")
+
+
+def tables(wanted: int) -> Iterator[Problem]:
+    """Yield random tables of which 10³ to 10⁶ states can be reached without regard to the goal, a third of them unsolvable."""
+    seed, solvable, unsolvable = TABLES, 0, 0
+    while solvable + unsolvable < wanted:
+        seed += 1
+        problem = random_table(seed)
+        level = problem.domain.levels[-1]
+        goal = next(iter(problem.goal))
+        try:
+            states = Space(replace(problem, goal={goal: "nowhere"}), level).search(10**6).states
+            if states < 1000:
+                continue
+            possible = Space(problem, level).search(10**6 + 1).steps is not None
+        except TooLargeError:
+            continue
+        if possible and solvable < round(wanted * 0.68):
+            solvable += 1
+            yield problem
+        elif not possible:
+            unsolvable += 1
+            yield problem
+
+
+# --------------------------------------------------------------------------------------------------------------- parts
+
+
+class Everything(Segments):
+    """Segments without relevance: whatever is applicable is tried, in the order of the IDs."""
+
+    def relevant(self, level: int, off: Any, depth: int) -> Iterator[Ground]:
+        """Yield every applicable behaviour."""
+        from planner.behaviors import ground
+
+        cache = self.__dict__.setdefault("grounds", {})
+        if level not in cache:
+            cache[level] = [(g.behavior, g.arguments) for g in ground(self.program.problem, level)]
+        yield from (g for g in cache[level] if self.forward[g[0]](*g[1]) is not None)
+
+    def nearest(self, level: int, cell: Any, value: str, effort: Any, found: dict[Ground, None]) -> int:
+        """Count what is off, and add every applicable behaviour."""
+        found.update(dict.fromkeys(self.relevant(level, {}, 1)))
+        return 1
+
+
+def parts() -> None:
+    """Switch each part off in turn, 20 s each, to see what it contributes."""
+    import planner.serialise
+
+    print("| family | n | without | status | CPU ms | expansions 1/2/3 | primitives |")
+    print("|---|---|---|---|---|---|---|")
+    for family in ("served", "swap"):
+        for n in (4, 10, 50):
+            problem, _ = scene(family, n)
+            limits = Limits(seconds=20)
+
+            def without_levels(problem: Problem = problem, limits: Limits = limits) -> Outcome:
+                level = problem.domain.levels[-1]
+                only = {b.name: b for b in problem.domain.at_level(level)}
+                flat = Domain(problem.domain.situations, only, problem.domain.first_ids)
+                return plan(replace(problem, domain=flat), limits=limits, improve=0)
+
+            def without_relevance(problem: Problem = problem, limits: Limits = limits) -> Outcome:
+                kept = planner.serialise.Segments
+                planner.serialise.Segments = Everything  # type: ignore[misc]
+                try:
+                    return plan(problem, limits=limits, improve=0)
+                finally:
+                    planner.serialise.Segments = kept  # type: ignore[misc]
+
+            def without_templates(problem: Problem = problem, limits: Limits = limits) -> Outcome:
+                return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, replay=False))
+
+            def flat_search(problem: Problem = problem, limits: Limits = limits) -> Outcome:
+                return plan_level(problem, limits=limits)
+
+            variants: dict[str, Callable[[], Outcome]] = {
+                "nothing": lambda problem=problem, limits=limits: plan(problem, limits=limits, improve=0),  # type: ignore[misc]
+                "cached refinements": without_templates,
+                "relevance": without_relevance,
+                "levels": without_levels,
+                "levels and goal order (flat h_FF)": flat_search,
+            }
+            for name, variant in variants.items():
+                outcome, seconds = timed(variant, 1)
+                expansions = "/".join(str(count.expanded) for count in outcome.search.values())
+                length = len(outcome.plan.primitives) if outcome.plan else "–"
+                print(
+                    f"| {family} | {n} | {name} | {outcome.status.value} | {seconds * 1e3:.1f} | {expansions} | {length} |",
+                    flush=True,
+                )
