@@ -8,7 +8,8 @@ docs/quantification.md, the test in tests/reasoner/test_recognition.py). Two ste
    terms are reached from that object: forward over a value (the object is at a place), over a static relation (a hand
    reaches the place), or backward from a value (what else is at the place). A term that nothing leads to has to be looked
    for among all individuals of its class.
-2. `recognise` starts from what the goal names and follows the routes in the graph, a round of them per query.
+2. `recognise` starts from what the goal names and follows the routes in the graph, a round of them per query, until nothing
+   new comes: the slice widens until nothing outside can help, so a task that has no plan in it has none.
 """
 
 from __future__ import annotations
@@ -28,17 +29,14 @@ from reasoner.reading import (
     Reading,
     Schema,
     frame,
-    read,
     read_schema,
     reading_of,
-    with_goals,
 )
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     Condition,
-    Problem,
     RelationCondition,
     ValueCondition,
     Witness,
@@ -101,17 +99,6 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     bounds = routes(frame(schema, search.members()), schema, [goal.split()[1] for goal in goals if " " in goal.strip()])
     search.close(seeds | constants, constants, bounds)
     return reading_of(graph.scene, schema, search.individuals(bounds), whole=False)
-
-
-def readings(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Iterator[tuple[Reading, Problem]]:
-    """Yield ever wider readings of a scene, each with its problem: what the task can need, then the whole world.
-
-    Since the slice is closed, the second is asked for only by somebody who doubts the first.
-    """
-    narrow = recognise(graph, goals)
-    yield narrow, with_goals(narrow, goals)
-    wide = read(graph)
-    yield wide, with_goals(wide, goals)
 
 
 # ------------------------------------------------------------------------------------------------- 1. what leads to what
@@ -412,18 +399,13 @@ def _values(iris: Iterable[str]) -> str:
 
 
 def _constants(schema: Schema) -> set[str]:
-    """Return the individuals that the schema names: in conditions and effects, and as rest and default values."""
+    """Return what the schema names: in conditions, effects and definitions of classes, and as rest and default values."""
+    goals = _goal_conditions(schema)
     names = (*ARGUMENTS, CORE + "restValue", CORE + "defaultValue")
-    found = {v for node in schema.nodes.values() for name in names for v in node.get(name, ()) if v not in schema.nodes}
-    goal_only = _goal_individuals(schema)
-    behaviors = {
-        v
-        for iri, node in schema.nodes.items()
-        if iri not in _goal_conditions(schema)
-        for name in names
-        for v in node.get(name, ())
-    }
-    return (found - (goal_only - behaviors)) | {CORE + "true", CORE + "false"}
+    found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
+    named = (PREFIXES["owl"] + "hasValue", PREFIXES["rdf"] + "first")
+    found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}
+    return (found - set(schema.nodes)) | {CORE + "true", CORE + "false"}
 
 
 def _goal_conditions(schema: Schema) -> set[str]:
