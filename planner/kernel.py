@@ -5,15 +5,19 @@ Worth it from about two thousand operators on; numba comes with the extra ``fast
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 import numpy as np
-from numba import njit
 
 from planner.relaxed import Evaluate, Evaluation
 from planner.task import Grouped, Task
 
 
 def heuristic(task: Task) -> Evaluate:
-    """Return h_FF of a task, as a function of a state."""
+    """Return h_FF of a task, as a function of a state; raises `ImportError` without numba."""
+    relax = _compiled()
     operators, size = len(task), task.size
     owners = np.array(task.owners, np.int64)
     needs, adds = task.needs, task.adds
@@ -30,7 +34,7 @@ def heuristic(task: Task) -> Evaluate:
     def evaluate(state: int) -> Evaluation:
         packed = np.frombuffer(state.to_bytes(number_of_bytes, "little"), np.uint8)
         bits = np.flatnonzero(np.unpackbits(packed, bitorder="little"))
-        found, layers, applicable, solved = _relax(bits, missing, step, owners, always, goal, operators, size, *arrays)
+        found, layers, applicable, solved = relax(bits, missing, step, owners, always, goal, operators, size, *arrays)
         if not solved:
             return None
         chosen = sorted(zip(layers.tolist(), found.tolist(), strict=True))
@@ -39,7 +43,15 @@ def heuristic(task: Task) -> Evaluate:
     return evaluate
 
 
-@njit(cache=True)
+@cache
+def _compiled() -> Callable[..., Any]:
+    """Compile the kernel; numba is imported here, since that alone takes a third of a second."""
+    from numba import njit
+
+    compiled: Callable[..., Any] = njit(cache=True)(_relax)
+    return compiled
+
+
 def _relax(  # type: ignore[no-untyped-def]
     bits,
     missing,
