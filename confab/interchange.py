@@ -87,7 +87,7 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
             raise KnowledgeError(f"{where}: '{argument}' is no {parameter.kind}{nearest(argument, members)}")
     return Step(
         path=position,
-        id=problem.id_of(behavior.name, arguments),
+        id=data["id"] if isinstance(data.get("id"), int) else problem.id_of(behavior.name, arguments),
         level=behavior.level,
         behavior=behavior.name,
         arguments=arguments,

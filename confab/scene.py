@@ -180,8 +180,9 @@ class Scene:
         memory : Memory, or Links alone in paper mode; optional
             What was learned before; none if left out.
         mode : str
-            ``paper``: A* with eq. (5) on each level. ``guarded`` and ``strict``: the fast planner, and how far experience
-            may lead it.
+            ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded`` and
+            ``strict``: the fast planner over what the task can need, and how far experience may lead it; behaviours are then
+            numbered among the individuals that were recognised.
         time_limit : float, optional
             Seconds after which the call gives up.
 
@@ -194,12 +195,12 @@ class Scene:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
         limits = Limits(seconds=time_limit)
         begin, asked, goals = perf_counter(), self.knowledge.round_trips, list(goals)
-        problem = with_goals(recognise(self.knowledge, goals), goals)
         if mode == "paper":
-            from planner.behaviors import ground
             from planner.refinement import plan as paper_plan
+            from reasoner.quantify import quantify
 
-            grounds = {level: ground(problem, level) for level in problem.domain.levels}
+            problem = with_goals(self.reading, goals)
+            grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
             quantified = perf_counter() - begin
             links = memory if isinstance(memory, Links) or memory is None else memory.links
             outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
@@ -207,6 +208,7 @@ class Scene:
             from planner.fast import compiled
             from planner.guided import plan as guided_plan
 
+            problem = with_goals(recognise(self.knowledge, goals), goals)
             using = compiled(problem)
             quantified = perf_counter() - begin
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
