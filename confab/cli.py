@@ -61,14 +61,23 @@ def plan(
     no_memory: NoMemory = False,
     mode: Mode = "guarded",
     time_limit: TimeLimit = None,
+    diff: Annotated[
+        str | None, typer.Option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
     from confab.scene import load
 
     loaded = load(scene)
+    if diff is not None:
+        from confab.authoring import difference
+
+        changed = difference(load(diff), loaded, mode)
+        _print(changed.json() if as_json else str(changed))
+        raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
-    result = loaded.plan(goal or (), remembered.links if remembered else None, mode, time_limit)
+    result = loaded.plan(goal or (), remembered, mode, time_limit)
     _print(result.json() if as_json else result)
     raise typer.Exit(EXIT[result.outcome.status.value])
 
@@ -212,6 +221,36 @@ def learn(
 
 
 @app.command()
+def new(
+    domain: Annotated[str, typer.Argument(metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")],
+    folder: Annotated[
+        Path | None, typer.Option("--folder", metavar="DIR", help="Where to write; default: DOMAIN.")
+    ] = None,
+) -> None:
+    """Begin a domain of your own: a commented skeleton that validates and can be planned in."""
+    from confab.authoring import new_domain
+
+    files = new_domain(domain, folder or Path(domain))
+    scene = next(file for file in files if file.stem.endswith("-scene"))
+    _print("\n".join([*map(str, files), f"next: confab validate {scene}; confab plan {scene}; docs/authoring.md"]))
+
+
+memory_app = typer.Typer(help="Look after a memory file.", no_args_is_help=True)
+app.add_typer(memory_app, name="memory")
+
+
+@memory_app.command()
+def migrate(
+    memory: Annotated[Path, typer.Argument(metavar="MEMORY", help="Memory file; it is replaced as a whole.")],
+    renames: Annotated[list[str], typer.Argument(metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")],
+) -> None:
+    """Rename terms in a memory, so that what was learned of them isn't lost."""
+    from confab.authoring import migrate as rename
+
+    _print(f"{memory}: {rename(memory, renames)} statements changed")
+
+
+@app.command()
 def validate(
     files: Annotated[list[str], typer.Argument(metavar="FILE…", help="Ontology files, or names of shipped scenes.")],
     deep: Annotated[bool, typer.Option("--deep", help="Ask HermiT for contradictions as well; needs Java.")] = False,
@@ -226,6 +265,72 @@ def validate(
     else:
         _print("\n".join(map(str, findings)) or "nothing is wrong")
     raise typer.Exit(NO if findings else YES)
+
+
+@app.command()
+def explain(
+    scene: SceneName,
+    goal: Goals = None,
+    memory: MemoryFile = None,
+    step: Annotated[int, typer.Option(metavar="N", help="Which step of the level, counted from 0.")] = 0,
+    level: Annotated[int, typer.Option(metavar="L", help="On which level of the plan.")] = 1,
+    against: Annotated[
+        str | None, typer.Option(metavar="BEHAVIOR", help="The alternative, e.g. 'B2_PICK right_hand cup1'.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the reasons: PNG, SVG or PDF.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say why this behaviour was chosen and not that one; or why there is no plan."""
+    from confab.explaining import explain as explain_step
+    from confab.scene import load
+
+    loaded = load(scene)
+    remembered = _memory(memory, False, loaded)
+    result = loaded.plan(goal or (), remembered)
+    if not result.solved or remembered is None:
+        if result.solved:
+            raise KnowledgeError("there is a plan; to explain a choice in it, give the --memory that made it")
+        _print(result.json() if as_json else result)
+        raise typer.Exit(EXIT[result.outcome.status.value])
+    steps = [(s.behavior, s.arguments) for s in result.plan.at_level(level)]
+    words = against.split() if against else None
+    other = (words[0], tuple(words[1:])) if words else None
+    found = explain_step(result.problem, remembered, steps, step, other)
+    if plot is not None:
+        found.plot(plot)
+    _print(found.json() if as_json else str(found))
+
+
+@memory_app.command()
+def show(
+    memory: Annotated[str, typer.Argument(metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")],
+    most: Annotated[int, typer.Option(metavar="N", help="So many rows.")] = 30,
+    as_json: AsJson = False,
+) -> None:
+    """Show what a memory has counted, what discriminates first."""
+    from confab.memory import Memory
+
+    loaded = Memory.load(memory)
+    if as_json:
+        _print({"memory": memory, "summary": repr(loaded), "counts": loaded.counts(most).records()})
+    else:
+        _print(repr(loaded))
+        _print(loaded.counts(most))
+
+
+@memory_app.command()
+def merge(
+    memories: Annotated[list[str], typer.Argument(metavar="FILE_OR_URL…", help="Memories to merge.")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The merged memory; may be one of them.")],
+) -> None:
+    """Merge memories: the counts of each replica, in any order, once or many times."""
+    from confab.memory import Memory
+
+    merged = Memory.load(memories[0])
+    for source in memories[1:]:
+        merged.merge(Memory.load(source))
+    merged.save(out)
+    _print(f"{out}: {merged!r}")
 
 
 @app.command()
@@ -253,6 +358,11 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
+    if path is not None and path.is_file():
+        from confab.authoring import unknown_terms
+
+        for term in unknown_terms(path, scene.knowledge):
+            print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
     return Memory.load(path, scene) if path is not None else None
 
 

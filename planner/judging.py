@@ -24,7 +24,9 @@ from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tall
 
 ALPHA = 1.0  # how much the class above weighs in a probability
 KAPPA = 2.0  # how much L weighs against counts of the same pattern
+CAUTION = 4.0  # with which individuals are told apart: by few choices, not at all
 DECAY = 0.9  # per episode, of what was preferred among equals
+TOGETHER = "all of this together"
 LEAST = 1e-3  # a fact of less relevance isn't looked at
 
 
@@ -63,8 +65,10 @@ class Sums:
         return self.weights[fact]
 
 
-def relevance(pairs: Sequence[tuple[float, float]]) -> float:
+def relevance(pairs: Sequence[tuple[float, float]], caution: float = 1.0) -> float:
     """Return the Jensen–Shannon divergence of two distributions given as counts, less its small-sample bias, in [0, 1].
+
+    `caution` multiplies the bias.
 
     >>> relevance([(50, 0), (0, 50)]) > 0.9, relevance([(50, 50), (50, 50)]), relevance([(1, 0), (0, 1)]) < 0.7
     (True, 0.0, True)
@@ -77,7 +81,7 @@ def relevance(pairs: Sequence[tuple[float, float]]) -> float:
         a, b = c / chosen, p / passed
         middle = (a + b) / 2
         divergence += (a * math.log(a / middle) if a else 0.0) + (b * math.log(b / middle) if b else 0.0)
-    bias = (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
+    bias = caution * (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
     return min(max((divergence / 2 - bias) / math.log(2), 0.0), 1.0)
 
 
@@ -183,7 +187,7 @@ class Judge:
             if c + p:
                 after = math.log(max(o, 1e-9)) - math.log(max(1 - o, 1e-9))
         c, p = levels[0].patterns.get(pattern, (0.0, 0.0))
-        found.append(Factor("all of this together", f"chosen {c:g} of {c + p:g}", after - before))
+        found.append(Factor(TOGETHER, f"chosen {c:g} of {c + p:g}", after - before))
         return found + self._preferences(candidate)
 
     def _preferences(self, candidate: Candidate) -> list[Factor]:
@@ -208,7 +212,7 @@ class Judge:
                 rows = {
                     who: pair for (fact, who), pair in table.items() if fact == f"{role} is" and fact not in without
                 }
-                weight = relevance(list(rows.values()))
+                weight = relevance(list(rows.values()), CAUTION)
                 likes.append({who: weight * math.log((c + 0.5) / (p + 0.5)) for who, (c, p) in rows.items() if weight})
             if any(likes):
                 found[conclusion.behavior, conclusion.classes] = likes
