@@ -4,7 +4,7 @@ The query has one sub-select per parameter, which yields the individuals of its 
 every assignment in the order that numbers them (PAPER.md section 4): behaviours in declared order, then parameters in theirs,
 then individuals in theirs. Whether a quantified behaviour can be done here is not asked: M counts them all.
 
-A planner that grounds wants fewer: those whose static conditions hold (`feasible`). Two ways lead to the same arrays:
+`quantify` reads the rows one by one, which suits a table. A planner that grounds wants fewer and larger ones: those whose static conditions hold (`feasible`). Two ways lead to the same arrays:
 
 ==============  ====================================================================================================
 `by_query`      the query's rows as CSV, by Arrow into a dictionary and its indices: for any store
@@ -95,8 +95,14 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     1 B2_PICK left_hand bottle2
     2 B2_PICK left_hand cup1
     """
-    behaviors = reading.problem.domain.at_level(level)
-    return tuple(ground for behavior in behaviors for ground in by_query(graph, reading, behavior))
+    domain = reading.problem.domain
+    found: list[GroundBehavior] = []
+    number = domain.first_ids.get(level, 0)
+    for behavior in domain.at_level(level):
+        for row in graph.select(query_for(reading, behavior), SCENE):
+            arguments = tuple(reading.names.short(text(term)) for term in row[: len(behavior.parameters)])
+            found.append(GroundBehavior(number + len(found), behavior.name, arguments))
+    return tuple(found)
 
 
 def behavior_named(reading: Reading, name: str) -> Behavior:
