@@ -51,8 +51,10 @@ def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
     """Return ``; did you mean 'x'?`` for the known word that is nearest, or the hint, or nothing."""
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
-    found = get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
-    return f"; did you mean '{folded[found[0]]}'?" if found else (f"; {hint}" if hint else "")
+    near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [
+        folded[name] for name in get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+    ]
+    return f"; did you mean '{near[0]}'?" if near else (f"; {hint}" if hint else "")
 
 
 def _ontology_name(iri: str) -> str:

@@ -1,0 +1,206 @@
+"""What a knowledge engineer does beside editing: begin a domain, see what an edit changed, take memory along in a rename."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyoxigraph as ox
+
+import ontology
+from planner.behaviors import ground
+from reasoner.files import write_whole
+from reasoner.graph import CORE, FORMATS, KnowledgeError, KnowledgeGraph
+from reasoner.names import local_name, nearest
+
+if TYPE_CHECKING:
+    from confab.scene import Scene
+
+PLACEHOLDER = "_DOMAIN_"
+CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
+<catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+{entries}
+</catalog>
+"""
+SPOKEN_OF = [CORE + name for name in ("behavior", "situationType", "value", "relation", "about")]
+SPOKEN_OF += [f"{CORE}argument{place}" for place in range(2, 10)]
+
+
+def new_domain(name: str, folder: Path) -> list[Path]:
+    """Write a commented skeleton that validates: a domain, a scene, a catalog. Return the files.
+
+    The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
+
+    Raises
+    ------
+    KnowledgeError
+        The name is no word, or one of the files exists already.
+    """
+    if not re.fullmatch(r"[A-Za-z][\w-]*", name):
+        raise KnowledgeError(f"'{name}' can't be a domain's name: wanted a letter, then letters, digits, _ or -")
+    templates = sorted((ontology.ROOT / "skeleton").glob("*.ttl"))
+    texts = {
+        template.name.replace(PLACEHOLDER, name): template.read_text(encoding="utf-8").replace(PLACEHOLDER, name)
+        for template in templates
+    }
+    places = {f"https://example.org/{Path(file).stem}": file for file in texts}
+    places |= {iri: file.as_uri() for iri, file in ontology.shipped().items()}
+    entries = "\n".join(f'  <uri name="{iri}" uri="{place}"/>' for iri, place in places.items())
+    texts[ontology.CATALOG] = CATALOG.format(entries=entries)
+    files = {folder / file: text for file, text in texts.items()}
+    for file in files:
+        if file.exists():
+            raise KnowledgeError(f"{file} exists already; give another name or folder")
+    for file, text in files.items():
+        write_whole(file, text)
+    return list(files)
+
+
+# ------------------------------------------------------------------------------------------------ what did my edit change?
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What differs between two scenes: names gained and lost by kind, and the plans' lines before and after."""
+
+    gained: dict[str, tuple[str, ...]]
+    lost: dict[str, tuple[str, ...]]
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+
+    def json(self) -> dict[str, Any]:
+        """Return the difference as JSON can take it."""
+        return {
+            "gained": {kind: list(names) for kind, names in self.gained.items()},
+            "lost": {kind: list(names) for kind, names in self.lost.items()},
+            "plan": {"before": list(self.before), "after": list(self.after), "same": self.before == self.after},
+        }
+
+    def __str__(self) -> str:
+        """Return the difference in lines that start with ``+`` and ``-``, as people know them."""
+        lines = []
+        for kind in self.gained:
+            lines += [f"- {kind} {name}" for name in self.lost[kind]] + [
+                f"+ {kind} {name}" for name in self.gained[kind]
+            ]
+        if self.before == self.after:
+            return "\n".join([*lines, f"the plan is the same: {len(self.after)} steps"])
+        import difflib
+
+        return "\n".join(
+            [
+                *lines,
+                *list(difflib.unified_diff(self.before, self.after, "plan before", "plan after", lineterm="", n=1)),
+            ]
+        )
+
+
+def difference(old: Scene, new: Scene, mode: str) -> Difference:
+    """Return what an edit changed: objects, behaviours and quantified behaviours, and the plan."""
+    before, after = _inventory(old), _inventory(new)
+    return Difference(
+        {kind: tuple(n for n in after[kind] if n not in set(before[kind])) for kind in after},
+        {kind: tuple(n for n in before[kind] if n not in set(after[kind])) for kind in before},
+        _lines(old, mode),
+        _lines(new, mode),
+    )
+
+
+def _inventory(scene: Scene) -> dict[str, list[str]]:
+    problem = scene.problem
+    grounds = [g for level in problem.domain.levels for g in ground(problem, level)]
+    return {
+        "individual": sorted({name for members in problem.classes.values() for name in members}),
+        "situation type": sorted(problem.domain.situations),
+        "behaviour": list(problem.domain.behaviors),
+        "quantified": [" ".join((g.behavior, *g.arguments)) for g in grounds],
+    }
+
+
+def _lines(scene: Scene, mode: str) -> tuple[str, ...]:
+    """Return a scene's plan, one line per step, or the reason why there is none."""
+    result = scene.plan(mode=mode)
+    if not result.solved:
+        return (f"no plan: {result.json().get('reason')}",)
+    return tuple(
+        "  " * (len(step["path"]) - 1) + " ".join((step["behavior"], *step["arguments"]))
+        for step in _steps(result.json()["steps"])
+    )
+
+
+def _steps(steps: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [found for step in steps for found in (step, *_steps(step.get("steps", ())))]
+
+
+# ------------------------------------------------------------------------------------------------------- memory and renames
+
+
+def unknown_terms(memory: Path, graph: KnowledgeGraph) -> list[str]:
+    """Return what a memory file speaks of and a scene doesn't know, with the nearest known name."""
+    known = {quad.subject.value for quad in graph.store if isinstance(quad.subject, ox.NamedNode)}
+    spoken = {
+        quad.object.value
+        for quad in _parse(memory)
+        if quad.predicate.value in SPOKEN_OF and isinstance(quad.object, ox.NamedNode)
+    }
+    names = [local_name(iri) for iri in known]
+    return [f"{local_name(iri)}{nearest(local_name(iri), names)}" for iri in sorted(spoken - known)]
+
+
+def migrate(memory: Path, renames: Sequence[str]) -> int:
+    """Rename terms in a memory file, each given as ``OLD=NEW``; return how many triples changed.
+
+    OLD and NEW are IRIs or their last parts; a NEW without namespace stays in that of OLD.
+
+    Raises
+    ------
+    KnowledgeError
+        The file is no memory; OLD isn't in it, or names two terms.
+    """
+    quads = _parse(memory)
+    iris = {term.value for quad in quads for term in (quad.predicate, quad.object) if isinstance(term, ox.NamedNode)}
+    table = dict(_rename(text, iris) for text in renames)
+    words = {local_name(old): local_name(new) for old, new in table.items()}
+    changed = [_renamed(quad, table, words) for quad in quads]
+    write_whole(memory, ox.serialize(changed, format=FORMATS[memory.suffix], prefixes=_prefixes(memory)) or b"")
+    return sum(one != other.triple for one, other in zip(changed, quads, strict=True))
+
+
+def _rename(text: str, iris: set[str]) -> tuple[str, str]:
+    old, sign, new = text.partition("=")
+    if not (old and sign and new):
+        raise KnowledgeError(f"'{text}' is no rename; wanted OLD=NEW, e.g. Cup=Mug")
+    found = [iri for iri in iris if old in (iri, local_name(iri))]
+    if len(found) != 1:
+        what = "isn't in the memory" if not found else f"could be {' or '.join(sorted(found))}"
+        raise KnowledgeError(f"'{old}' {what}{nearest(old, map(local_name, iris)) if not found else '; give the IRI'}")
+    namespace = found[0][: len(found[0]) - len(local_name(found[0]))]
+    return found[0], new if "://" in new else namespace + new
+
+
+def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.Triple:
+    """Return a triple with its IRIs renamed, and the words of facts that are written as text."""
+    value: Any = quad.object
+    if isinstance(value, ox.NamedNode):
+        value = ox.NamedNode(table.get(value.value, value.value))
+    elif isinstance(value, ox.Literal) and quad.predicate.value == CORE + "facts":
+        value = ox.Literal(re.sub(r"\w+", lambda match: words.get(match[0], match[0]), value.value))
+    return ox.Triple(quad.subject, quad.predicate, value)
+
+
+def _parse(memory: Path) -> list[ox.Quad]:
+    if memory.suffix not in FORMATS or not memory.is_file():
+        raise KnowledgeError(f"{memory}: no such memory file")
+    try:
+        return list(ox.parse(path=str(memory), format=FORMATS[memory.suffix], base_iri=memory.resolve().as_uri()))
+    except SyntaxError as error:
+        raise KnowledgeError(f"{memory}: {error}") from error
+
+
+def _prefixes(memory: Path) -> dict[str, str]:
+    parser = ox.parse(path=str(memory), format=FORMATS[memory.suffix], base_iri=memory.resolve().as_uri())
+    next(iter(parser), None)
+    return dict(parser.prefixes)

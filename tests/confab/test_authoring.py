@@ -1,0 +1,85 @@
+"""Beginning a domain, seeing what an edit changed, and taking memory along in a rename."""
+
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.authoring import difference, migrate, new_domain, unknown_terms
+from reasoner.graph import KnowledgeError
+from reasoner.validate import validate
+
+
+def test_a_new_domain_validates_and_can_be_planned_in(tmp_path: Path) -> None:
+    files = new_domain("tearoom", tmp_path / "tearoom")
+    assert sorted(file.name for file in files) == ["catalog-v001.xml", "tearoom-scene.ttl", "tearoom.ttl"]
+    scene = tmp_path / "tearoom" / "tearoom-scene.ttl"
+    assert validate([scene]) == []
+    result = confab.load(scene).plan(mode="paper")
+    assert [(step["behavior"], step["arguments"]) for step in result.json()["steps"]] == [
+        ("B1_CARRY", ["plate1", "sink"]),
+        ("B1_WASH", ["plate1"]),
+        ("B1_CARRY", ["plate1", "table"]),
+    ]
+
+
+def test_a_new_domain_overwrites_nothing(tmp_path: Path) -> None:
+    new_domain("tearoom", tmp_path)
+    with pytest.raises(KnowledgeError, match="exists already"):
+        new_domain("tearoom", tmp_path)
+    with pytest.raises(KnowledgeError, match="can't be a domain's name"):
+        new_domain("tea room", tmp_path)
+
+
+def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    for folder in (old, new):
+        new_domain("tearoom", folder)
+    scene = new / "tearoom-scene.ttl"
+    text = scene.read_text()
+    added = ':tray a owl:NamedIndividual, d:Place ; c:index 4 ; rdfs:label "tray"@en .\n'
+    scene.write_text(text.replace("d:isAt :table ; d:cleanliness", "d:isAt :sink ; d:cleanliness") + added)
+    changed = difference(confab.load(old / "tearoom-scene.ttl"), confab.load(scene), "paper")
+    assert changed.gained["individual"] == ("tray",)
+    assert changed.gained["quantified"] == ("B1_CARRY plate1 tray", "B1_CARRY plate2 tray")
+    assert changed.lost["quantified"] == ()
+    assert changed.before == ("B1_CARRY plate1 sink", "B1_WASH plate1", "B1_CARRY plate1 table")
+    assert changed.after == ("B1_WASH plate1", "B1_CARRY plate1 table")
+    assert "+ quantified B1_CARRY plate1 tray" in str(changed)
+    same = difference(confab.load(scene), confab.load(scene), "paper")
+    assert str(same) == "the plan is the same: 2 steps"
+
+
+MEMORY = """@prefix : <https://w3id.org/confab/core#> . @prefix m: <https://w3id.org/confab/memory#> .
+m:one :behavior <https://example.org/tearoom#B1_WASH> ; :about <https://example.org/tearoom-scene#plate1> ;
+  :situationType <https://example.org/tearoom#CLEANLINES> ; :facts "item is: Plate | where is: Sink" .
+"""
+
+
+def test_a_renamed_term_takes_its_memory_along(tmp_path: Path) -> None:
+    new_domain("tearoom", tmp_path)
+    memory = tmp_path / "memory.ttl"
+    memory.write_text(MEMORY)
+    graph = confab.load(tmp_path / "tearoom-scene.ttl").knowledge
+    assert unknown_terms(memory, graph) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
+    assert migrate(memory, ["CLEANLINES=CLEANLINESS"]) == 1
+    assert unknown_terms(memory, graph) == []
+
+
+def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(tmp_path: Path) -> None:
+    memory = tmp_path / "memory.ttl"
+    memory.write_text(MEMORY + 'm:two :about <https://example.org/tearoom#Plate> ; :facts "Plates" .')
+    assert migrate(memory, ["Plate=Saucer"]) == 2
+    text = memory.read_text()
+    assert "item is: Saucer" in text
+    assert '"Plates"' in text
+    assert "https://example.org/tearoom#Saucer" in text or ":Saucer" in text
+
+
+@pytest.mark.parametrize(("rename", "said"), [("Cup=Mug", "isn't in the memory"), ("Cup", "wanted OLD=NEW")])
+def test_a_rename_that_means_nothing_is_refused(tmp_path: Path, rename: str, said: str) -> None:
+    memory = tmp_path / "memory.ttl"
+    memory.write_text(MEMORY)
+    with pytest.raises(KnowledgeError, match=said):
+        migrate(memory, [rename])
+    assert memory.read_text() == MEMORY
