@@ -4,7 +4,8 @@ The query has one sub-select per parameter, which yields the individuals of its 
 every assignment in the order that numbers them (PAPER.md section 4): behaviours in declared order, then parameters in theirs,
 then individuals in theirs. Whether a quantified behaviour can be done here is not asked: M counts them all.
 
-`quantify` reads the rows one by one, which suits a table. A planner that grounds wants fewer and larger ones: those whose static conditions hold (`feasible`). Two ways lead to the same arrays:
+`quantify` reads the rows one by one, which suits a table. A planner that grounds wants fewer behaviours, those whose static
+conditions hold (`feasible`), and faster. Two ways lead to the same arrays:
 
 ==============  ====================================================================================================
 `by_query`      the query's rows as CSV, by Arrow into a dictionary and its indices: for any store
