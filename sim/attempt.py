@@ -91,16 +91,18 @@ class Attempt:
 
     # ------------------------------------------------------------------------------------------------- where to
 
-    def reacher(self, *ignored: str, margin: float = MARGIN) -> Reacher:
-        """Return the arm, with what it holds, among its surroundings less the `ignored` things."""
-        mover = self.hand.mover()
+    def reacher(self, *ignored: str, margin: float = MARGIN, opened: bool = False) -> Reacher:
+        """Return the arm, with what it holds and perhaps `opened` fingers, among its surroundings less the `ignored` things."""
+        mover = self.hand.mover(opened)
         if self.held is not None:
             mover = mover.holding(self.world.load_spheres(self.hand, self.held))
         around = self.world.surroundings(self.hand.hand.name, self.held).without(*ignored)
         return Reacher(mover, around, margin)
 
-    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...]) -> list[int]:
+    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opened: bool = False) -> list[int]:
         """Return candidates for which every stage is reachable and free, the most comfortable first.
+
+        With `opened`, the fingers are taken to be open, as they will be when the hand lets go.
 
         Raises
         ------
@@ -108,7 +110,7 @@ class Attempt:
             There is none: `unreachable` with the missing metres, or `goal in collision` with what is in the way.
         """
         with self.planning():
-            reacher = self.reacher()
+            reacher = self.reacher(opened=opened)
             solved = [reacher.solve(stage.poses) for stage in stages]
             valid = np.all([ok for _, ok in solved], axis=0)
             if not valid.any():

@@ -71,9 +71,10 @@ class Manipulator:
         states = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
         return tuple(state[0] for state in states)
 
-    def mover(self) -> Mover:
-        """Return the arm as spheres, its fingers as they are."""
-        return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, self.openings(), strict=True)))
+    def mover(self, opened: bool = False) -> Mover:
+        """Return the arm as spheres, its fingers as they are, or `opened`."""
+        openings = [self.hand.opening] * len(self.fingers) if opened else self.openings()
+        return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, openings, strict=True)))
 
     def command(self, q: Array, velocity: Array | None = None) -> None:
         """Set the motors' target; they keep it until the next command."""

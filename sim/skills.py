@@ -61,7 +61,7 @@ def _reach_object(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, 
         raise SkillError("toppled", (target,), f"{target} doesn't stand; this skill takes what does", tilt_rad=leaning)
     grip = base + np.array([0.0, 0.0, attempt.world.bodies[target].shape.grasp_height])
     at, before, above = grip_stages(grip, numbers, (target,))
-    chosen = attempt.choose([at, before, above], (target,))
+    chosen = attempt.choose([at, before, above], (target,), opened=True)
     attempt.hand.open()
     best = chosen[attempt.go([before.poses[i] for i in chosen], (target,))]
     goal = turned_near(attempt.hand.pose, at.poses[best])
@@ -84,7 +84,7 @@ def _reach_place(attempt: Attempt, place: str, numbers: Numbers) -> dict[str, fl
     back[:, :2] -= numbers["approach"] * np.stack([np.cos(yaw), np.sin(yaw)], -1)
     above[:, 2] += numbers["raised"]
     objects = (place,) if attempt.held is None else (place, attempt.held)
-    chosen = attempt.choose([Stage(hover), Stage(down), Stage(back), Stage(above)], objects)
+    chosen = attempt.choose([Stage(hover), Stage(down), Stage(back), Stage(above)], objects, opened=True)
     best = attempt.go([hover[i] for i in chosen], objects)
     measured = attempt.check_arrival(hover[chosen[best]], numbers)
     reached = attempt.hand.frame()[1] if attempt.held is None else world.truth(attempt.held)[1]
