@@ -172,17 +172,18 @@ def test_at_most_twelve_queries_at_any_size(
 
 
 def test_a_task_on_one_of_two_tables_leaves_the_other_out(tmp_path: Path) -> None:
-    """Hands, places and objects of a second table, with the same beverage, aren't read."""
+    """Hands, places and objects of a second table, with the same beverage or in a hand as others may be, aren't read."""
     second = "".join(
         f":far_hand a owl:NamedIndividual, c:Hand ; k:canReach :far{i} .\n"
         f":far{i} a owl:NamedIndividual, k:Location .\n"
         f":far_bottle{i} a owl:NamedIndividual, k:Bottle ; k:location :far{i} ; k:beverage :beverage1 .\n"
+        f":held{i} a owl:NamedIndividual, k:Cup ; k:location k:in_hand ; k:beverage k:no_beverage .\n"
         for i in range(5)
     )
     path = tmp_path / "scene.ttl"
     path.write_text(generate("served") + second, encoding="utf-8")
     problem = recognise(load(path)).problem
-    assert problem.classes["Bottle"] == ("bottle1", "bottle2")
+    assert problem.classes["Movable"] == ("bottle1", "bottle2", "cup1", "cup2")
     assert problem.classes["Hand"] == ("hand1", "hand2")
 
 
