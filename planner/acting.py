@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
+from planner.caution import Caution, without_relations
 from planner.episode import (
     Change,
     End,
@@ -29,6 +30,7 @@ from planner.episode import (
     World,
 )
 from planner.fast import compiled
+from planner.fast import plan as fast_plan
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from planner.repair import Planner, difference, mend, renumbered, replan, vanished
 from planner.symbolic import with_individual
@@ -68,6 +70,7 @@ def act(
     patience: Patience = Patience(),
     tell: Callable[[Moment], None] | None = None,
     mending: bool = True,
+    caution: Caution | None = None,
 ) -> Episode:
     """Carry a task out in a world, whatever happens, until it is done, proved impossible, or a limit is reached.
 
@@ -88,11 +91,15 @@ def act(
         Is told every `Moment`.
     mending : bool
         False replans from scratch instead of repairing.
+    caution : Caution, optional
+        What failed in earlier episodes: what it speaks against is done otherwise, where there is another way.
 
     Returns
     -------
     Episode
     """
+    if caution is not None and plan is None:
+        problem = caution.applied(problem, planner or fast_plan)
     run = _Run(problem, world, list(interventions), planner, patience, tell, mending)
     run.look(dict(problem.initial))
     run.start(plan)
@@ -222,7 +229,8 @@ class _Run:
         verdict = self.world.execute(step)
         self.note_what_happened_by_the_clock()
         surprises = self.look(expected if verdict.ok else dict(before))
-        self.events.append(Event(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises))
+        relied_on = tuple(relations_of(self.belief, chain))
+        self.events.append(Event(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on))
         if verdict.ok:
             self.done.update((above.path, above) for above in chain)
             self.agenda = _rest(self.agenda)
@@ -426,14 +434,6 @@ def relations_of(problem: Problem, chain: Sequence[Step]) -> list[tuple[str, tup
         if found:
             return found
     return []
-
-
-def without_relations(problem: Problem, gone: Iterable[tuple[str, tuple[str, ...]]]) -> Problem:
-    """Return the problem without some of its static facts."""
-    relations: dict[str, frozenset[tuple[str, ...]]] = dict(problem.relations)
-    for name, row in gone:
-        relations[name] = relations[name] - {row}
-    return replace(problem, relations=relations)
 
 
 # ------------------------------------------------------------------------------------------------------------- trees of steps

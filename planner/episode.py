@@ -128,7 +128,10 @@ class Failure:
 
 @dataclass(frozen=True)
 class Event:
-    """A primitive that was begun: when, how it ended, and what was surprising afterwards."""
+    """A primitive that was begun: when, how it ended, what was surprising afterwards.
+
+    `relied_on` are the static facts, as relation and individuals, that it or the behaviour above it relied on.
+    """
 
     step: Step
     begin: float
@@ -136,6 +139,7 @@ class Event:
     ok: bool
     code: str | None = None
     surprises: tuple[Surprise, ...] = ()
+    relied_on: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ XSD = "http://www.w3.org/2001/XMLSchema#"
 Data = Mapping[str, Any]
 
 
-def save_episode(path: Path, episode: Data, names: Names, name: str = "episode") -> None:
+def save_episode(path: Path, episode: Data, names: Names) -> None:
     """Write an episode as a Turtle file that imports the scene, whole or not at all.
 
     Parameters
@@ -43,9 +43,8 @@ def save_episode(path: Path, episode: Data, names: Names, name: str = "episode")
         As ``confab execute --json`` prints it.
     names : Names
         The scene's names, to lead back to IRIs.
-    name : str
-        Of the episode, unique in its file.
     """
+    name = path.stem  # who looks for an ontology finds it by the last part of its IRI
     iri = ontology_of(episode, name)
     prefixes = {"": iri + "#", "e": EPISODES, "c": CORE, "prov": PROV, "owl": PREFIXES["owl"], "xsd": XSD}
     triples = [*_header(iri, episode), *triples_of(episode, names, name)]
@@ -60,7 +59,7 @@ def assert_episode(graph: KnowledgeGraph, episode: Data, names: Names, name: str
 
 def ontology_of(episode: Data, name: str) -> str:
     """Return the IRI of the ontology that an episode is written as."""
-    return f"{str(episode['scene']).rstrip('#/')}.episodes.{name}"
+    return f"{str(episode['scene']).rstrip('#/').rpartition('/')[0]}/{name}"
 
 
 def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[ox.Triple]:

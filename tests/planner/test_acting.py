@@ -1,0 +1,362 @@
+"""The executive in a symbolic world: what people do in the meantime, and what it does about it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.acting import Moment, Patience, act
+from planner.caution import Caution
+from planner.episode import Change, End, Episode, Intervention
+from planner.fast import plan
+from planner.learning import learn
+from planner.plan import Plan, Step
+from planner.refinement import plan as paper_plan
+from planner.symbolic import Said, SymbolicWorld
+from planner.validation import successor, validate
+from reasoner.generate import write_scene
+from reasoner.graph import load
+from reasoner.links import Links
+from reasoner.reading import read
+from reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+
+SERVED_AS_IN_FIGURE_8 = {
+    22: {2: [6, 28, 32], 22: [18, 30, 32]},
+    34: {4: [8, 29, 33], 14: [10, 35, 37, 33], 27: [23, 31, 33]},
+    28: {3: [7, 28, 32], 20: [16, 30, 32]},
+    39: {5: [9, 29, 33], 15: [11, 35, 37, 33], 26: [22, 31, 33]},
+}
+
+
+@cache
+def serving() -> Problem:
+    return read(load("beverage-serving")).problem
+
+
+@cache
+def planned() -> Plan:
+    found = plan(serving()).plan
+    assert found is not None
+    return found
+
+
+@cache
+def situations() -> tuple[State, ...]:
+    """The situation before each primitive of the plan."""
+    found: list[State] = [serving().initial]
+    for step in planned().primitives:
+        after = successor(serving(), serving().domain.behaviors[step.behavior], step.arguments, found[-1])
+        assert after is not None
+        found.append(after)
+    return tuple(found)
+
+
+def at(individual: str, value: str, situation: str = "LOCATION") -> Fact:
+    return Fact(Symbol(situation, (individual,)), value)
+
+
+def moved(individual: str, place: str, **when: object) -> Intervention:
+    return Intervention(Change.WORLD, (at(individual, place),), **when)  # type: ignore[arg-type]
+
+
+def wanted(individual: str, value: str, situation: str = "LOCATION", **when: object) -> Intervention:
+    return Intervention(Change.GOAL, (at(individual, value, situation),), **when)  # type: ignore[arg-type]
+
+
+def acted(*interventions: Intervention, **options: object) -> Episode:
+    options = {"plan": planned(), **options}
+    return act(serving(), SymbolicWorld(serving()), interventions=interventions, **options)  # type: ignore[arg-type]
+
+
+def tree(done: Plan) -> dict[int, dict[int, list[int]]]:
+    return {a.id: {m.id: [p.id for p in m.steps] for m in a.steps} for a in done.steps}
+
+
+def holds(episode: Episode) -> bool:
+    return all(episode.observed.get(symbol, FALSE) == value for symbol, value in episode.goal.items())
+
+
+def at_rest(episode: Episode) -> bool:
+    rests = {name: s.rest for name, s in serving().domain.situations.items() if s.rest is not None}
+    return all(value == rests[s.situation] for s, value in episode.observed.items() if s.situation in rests)
+
+
+# ------------------------------------------------------------------------------------------------------------- figure 8
+
+
+def test_after_step_28_the_cup_moves_and_the_right_hand_does_the_rest_as_in_figure_8() -> None:
+    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28))
+    assert episode.status is End.REACHED
+    assert tree(episode.done) == SERVED_AS_IN_FIGURE_8
+    (change,) = episode.replans
+    assert (change.kind, change.dropped, change.added) == ("repair", 10, 10)
+    assert holds(episode)
+    assert at_rest(episode)
+
+
+def test_in_the_papers_mode_after_a_demonstration_the_whole_course_is_that_of_the_figures() -> None:
+    shown = Plan(tuple(sorted(planned().steps, key=lambda step: [22, 34, 28, 39].index(step.id))))
+    links = learn(serving(), shown, Links())
+    episode = acted(
+        moved("cup2", "location8", after=28),
+        wanted("cup2", "location8", after=28),
+        plan=None,
+        planner=lambda problem: paper_plan(problem, links),
+    )
+    assert [step.id for step in episode.done.steps] == [22, 34, 28, 39]
+    assert tree(episode.done) == SERVED_AS_IN_FIGURE_8
+    assert episode.replans[0].after == (2, 1, 2)
+
+
+def test_replanning_from_scratch_comes_to_the_same() -> None:
+    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), mending=False)
+    assert tree(episode.done) == SERVED_AS_IN_FIGURE_8
+
+
+def test_what_was_done_is_a_plan_if_nobody_interferes() -> None:
+    episode = acted()
+    assert episode.done == planned()
+    assert episode.replans == ()
+    assert validate(serving(), episode.done) == []
+
+
+# ------------------------------------------------------------------------------------------------------------- safety
+
+
+def begun(episode: Episode) -> list[str]:
+    return [str(event.step) for event in episode.events]
+
+
+def test_an_object_that_vanished_is_not_poured_into() -> None:
+    episode = acted(Intervention(Change.REMOVE, individual="cup2", after=28))
+    assert episode.status is End.IMPOSSIBLE
+    assert any("cup2" in reason.terms for reason in episode.reasons)
+    last = max(i for i, event in enumerate(episode.events) if "cup2" in event.step.arguments)
+    assert episode.events[last].step.path < (2,)
+    assert episode.observed[Symbol("BEVERAGE", ("cup1",))] == "beverage1"
+    assert at_rest(episode)
+
+
+def test_a_primitive_whose_precondition_is_lost_is_not_begun() -> None:
+    class Watched(SymbolicWorld):
+        def execute(self, step: Step) -> Said:
+            behavior = self.problem.domain.behaviors[step.behavior]
+            assert successor(self.problem, behavior, step.arguments, self.state) is not None, step
+            return super().execute(step)
+
+    world = Watched(serving())
+    path = planned().primitives[8].path  # the hand holds cup2, raised
+    episode = act(serving(), world, planned(), [moved("cup2", "location6", after=path)])
+    assert episode.status is End.REACHED
+
+
+def test_what_is_interrupted_leaves_the_hand_in_a_named_state_from_which_planning_goes_on() -> None:
+    reach = planned().primitives[0]
+    episode = acted(moved("cup1", "location8", at=0.5))
+    first = episode.events[0]
+    assert (str(first.step), first.ok, first.code) == (str(reach), False, "interrupted")
+    assert episode.status is End.REACHED
+    assert at_rest(episode)
+
+
+def test_nobody_puts_down_where_somebody_else_has_put_something() -> None:
+    over = next(i for i, s in enumerate(planned().primitives) if s.arguments[1:] == ("location5",))
+    episode = acted(moved("bottle2", "location5", after=planned().primitives[over].path))
+    assert episode.status is End.REACHED
+    for event, following in zip(episode.events, episode.events[1:], strict=False):
+        if event.surprises and any(s.symbol.arguments == ("bottle2",) for s in event.surprises):
+            assert following.step.behavior != "B3_PUT_DOWN"
+
+
+# ------------------------------------------------------------------------------------------------------------- impossible
+
+
+@pytest.mark.parametrize("value", ["beverage1", "beverage2"])
+def test_a_cup_filled_with_the_wrong_drink_is_proved_hopeless_and_the_rest_is_served(value: str) -> None:
+    fill = Intervention(Change.WORLD, (at("cup2", value, "BEVERAGE"),), after=28)
+    episode = acted(fill)
+    assert episode.status is (End.REACHED if value == "beverage2" else End.IMPOSSIBLE)
+    assert bool(episode.reasons) == (value == "beverage1")
+    assert episode.observed[Symbol("BEVERAGE", ("cup1",))] == "beverage1"
+    assert holds(episode)
+
+
+def test_a_goal_that_is_dropped_is_not_served() -> None:
+    drop = [Intervention(Change.DROP_GOAL, symbol=Symbol("BEVERAGE", (cup,)), after=28) for cup in ("cup1", "cup2")]
+    episode = acted(*drop)
+    assert episode.status is End.REACHED
+    assert len(episode.done.primitives) == 12
+
+
+def test_an_object_that_is_added_stands_in_the_way_and_is_taken_care_of() -> None:
+    newcomer = (at("cup9", "location5"), at("cup9", "no_beverage", "BEVERAGE"))
+    episode = acted(Intervention(Change.ADD, newcomer, individual="cup9", kind="Cup", after=22))
+    assert episode.status is End.REACHED
+    assert episode.observed[Symbol("LOCATION", ("cup9",))] != "location5"
+
+
+def test_goals_about_what_was_added_are_served() -> None:
+    newcomer = (at("cup9", "location6"), at("cup9", "no_beverage", "BEVERAGE"))
+    episode = acted(
+        Intervention(Change.ADD, newcomer, individual="cup9", kind="Cup", after=22),
+        wanted("cup9", "beverage1", "BEVERAGE", after=22),
+    )
+    assert episode.status is End.REACHED
+    assert episode.observed[Symbol("BEVERAGE", ("cup9",))] == "beverage1"
+
+
+# ------------------------------------------------------------------------------------------------------------- failures
+
+
+def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episode:
+    def fault(step: Step, state: State) -> Said | None:
+        return Said(False, code, ("cup2",)) if test(step, state) else None
+
+    return act(serving(), SymbolicWorld(serving(), fault=fault), planned())
+
+
+def test_a_slip_is_tried_again() -> None:
+    tries = iter([True])
+    episode = failing(lambda step, state: step.behavior == "B3_GRASP" and next(tries, False), "no grasp")
+    assert episode.status is End.REACHED
+    assert [failure.code for failure in episode.failures] == ["no grasp"]
+    assert episode.replans == ()
+
+
+def test_where_one_hand_has_no_path_the_other_hand_does_it() -> None:
+    bottle = Symbol("LOCATION", ("bottle2",))
+    episode = failing(
+        lambda step, state: (
+            step.arguments[0] == "left_hand" and state[bottle] == "location3" and "bottle2" in step.arguments
+        )
+    )
+    assert episode.status is End.REACHED
+    assert ("right_hand", "bottle2") in [step.arguments for step in episode.done.primitives]
+    assert len(episode.failures) == 2
+
+
+def test_where_no_hand_has_a_path_it_gives_up_and_says_why() -> None:
+    episode = failing(lambda step, state: "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT")
+    assert episode.status is End.GAVE_UP
+    assert episode.reasons
+    assert at_rest(episode)
+
+
+def test_a_world_in_which_nothing_works_is_given_up_soon() -> None:
+    episode = failing(lambda step, state: True)
+    assert episode.status is End.GAVE_UP
+    assert len(episode.events) < 100
+
+
+def test_the_number_of_primitives_is_bounded() -> None:
+    class Stubborn(SymbolicWorld):
+        def execute(self, step: Step) -> Said:
+            said = super().execute(step)
+            if step.behavior == "B3_LIFT":  # somebody puts the cup back, again and again
+                self.state[Symbol("LOCATION", ("cup1",))] = "location2"
+                self.state[Symbol("HOLDS", ("left_hand",))] = "nothing"
+            return said
+
+    episode = act(serving(), Stubborn(serving()), planned(), patience=Patience(primitives=2))
+    assert episode.status is End.GAVE_UP
+    assert len(episode.events) <= 2 * 32 + 10
+
+
+def blocked(step: Step, state: State) -> Said | None:
+    """An obstacle that nobody perceives: the left hand can't get to the bottle at location3."""
+    there = state[Symbol("LOCATION", ("bottle2",))] == "location3"
+    hit = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments == ("left_hand", "bottle2") and there
+    return Said(False, "no path", ("bottle2",)) if hit else None
+
+
+@pytest.mark.parametrize("learning", [True, False])
+def test_the_second_attempt_in_the_same_situation_chooses_better_only_if_it_learned(learning: bool) -> None:
+    caution, ends = Caution(), []
+    for _ in range(3):
+        world = SymbolicWorld(serving(), fault=blocked)
+        episode = act(serving(), world, patience=Patience(failures=2), caution=caution)
+        ends.append(episode.status)
+        caution = caution.learned(episode) if learning else caution
+    assert ends == [End.GAVE_UP, *[End.REACHED if learning else End.GAVE_UP] * 2]
+
+
+def test_caution_never_gives_a_task_up_that_has_only_one_way() -> None:
+    only = ("canReach", ("left_hand", "location1"))
+    world = SymbolicWorld(serving())
+    assert act(serving(), world, caution=Caution({only: (9, 9)})).status is End.REACHED
+
+
+def test_what_two_robots_have_seen_adds_up() -> None:
+    one, other = ("canReach", ("left_hand", "location1")), ("canReach", ("left_hand", "location2"))
+    assert (Caution({one: (3, 1)}) + Caution({one: (1, 1), other: (2, 0)})).counts == {one: (4, 2), other: (2, 0)}
+
+
+# ------------------------------------------------------------------------------------------------------------- at random
+
+OBJECTS, PLACES = ("bottle1", "bottle2", "cup1", "cup2"), tuple(f"location{i}" for i in range(1, 9))
+
+
+@st.composite
+def interventions(draw: st.DrawFn) -> Intervention:
+    position = draw(st.integers(0, len(planned().primitives) - 1))
+    inside = draw(st.booleans())
+    when = {"at": position + 0.5} if inside else {"after": planned().primitives[position].path}
+    state = situations()[position]
+    taken = set(state.values()) | set(serving().goal.values())
+    free = [place for place in PLACES if place not in taken]
+    one = draw(st.sampled_from(OBJECTS))
+    cup = draw(st.sampled_from(OBJECTS[2:]))
+    drink = draw(st.sampled_from(["no_beverage", "beverage1", "beverage2"]))
+    choices: list[Intervention] = [
+        moved(one, draw(st.sampled_from(free)), **when),
+        Intervention(Change.WORLD, (at(cup, drink, "BEVERAGE"),), **when),
+        Intervention(Change.REMOVE, individual=one, **when),
+        wanted(one, draw(st.sampled_from(free)), **when),
+        Intervention(Change.DROP_GOAL, symbol=draw(st.sampled_from(sorted(serving().goal))), **when),
+    ]
+    return draw(st.sampled_from(choices))
+
+
+@settings(max_examples=120)
+@given(st.lists(interventions(), min_size=1, max_size=2))
+def test_whatever_people_do_the_goal_is_reached_or_proved_impossible(happenings: list[Intervention]) -> None:
+    episode = acted(*happenings)
+    assert episode.status in (End.REACHED, End.IMPOSSIBLE)
+    assert (episode.status is End.IMPOSSIBLE) == bool(episode.reasons)
+    assert holds(episode)
+    assert at_rest(episode)
+    assert len(episode.events) <= 120
+
+
+def test_the_same_course_of_events_gives_the_same_episode() -> None:
+    def timeless(episode: Episode) -> Episode:
+        return replace(episode, seconds={}, replans=tuple(replace(r, seconds=0.0) for r in episode.replans))
+
+    happening = moved("cup1", "location6", at=20.5)
+    assert timeless(acted(happening)) == timeless(acted(happening))
+
+
+def test_a_spectator_is_told_of_every_primitive_and_every_change() -> None:
+    moments: list[Moment] = []
+    episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), tell=moments.append)
+    said = [moment.what for moment in moments]
+    assert said.count("begin") == said.count("end") == len(episode.events)
+    assert said.count("intervention") == 2
+    assert said.count("repair") == 1
+    assert said[0] == "plan"
+    assert said[-1] == "over"
+
+
+def test_twenty_objects_are_served_whatever_is_moved(tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("scenes") / "served.ttl"
+    write_scene(path, "served", 20)
+    problem = read(load(path)).problem
+    begin = plan(problem).plan
+    assert begin is not None
+    step = begin.primitives[80]
+    episode = act(problem, SymbolicWorld(problem), begin, [moved("cup3", "location40", after=step.path)])
+    assert episode.status in (End.REACHED, End.IMPOSSIBLE)
+    assert all(change.distance < 60 for change in episode.replans)
