@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from planner.acting import Moment
     from planner.episode import World
     from reasoner.embodiment import Embodiment
+    from reasoner.mirror import Mirror
 
 MODES = ("guarded", "strict", "paper")
 DEFAULT_MODE = MODES[0]
@@ -113,6 +114,24 @@ class Scene:
 
         return verify(self, plan, rollouts, seed, **options)
 
+    @cached_property
+    def _mirror(self) -> Mirror:
+        from reasoner.mirror import Mirror
+
+        return Mirror(self.knowledge)
+
+    @property
+    def owl(self) -> Any:
+        """The scene as an owlready2 world; what is added through it is seen by `query` and `plan`."""
+        return self._mirror.world
+
+    def _pull(self) -> None:
+        """Take over what was added through `owl`."""
+        if "_mirror" in self.__dict__ and self._mirror.pull():
+            self.__dict__.pop("graph", None)
+            infer(self.knowledge)
+            self.reading = read(self.knowledge)
+
     def query(self, sparql: str) -> Table:
         """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
 
@@ -123,6 +142,7 @@ class Scene:
         """
         from reasoner.affordance import SITUATION, write_situation
 
+        self._pull()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
         columns, rows = self.knowledge.table(sparql)
@@ -191,6 +211,7 @@ class Scene:
         KnowledgeError
             A goal names what the scene doesn't have, or the mode is unknown.
         """
+        self._pull()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
         limits = Limits(seconds=time_limit)
