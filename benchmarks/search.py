@@ -19,6 +19,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from math import log
 from pathlib import Path
 from statistics import mean, median
@@ -26,6 +27,7 @@ from time import process_time
 from typing import Any
 
 from benchmarks.pddl import peers, planners, run
+from planner import serialise
 from planner.exhaust import Space, TooLargeError
 from planner.fast import Compiled, compiled, plan
 from planner.flat import plan_level
@@ -80,6 +82,13 @@ def timed(function: Callable[[], Any], runs: int = 5) -> tuple[Any, float]:
     return result, median(seconds)
 
 
+def cold(problem: Problem, program: Compiled, improve: int | None = None) -> Callable[[], Outcome]:
+    """Return a planning call with nothing learned from earlier ones."""
+    if improve is None:
+        return lambda: plan(problem, using=Compiled(program.program))
+    return lambda: plan(problem, improve=improve, using=Compiled(program.program))
+
+
 def check(problem: Problem, outcome: Outcome, what: str, easy: bool = True) -> None:
     """Stop the benchmark if a plan isn't one, or an easy family needed a lower level."""
     if outcome.plan is None or validate(problem, outcome.plan):
@@ -99,13 +108,9 @@ def scale() -> None:
     for n in (4, 10, 20, 50, 100, 200, 1000, 10_000):
         problem, reading = scene("served", n)
         runs = 9 if n <= 200 else 3 if n <= 1000 else 1
-        program, compiling = timed(lambda problem=problem: compiled(problem), runs)
-        first, seconds = timed(
-            lambda problem=problem, program=program: plan(problem, improve=0, using=Compiled(program.program)), runs
-        )
-        better, improving = timed(
-            lambda problem=problem, program=program: plan(problem, using=Compiled(program.program)), runs
-        )
+        program, compiling = timed(partial(compiled, problem), runs)
+        first, seconds = timed(cold(problem, program, 0), runs)
+        better, improving = timed(cold(problem, program), runs)
         if n <= 1000:
             check(problem, first, f"served {n}")
             check(problem, better, f"served {n} improved")
@@ -131,9 +136,7 @@ def hands() -> None:
     for family, number, n in cases:
         problem, _ = scene(family, n, number)
         program = compiled(problem)
-        outcome, seconds = timed(
-            lambda problem=problem, program=program: plan(problem, improve=0, using=Compiled(program.program)), 3
-        )
+        outcome, seconds = timed(cold(problem, program, 0), 3)
         check(problem, outcome, f"{family} {n}", easy=family != "full")
         steps = "/".join(str(outcome.plan.length.get(level, 0)) for level in (1, 2, 3))
         expansions = "/".join(str(count.expanded) for count in outcome.search.values())
@@ -194,7 +197,7 @@ def beside_peers() -> None:
             path = Path(folder) / f"served-{n}.ttl"
             write_scene(path, "served", n, 2, 0, SEED)
             problem = read(load(str(path))).problem
-            ours = [sys.executable, "-m", "confab.cli", "plan", str(path), "--json"]
+            ours = [str(Path(sys.executable).with_name("confab")), "plan", str(path), "--json"]
             found = run(ours, path, path)
             length = json.loads(found.output[found.output.index("{") :])["length"]["3"] if "{" in found.output else "–"
             row += [f"{found.seconds:.2f} s", str(length)]
@@ -212,7 +215,7 @@ def beside_peers() -> None:
 
 
 def lengths() -> None:
-    """Compare the primitives of the first and of the improved plan, with the best length known (`lengths.json`, with its source)."""
+    """Compare the length of the first and of the improved plan with the best known (`lengths.json` says whose)."""
     known: dict[str, dict[str, Any]] = json.loads(LENGTHS.read_text()) if LENGTHS.exists() else {}
     print("| family | n | first | improved | improved ms | best known | source | ratio |")
     print("|---|---|---|---|---|---|---|---|")
@@ -222,9 +225,7 @@ def lengths() -> None:
             problem, _ = scene(family, n)
             program = compiled(problem)
             first = plan(problem, improve=0, using=Compiled(program.program))
-            better, seconds = timed(
-                lambda problem=problem, program=program: plan(problem, using=Compiled(program.program)), 1
-            )
+            better, seconds = timed(cold(problem, program), 1)
             check(problem, better, f"{family} {n}", easy=False)
             best = known.get(f"{family} {n}")
             length = len(better.plan.primitives)
@@ -312,8 +313,6 @@ class Everything(Segments):
 
 def parts() -> None:
     """Switch each part off in turn, 20 s each, to see what it contributes."""
-    import planner.serialise
-
     print("| family | n | without | status | CPU ms | expansions 1/2/3 | primitives |")
     print("|---|---|---|---|---|---|---|")
     for family in ("served", "swap"):
@@ -328,12 +327,12 @@ def parts() -> None:
                 return plan(replace(problem, domain=flat), limits=limits, improve=0)
 
             def without_relevance(problem: Problem = problem, limits: Limits = limits) -> Outcome:
-                kept = planner.serialise.Segments
-                planner.serialise.Segments = Everything  # type: ignore[misc]
+                kept = serialise.Segments  # type: ignore[attr-defined]
+                serialise.Segments = Everything  # type: ignore[attr-defined]
                 try:
                     return plan(problem, limits=limits, improve=0)
                 finally:
-                    planner.serialise.Segments = kept  # type: ignore[misc]
+                    serialise.Segments = kept  # type: ignore[attr-defined]
 
             def without_templates(problem: Problem = problem, limits: Limits = limits) -> Outcome:
                 return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, replay=False))
@@ -342,7 +341,7 @@ def parts() -> None:
                 return plan_level(problem, limits=limits)
 
             variants: dict[str, Callable[[], Outcome]] = {
-                "nothing": lambda problem=problem, limits=limits: plan(problem, limits=limits, improve=0),  # type: ignore[misc]
+                "nothing": partial(plan, problem, limits=limits, improve=0),
                 "cached refinements": without_templates,
                 "relevance": without_relevance,
                 "levels": without_levels,

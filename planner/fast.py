@@ -16,6 +16,7 @@ flat search             the rest, until a limit comes                   `planner
 
 from __future__ import annotations
 
+from contextlib import suppress
 from time import perf_counter
 
 from planner.exhaust import Space, TooLargeError
@@ -75,7 +76,8 @@ def plan(
     try:
         if call.serialise():
             if improve:
-                call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
+                with suppress(LimitError):  # then the first plan is what there is
+                    call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
             return outcome(Status.SOLVED, call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)

@@ -15,6 +15,7 @@ from itertools import groupby, product
 
 from planner.exhaust import Space, TooLargeError
 from planner.lifted import Done, Refiner, Template
+from planner.segments import LimitError
 from planner.table import Cell, Key, arguments_of, key_of
 from reasoner.symbols import Problem, Symbol
 
@@ -82,6 +83,7 @@ class Improver:
         kept: list[tuple[Done, int]] = []
         k = 0
         while k < len(parts):
+            self.segments.check_time()
             j = undone.get(k)
             mark = len(self.table.trail)
             if j is not None and all(self.again(part) is not None for part, _ in parts[k + 1 : j]):
@@ -160,6 +162,7 @@ class Improver:
         """Plan each cluster anew, one level further down, and keep what is shorter."""
         rest = []
         for step in steps:
+            self.segments.check_time()
             mark = len(self.table.trail)
             if self.again(step) is None:
                 return list(steps)
@@ -170,6 +173,7 @@ class Improver:
         found: list[Done] = []
         position = 0
         while position < len(rest):
+            self.segments.check_time()
             members = self._cluster(rest, position)
             replaced = self._replace([step for step, _, _ in rest[position : members[-1] + 1]], members, position)
             if replaced is not None:
@@ -278,9 +282,11 @@ class Improver:
         goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in initial.items()}
         try:
             small = replace(problem, classes=classes, initial=initial, goal=goal)
-            found = Space(small, level, OPERATORS).search(STATES)
+            found = Space(small, level, OPERATORS).search(STATES, self.segments.deadline)
         except TooLargeError:
             return None
+        except TimeoutError as error:
+            raise LimitError("the time limit") from error
         steps = [(step.behavior, step.arguments) for step in found.steps or ()]
         return self.refiner.template(steps, roles) if steps else None
 

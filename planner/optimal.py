@@ -54,7 +54,7 @@ def plan(
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + limits.seconds
     using = using or compiled(problem)
-    best = fast_plan(problem, limits=limits, using=using)
+    best = fast_plan(problem, limits=_left(limits, deadline), using=using)
     best = _shortened(problem, best, limits, using, deadline)
     if best.status is Status.UNSOLVABLE:
         return best
@@ -71,6 +71,10 @@ def plan(
     )
 
 
+def _left(limits: Limits, deadline: float | None) -> Limits:
+    return limits if deadline is None else Limits(limits.expansions, max(deadline - perf_counter(), 0.0))
+
+
 def cost(problem: Problem, plan: Plan) -> float:
     """Return the cost of a plan's primitives."""
     return sum(problem.domain.behaviors[step.behavior].cost for step in plan.primitives)
@@ -83,7 +87,7 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
     while best.plan is not None and shapes <= 512:
         if deadline is not None and perf_counter() - begin > (deadline - begin) / 4:
             break
-        again = fast_plan(problem, limits=limits, using=using, improve=shapes)
+        again = fast_plan(problem, limits=_left(limits, deadline), using=using, improve=shapes)
         shapes *= 4
         if again.plan is not None and cost(problem, again.plan) < cost(problem, best.plan):
             best = again
@@ -160,6 +164,8 @@ def a_star(
                 came_from[after] = state, operator
                 estimate = heuristic(after)
                 number += 1
+                if deadline is not None and perf_counter() > deadline:
+                    return lower, None
                 if new + estimate < upper:
                     heapq.heappush(queue, (new + estimate, estimate, number, after))
     return upper, None
