@@ -197,7 +197,7 @@ class Attempt:
     def check_others(self, numbers: Numbers, *moved: str) -> None:
         """Raise if something other than the `moved` objects and the held one was disturbed or toppled."""
         for name, position in self.before.items():
-            if name in moved or name == self.held or name not in self.world.bodies:
+            if name in (*moved, self.held, *self.world.elsewhere) or name not in self.world.bodies:
                 continue
             rotation, now = self.world.truth(name)
             shift = float(np.linalg.norm(now - position))

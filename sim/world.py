@@ -138,6 +138,7 @@ class World:
         self.bodies: dict[str, Thing] = {}
         self.beads: list[Bead] = []
         self.spilled: set[int] = set()
+        self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
         self.disturb: Callable[[World], None] | None = None
         self.client = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:

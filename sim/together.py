@@ -1,0 +1,175 @@
+"""Both hands at once: several skills run at the same time in one world, each as if it were alone.
+
+A skill asks the world to go on by some steps. Here every skill has a thread of its own that waits for each step; when all that
+are at work wait, the world makes one step for all of them. Only one thread runs at any time, always in the same order, so that
+the same call gives the same course of events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from threading import Semaphore, Thread
+
+import numpy as np
+import pybullet
+
+from planner.plan import Step
+from planner.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
+from reasoner.symbols import Problem
+from sim.verdict import Verdict
+from sim.world import World
+
+ROOM = 0.25
+"""Metres between the places at which two hands may work at the same time."""
+
+LOOKING = 6
+"""So many steps lie between two looks for contact between the arms."""
+
+
+@dataclass(frozen=True)
+class Performance:
+    """What came of a schedule: when each primitive was done, its verdict, and seconds in which the arms touched."""
+
+    slots: tuple[Slot, ...]
+    verdicts: tuple[Verdict, ...]
+    touching: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything succeeded and the arms never touched."""
+        return all(verdict.ok for verdict in self.verdicts) and self.touching == 0
+
+
+class _Job:
+    """One primitive at work in a thread of its own."""
+
+    def __init__(self, world: World, step: Step, position: int, worker: str) -> None:
+        self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
+        self.elsewhere: set[str] = set()
+        self.verdict: Verdict | None = None
+        self.error: BaseException | None = None
+        self.go, self.paused = Semaphore(0), Semaphore(0)
+        self.thread = Thread(target=self._work, args=(world,), daemon=True)
+        self.thread.start()
+
+    def _work(self, world: World) -> None:
+        self.go.acquire()
+        try:
+            self.verdict = world.execute(self.step)
+        except BaseException as error:
+            self.error = error
+        self.paused.release()
+
+    def advance(self) -> None:
+        """Let the thread run until it wants a step, or ends."""
+        self.go.release()
+        self.paused.acquire()
+        if self.error is not None:
+            raise self.error
+
+    def wait(self) -> None:
+        """Wait for a step of the world; called in the thread."""
+        self.paused.release()
+        self.go.acquire()
+
+
+def perform(
+    world: World, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
+) -> Performance:
+    """Carry out primitives with all hands at once, each as soon as what it needs is done and there is room.
+
+    Parameters
+    ----------
+    world : World
+    problem : Problem
+        Its initial state is the world's.
+    primitives : sequence of Step
+    room : float
+        Metres between the places at which two hands may work at the same time.
+    most : float
+        Simulated seconds after which it is given up.
+    """
+    order, workers = partial_order(problem, primitives), workers_of(problem)
+    urgency = urgency_of(order)
+    where = [_where(world, step) for step in primitives]
+    index = {id(step): i for i, step in enumerate(primitives)}
+
+    def apart(one: Step, other: Step) -> bool:
+        here, there = where[index[id(one)]](), where[index[id(other)]]()
+        return here is None or there is None or float(np.linalg.norm(here - there)) >= room
+
+    step_once, jobs, current = world.run, list[_Job](), list[_Job]()
+
+    def wait_for(steps: int) -> None:
+        for _ in range(steps):
+            current[-1].wait()
+
+    done: dict[int, tuple[Slot, Verdict]] = {}
+    touching = 0
+    world.run = wait_for  # type: ignore[method-assign]
+    try:
+        while len(done) < len(primitives) and world.seconds < most:
+            if all(verdict.ok for _, verdict in done.values()):
+                running = [job.position for job in jobs]
+                for i in ready(order, primitives, workers, [*done, *running], running, urgency, apart):
+                    jobs.append(_Job(world, primitives[i], i, worker_of(primitives[i], workers)))
+            if not jobs:
+                break
+            for job in list(jobs):
+                for other in jobs:
+                    if other is not job:
+                        job.elsewhere |= _seen_to(world, other.step)
+                world.elsewhere = job.elsewhere
+                current.append(job)
+                job.advance()
+                current.pop()
+                if job.verdict is not None:
+                    slot = Slot(job.step, job.position, job.worker, job.begin, world.seconds)
+                    done[job.position] = slot, job.verdict
+                    jobs.remove(job)
+            step_once(1)
+            if world.steps % LOOKING == 0 and arms_touch(world):
+                touching += LOOKING
+    finally:
+        world.run, world.elsewhere = step_once, set()  # type: ignore[method-assign]
+    ordered = sorted(done.values(), key=lambda pair: (pair[0].begin, pair[0].position))
+    return Performance(
+        tuple(slot for slot, _ in ordered), tuple(verdict for _, verdict in ordered), touching / world.rate
+    )
+
+
+def arms_touch(world: World) -> bool:
+    """Whether two hands of the world, arms included, are in contact with each other."""
+    owner: dict[tuple[int, int], str] = {}
+    for name, hand in world.hands.items():
+        owner |= {(hand.body, link): name for link in (*hand.joints, *hand.fingers, hand.tip)}
+    for body in {hand.body for hand in world.hands.values()}:
+        for contact in pybullet.getContactPoints(body, physicsClientId=world.client):
+            one, other = owner.get((contact[1], contact[3])), owner.get((contact[2], contact[4]))
+            if one is not None and other is not None and one != other:
+                return True
+    return False
+
+
+def _seen_to(world: World, step: Step) -> set[str]:
+    """Return the bodies that a primitive moves or may move: those that it names, and what its hand holds."""
+    named = {*step.arguments, *step.bindings.values()}
+    held = {world.held(hand) for hand in named & world.hands.keys()}
+    return {name for name in named | held if name is not None and name in world.bodies}
+
+
+def _where(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
+    """Return a function that says where a primitive is at work now: at its last place or body, else where its hand is."""
+    named = [name for name in (*step.arguments, *step.bindings.values())]
+    hand = next((name for name in named if name in world.hands), None)
+
+    def now() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None:
+        places = [np.array(world.embodiment.places[n].position[:2]) for n in named if n in world.embodiment.places]
+        held = world.held(hand) if hand is not None else None
+        bodies = [world.truth(n)[1][:2] for n in named if n in world.bodies and n != held]
+        if bodies or places:
+            return (bodies or places)[-1]
+        return world.hands[hand].frame()[1][:2] if hand is not None else None
+
+    return now
