@@ -18,6 +18,7 @@ from reasoner.graph import KnowledgeError
 if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.scene import Scene
+    from planner.plan import Plan
 
 YES, NO, MISUSE, GAVE_UP = 0, 1, 2, 3
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
@@ -100,7 +101,9 @@ def run(
 @app.command()
 def verify(
     scene: SceneName,
-    plan: Annotated[Path, typer.Argument(metavar="PLAN.json", help="What 'confab plan --json' prints.")],
+    plan: Annotated[
+        Path, typer.Argument(metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form.")
+    ],
     rollouts: Annotated[
         int, typer.Option("--rollouts", metavar="N", min=1, help="How often, with seeds S, S+1, …")
     ] = 1,
@@ -110,11 +113,10 @@ def verify(
     as_json: AsJson = False,
 ) -> None:
     """Let a robot carry out a plan in physics, and check every primitive there."""
-    from confab.interchange import read_plan
     from confab.scene import load
 
     loaded = load(scene)
-    report = loaded.verify(read_plan(plan, loaded.problem), rollouts=rollouts, seed=seed, perturb=perturb, video=video)
+    report = loaded.verify(_plan(plan, loaded), rollouts=rollouts, seed=seed, perturb=perturb, video=video)
     _print(report.json() if as_json else report)
     raise typer.Exit(YES if report.verified else NO)
 
@@ -352,6 +354,35 @@ def generate(
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
+@app.command("import")
+def import_(
+    domain: Annotated[Path, typer.Argument(metavar="DOMAIN.pddl")],
+    problem: Annotated[Path, typer.Argument(metavar="PROBLEM.pddl")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
+    level: Annotated[int, typer.Option(help="Level of its behaviours; abstract ones can be added above.")] = 1,
+) -> None:
+    """Turn a PDDL problem into a scene, to be edited in Protégé and planned in."""
+    from confab.pddl_commands import import_pddl
+
+    imported = import_pddl(domain, problem, out, level)
+    behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
+    print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
+
+
+@app.command()
+def export(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.")],
+    level: Annotated[int | None, typer.Option(help="Level to export; the lowest if not given.")] = None,
+) -> None:
+    """Write one level of a scene as PDDL, for other planners."""
+    from confab.pddl_commands import export_pddl
+    from confab.scene import load
+
+    for path in export_pddl(load(scene).problem, level, out):
+        print(path)
+
+
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     """Return the memory to plan with, if one was asked for."""
     from confab.memory import Memory
@@ -364,6 +395,17 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
         for term in unknown_terms(path, scene.knowledge):
             print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
     return Memory.load(path, scene) if path is not None else None
+
+
+def _plan(path: Path, scene: Scene) -> Plan:
+    """Return the plan in a file: JSON of ours, else a list of actions as PDDL planners write it for our export."""
+    if path.suffix.lower() in (".json", ""):
+        from confab.interchange import read_plan
+
+        return read_plan(path, scene.problem)
+    from confab.pddl_commands import read_pddl_plan
+
+    return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"))
 
 
 def _print(what: Any) -> None:

@@ -85,7 +85,7 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
     if satisfied is None:
         return None
     after = dict(state)
-    for effect in behavior.effects:
+    for effect in sorted(behavior.effects, key=lambda e: e.value != FALSE):  # what becomes true wins, as in PDDL
         for trial in _assignments(problem, list(effect.when), state, satisfied, kinds):
             symbol = Symbol(effect.situation, tuple(trial.get(a, a) for a in effect.arguments))
             value = trial.get(effect.value, effect.value)
