@@ -104,7 +104,7 @@ class Schema:
         if individual in self.names:
             return individual
         within = [kind for kind in self.mentioned if individual in self.members.get(kind, ())]
-        return min(within, key=lambda kind: (len(self.members[kind]), kind), default=NONE)
+        return min(within, key=lambda kind: (len(self.members[kind]), -_depth(kind, self.problem), kind), default=NONE)
 
     def _ends(self, behavior: Behavior) -> list[End]:
         """Return the roles, then what paths lead to; a determined value is what a path of one step leads to."""
@@ -246,7 +246,9 @@ class View:
         conclusion = Conclusion(behavior, tuple([schema.classes.get(role, NONE) for role in roles]))
         names = [name for name, _ in schema.roles(schema.problem.domain.behaviors[behavior])]
         found = self.values(behavior, roles) if values is None else values
-        return Candidate(conclusion, self.pattern(behavior, found), tuple(zip(names, roles, strict=True)))
+        kinds = [kind for _, kind in schema.roles(schema.problem.domain.behaviors[behavior])]
+        personal = tuple(name for name, kind in zip(names, kinds, strict=True) if len(schema.members[kind]) <= CROWD)
+        return Candidate(conclusion, self.pattern(behavior, found), tuple(zip(names, roles, strict=True)), personal)
 
     def pattern(self, behavior: str, values: Values) -> Pattern:
         """Return values together with the names of their facts."""

@@ -2,7 +2,7 @@
 
 base       the fast planner, exactly as it is without memory
 stream     the search that experience leads (`planner.stream`), one expansion at a time, between two expansions of the base
-strict     the stream gets one expansion for every `DEBT` of the base: never more than 1.05 times the base alone
+strict     the stream gets one expansion for every `DEBT` of the base on its level: never more than 1.05 times the base alone
 guarded    once the base has spent `patience` expansions, the stream leads as long as it gets on; after `STRETCH` expansions
            without a new least number of open goals it owes the base `DEBT` expansions for each of them
 
@@ -79,7 +79,7 @@ class Race:
                 raise ArrivedError
         elif self.base >= max(self.owed, self.patience) and self.lead():
             raise ArrivedError
-        self.base += 1
+        self.base += level == self.stream.field.level
         self.spent[level] = self.spent.get(level, 0) + 1
         return choices
 

@@ -3,7 +3,8 @@
 c, p    how often such candidates were chosen, and passed over (or chosen in vain)
 L       ln((c + ½) / (p + ½)) + Σ w_f · ln(p(f | chosen) / p(f | passed over)) over the facts f
 w_f     relevance of a fact: Jensen–Shannon divergence of both distributions, less what chance alone gives
-o       σ(L), then for each class level downwards (c + κ o) / (c + p + κ) with the counts of the very same pattern
+o       σ(L), then for each class level downwards (c + κ o) / (c + p + κ) with the counts of the very same pattern, and in the end
+        with those of the very individual, each episode since weighing less: what was preferred among equals may change
 
 Equation (1) of the paper drops a factor that all conclusions share, because all see the same facts. Lifted facts differ from one
 candidate to the next; the share of candidates passed over of which they hold, in the denominator, restores the comparison.
@@ -24,7 +25,6 @@ from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tall
 
 ALPHA = 1.0  # how much the class above weighs in a probability
 KAPPA = 2.0  # how much L weighs against counts of the same pattern
-CAUTION = 4.0  # with which individuals are told apart: by few choices, not at all
 DECAY = 0.9  # per episode, of what was preferred among equals
 TOGETHER = "all of this together"
 LEAST = 1e-3  # a fact of less relevance isn't looked at
@@ -65,10 +65,8 @@ class Sums:
         return self.weights[fact]
 
 
-def relevance(pairs: Sequence[tuple[float, float]], caution: float = 1.0) -> float:
+def relevance(pairs: Sequence[tuple[float, float]]) -> float:
     """Return the Jensen–Shannon divergence of two distributions given as counts, less its small-sample bias, in [0, 1].
-
-    `caution` multiplies the bias.
 
     >>> relevance([(50, 0), (0, 50)]) > 0.9, relevance([(50, 50), (50, 50)]), relevance([(1, 0), (0, 1)]) < 0.7
     (True, 0.0, True)
@@ -81,7 +79,7 @@ def relevance(pairs: Sequence[tuple[float, float]], caution: float = 1.0) -> flo
         a, b = c / chosen, p / passed
         middle = (a + b) / 2
         divergence += (a * math.log(a / middle) if a else 0.0) + (b * math.log(b / middle) if b else 0.0)
-    bias = caution * (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
+    bias = (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
     return min(max((divergence / 2 - bias) / math.log(2), 0.0), 1.0)
 
 
@@ -112,7 +110,6 @@ class Judge:
         for conclusion, patterns in experience.totals().items():
             if len(conclusion.classes) == len(roles.get(conclusion.behavior, ())):
                 self.tallies.setdefault(conclusion.behavior, {})[conclusion] = patterns
-        self.liked = self._liked(experience.preferences(DECAY), without)
         self._chains: dict[Conclusion, tuple[tuple[str, ...], ...]] = {}
         self._sums: dict[tuple[str, tuple[str, ...]], Sums] = {}
         self.facts: dict[str, frozenset[str]] = {}
@@ -124,6 +121,7 @@ class Judge:
                 for fact in top.facts
                 if fact not in without and any(sums.relevance(fact) > LEAST for sums in (top, *within))
             )
+        self.liked = self._liked(experience.preferences(DECAY))
         self._odds: dict[tuple[Conclusion, Pattern], float] = {}
 
     def knows(self, behaviors: Iterable[str]) -> bool:
@@ -188,34 +186,35 @@ class Judge:
                 after = math.log(max(o, 1e-9)) - math.log(max(1 - o, 1e-9))
         c, p = levels[0].patterns.get(pattern, (0.0, 0.0))
         found.append(Factor(TOGETHER, f"chosen {c:g} of {c + p:g}", after - before))
-        return found + self._preferences(candidate)
+        return found + self._preferences(candidate, after, pattern)
 
-    def _preferences(self, candidate: Candidate) -> list[Factor]:
-        """Return how much the individuals themselves are preferred to others in their roles."""
-        liked = self.liked.get((candidate.conclusion.behavior, candidate.conclusion.classes), ())
-        return [
-            Factor(f"{role} is", individual, likes[individual])
-            for likes, (role, individual) in zip(liked, candidate.roles, strict=False)
-            if individual in likes
-        ]
+    def _preferences(self, candidate: Candidate, odds: float, pattern: Pattern) -> list[Factor]:
+        """Return how far the individuals themselves are preferred to others in their roles, on top of `odds`."""
+        found = []
+        liked = self.liked.get((candidate.conclusion.behavior, candidate.conclusion.classes), {})
+        for role, individual in candidate.roles if liked else ():
+            c, p = liked.get((*pattern, (f"{role} is who", individual)), (0.0, 0.0))
+            if c + p:
+                before = 1 / (1 + math.exp(-max(min(odds, 50.0), -50.0)))
+                after = (c + KAPPA * before) / (c + p + KAPPA)
+                found.append(Factor(f"{role} is who", individual, math.log(after) - math.log(1 - after) - odds))
+                odds += found[-1].weight
+        return found
 
     def _liked(
-        self, preferred: Mapping[Conclusion, Mapping[tuple[str, str], tuple[float, float]]], without: frozenset[str]
-    ) -> dict[tuple[str, tuple[str, ...]], list[dict[str, float]]]:
-        """Return for each conclusion and role the individuals with how much each is preferred."""
-        found: dict[tuple[str, tuple[str, ...]], list[dict[str, float]]] = {}
+        self, preferred: Mapping[Conclusion, Mapping[Pattern, tuple[float, float]]]
+    ) -> dict[tuple[str, tuple[str, ...]], dict[Pattern, tuple[float, float]]]:
+        """Return the individuals that were preferred, and not, by pattern of the facts that are looked at."""
+        found: dict[tuple[str, tuple[str, ...]], dict[Pattern, tuple[float, float]]] = {}
         for conclusion, table in preferred.items():
-            if len(conclusion.classes) != len(self.roles.get(conclusion.behavior, ())):
+            looked = self.facts.get(conclusion.behavior)
+            if looked is None or len(conclusion.classes) != len(self.roles[conclusion.behavior]):
                 continue
-            likes: list[dict[str, float]] = []
-            for role in self.names[conclusion.behavior]:
-                rows = {
-                    who: pair for (fact, who), pair in table.items() if fact == f"{role} is" and fact not in without
-                }
-                weight = relevance(list(rows.values()), CAUTION)
-                likes.append({who: weight * math.log((c + 0.5) / (p + 0.5)) for who, (c, p) in rows.items() if weight})
-            if any(likes):
-                found[conclusion.behavior, conclusion.classes] = likes
+            liked = found.setdefault((conclusion.behavior, conclusion.classes), {})
+            for pattern, (c, p) in table.items():
+                key = (*(pair for pair in pattern[:-1] if pair[0] in looked), pattern[-1])
+                c0, p0 = liked.get(key, (0.0, 0.0))
+                liked[key] = c0 + c, p0 + p
         return found
 
     def _chain(self, conclusion: Conclusion) -> tuple[tuple[str, ...], ...]:

@@ -19,7 +19,6 @@ from planner.deciding import Field, Ground
 from planner.describing import Values
 from planner.judging import Judge
 from planner.table import Cell, Key, arguments_of
-from reasoner.experience import Conclusion
 from reasoner.symbols import FALSE
 
 WEIGHT = 1  # open goals that one discrepancy weighs
@@ -79,8 +78,7 @@ class Stream:
         for cell, value in field.goal.items():
             for individual in {*arguments_of(cell[1]), value}:
                 self.touching.setdefault(individual, []).append(cell)
-        self._known: dict[tuple[str, tuple[str, ...], Values], float] = {}
-        self._conclusions: dict[tuple[str, tuple[str, ...]], Conclusion] = {}
+        self._known: dict[tuple[str, tuple[str, ...], Values, tuple[str, ...]], float] = {}
         if not self.best:
             self.solution = []
 
@@ -185,20 +183,15 @@ class Stream:
         if roles is None:
             return float("-inf")
         self.evaluated += 1
-        name = ground[0]
-        view = self.field.view
+        name, view = ground[0], self.field.view
         values = view.values(name, roles) if name in self.judge.facts else ()
-        key = name, tuple([self.field.schema.classes.get(role, "") for role in roles]), values
-        known = self._known.get(key)
+        key = name, tuple([self.field.schema.classes.get(role, "") for role in roles])
+        who = roles if key in self.judge.liked else ()
+        known = self._known.get((*key, values, who))
         if known is None:
-            conclusion = Conclusion(*key[:2])
-            known = self._known[key] = self.judge.odds(conclusion, view.pattern(name, values) if values else ())
-        liked = self.judge.liked.get(key[:2])
-        return (
-            known
-            if liked is None
-            else known + sum(likes.get(role, 0.0) for likes, role in zip(liked, roles, strict=False))
-        )
+            candidate = view.candidate(name, roles, values) if name in self.judge.facts else None
+            known = self._known[(*key, values, who)] = self.judge.cogency(candidate) if candidate else 0.0
+        return known
 
     # --------------------------------------------------------------------------------------------------------- moving
 

@@ -7,8 +7,8 @@ Tally           how often such a candidate was chosen, passed over, and failed
 Experience      tallies by replica, epoch, conclusion and pattern: grow-only, so that memories merge
 ==============  =============================================================================================
 
-Epoch 0 holds what never ages. The later epochs, one for each episode of a replica, hold what was preferred among candidates
-alike in every lifted fact: the individuals themselves, whose weight decays when they are read.
+Epoch 0 holds what never ages. The later epochs, one for each episode of a replica, hold which individual was preferred where one
+could have done as well as another (this hand, not that one); their weight decays when they are read.
 """
 
 from __future__ import annotations
@@ -57,11 +57,15 @@ Tallies: TypeAlias = "dict[Conclusion, dict[Pattern, Tally]]"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A quantified behaviour as memory sees it: its conclusion, the facts that hold of it, and the individuals in its roles."""
+    """A quantified behaviour as memory sees it: its conclusion, the facts that hold of it, and the individuals in its roles.
+
+    `personal` are the roles in which individuals themselves may be preferred, since there are few: a hand, but not a place.
+    """
 
     conclusion: Conclusion
     pattern: Pattern
     roles: tuple[tuple[str, str], ...] = ()
+    personal: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,8 @@ class Experience:
     def learn(self, decisions: Iterable[Decision]) -> None:
         """Count the decisions of one episode.
 
-        What was chosen counts once; of the candidates passed over, every pattern other than the chosen one counts once. Among
-        candidates of the same pattern, the individuals that tell them apart are counted, in an epoch of their own.
+        What was chosen counts once; of the candidates passed over, every pattern other than the chosen one counts once. Where
+        one of them differs in a single, personal role, the individuals are counted besides, in an epoch of their own.
         """
         self.episodes[self.replica] = epoch = self.episodes.get(self.replica, 0) + 1
         for decision in decisions:
@@ -114,15 +118,11 @@ class Experience:
             for other in {(c.conclusion, c.pattern): c for c in decision.passed_over}.values():
                 if (other.conclusion, other.pattern) != (chosen.conclusion, chosen.pattern):
                     self._count(0, other, Tally(passed_over=1))
-            alike = [
-                c for c in decision.passed_over if (c.conclusion, c.pattern) == (chosen.conclusion, chosen.pattern)
-            ]
-            for role, individual in chosen.roles:
-                others = {dict(c.roles).get(role) for c in alike} - {individual, None}
-                if others:
-                    self._count(epoch, _individual(chosen, role, individual), Tally(chosen=1))
-                    for who in sorted(o for o in others if o):
-                        self._count(epoch, _individual(chosen, role, who), Tally(passed_over=1))
+            for other in decision.passed_over:
+                role = _told_apart_by(chosen, other)
+                if role is not None:
+                    self._count(epoch, _individual(chosen, role), Tally(chosen=1))
+                    self._count(epoch, _individual(other, role), Tally(passed_over=1))
 
     def merge(self, other: Experience) -> None:
         """Take in another memory: of counters that both have, the greater; of the rest, all. In any order, any number of times."""
@@ -141,15 +141,18 @@ class Experience:
                 table[pattern] = table.get(pattern, Tally()) + tally
         return found
 
-    def preferences(self, decay: float) -> dict[Conclusion, dict[tuple[str, str], tuple[float, float]]]:
-        """Return how often individuals were chosen and passed over among equals, each episode since weighing `decay` less."""
-        found: dict[Conclusion, dict[tuple[str, str], tuple[float, float]]] = {}
+    def preferences(self, decay: float) -> dict[Conclusion, dict[Pattern, tuple[float, float]]]:
+        """Return how often individuals were preferred and not, each episode since weighing `decay` less.
+
+        The patterns end with the fact which individual it was.
+        """
+        found: dict[Conclusion, dict[Pattern, tuple[float, float]]] = {}
         for (replica, epoch), conclusion, pattern, tally in self:
             if epoch:
                 weight = decay ** (self.episodes.get(replica, epoch) - epoch)
                 table = found.setdefault(conclusion, {})
-                chosen, passed = table.get(pattern[0], (0.0, 0.0))
-                table[pattern[0]] = chosen + weight * tally.chosen, passed + weight * tally.passed_over
+                chosen, passed = table.get(pattern, (0.0, 0.0))
+                table[pattern] = chosen + weight * tally.chosen, passed + weight * tally.passed_over
         return found
 
     def __iter__(self) -> Iterator[tuple[tuple[str, int], Conclusion, Pattern, Tally]]:
@@ -168,8 +171,16 @@ class Experience:
         table[candidate.pattern] = table.get(candidate.pattern, Tally()) + tally
 
 
-def _individual(candidate: Candidate, role: str, individual: str) -> Candidate:
-    return Candidate(candidate.conclusion, ((f"{role} is", individual),))
+def _told_apart_by(one: Candidate, other: Candidate) -> str | None:
+    """Return the role in which alone two candidates differ, if it is a personal one."""
+    if one.conclusion.behavior != other.conclusion.behavior:
+        return None
+    roles = [a for a, b in zip(one.roles, other.roles, strict=True) if a != b]
+    return roles[0][0] if len(roles) == 1 and roles[0][0] in one.personal else None
+
+
+def _individual(candidate: Candidate, role: str) -> Candidate:
+    return Candidate(candidate.conclusion, (*candidate.pattern, (f"{role} is who", dict(candidate.roles)[role])))
 
 
 def lineage(kind: str, top: str, parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:

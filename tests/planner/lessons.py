@@ -1,0 +1,61 @@
+"""Generated scenes as problems, and experience gathered on small ones."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from planner.compiling import Program
+from planner.deciding import decisions, shortened, single_level
+from planner.fast import plan
+from planner.guided import Memory
+from reasoner.experience import Experience
+from reasoner.generate import generate
+from reasoner.graph import load
+from reasoner.reading import Reading, read
+from reasoner.symbols import Problem
+
+
+def as_it_is(text: str) -> str:
+    return text
+
+
+def reading_of(text: str) -> Reading:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.ttl"
+        path.write_text(text)
+        return read(load(path))
+
+
+@lru_cache(maxsize=64)
+def problem(
+    family: str, objects: int, seed: int = 0, clutter: int = 0, edit: Callable[[str], str] = as_it_is
+) -> Problem:
+    """Return a generated scene; `edit` changes its Turtle."""
+    return reading_of(edit(generate(family, objects, clutter=clutter, seed=seed))).problem
+
+
+def teach(experience: Experience, lesson: Problem, level: int = 1) -> None:
+    """Let an experience live one episode: a plan of the fast planner, shortened."""
+    within = single_level(lesson, level)
+    program = Program(within)
+    found = plan(within).plan
+    assert found is not None
+    steps = [(step.behavior, step.arguments) for step in found.at_level(level)]
+    if all(step.level == level for step in found.steps):
+        experience.learn(decisions(program, within, level, shortened(program, within, level, steps)))
+
+
+@lru_cache(maxsize=8)
+def taught(
+    families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100, 101, 102, 103)
+) -> Memory:
+    """Return a memory that saw scenes of 4 to 8 objects."""
+    experience = Experience("taught")
+    for family in families:
+        for objects in (4, 6, 8):
+            for seed in seeds:
+                teach(experience, problem(family, objects, seed), level)
+    return Memory(experience)
