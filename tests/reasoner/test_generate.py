@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.refinement import plan
+from planner.fast import plan
 from reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, write_scene
 from reasoner.graph import KnowledgeError, load
 from reasoner.reading import Reading, read
@@ -60,7 +60,7 @@ def test_four_objects_served_are_the_papers_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("family", sorted({*families()} - {"unsolvable", "random"}))
-def test_the_paper_s_mode_plans_four_objects_of_a_family(tmp_path: Path, family: str) -> None:
+def test_four_objects_of_a_family_have_a_plan(tmp_path: Path, family: str) -> None:
     assert plan(reading_of(tmp_path, family, clutter=1).problem).plan
 
 

@@ -201,7 +201,7 @@ def test_what_a_changed_goal_names_is_read_too(tmp_path: Path) -> None:
     assert str(next(s for s in problem.goal if s.arguments == ("thing2",))) == "<thing2, LOCATION>"
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), objects=st.sampled_from([2, 4]), hands=st.integers(1, 3))
 def test_random_tables_are_solvable_in_the_slice_if_in_the_world(seed: int, objects: int, hands: int) -> None:
     with TemporaryDirectory() as folder:
