@@ -33,7 +33,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a file.")]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Shipped name, file, or URL of a SPARQL endpoint.")]
+SceneIri = Annotated[
+    str | None, typer.Option("--scene", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
+]
 Goals = Annotated[
     list[str] | None,
     typer.Option(
@@ -65,12 +68,13 @@ def plan(
     diff: Annotated[
         str | None, typer.Option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
     ] = None,
+    iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
     from confab.scene import load
 
-    loaded = load(scene)
+    loaded = load(scene, iri)
     if diff is not None:
         from confab.authoring import difference
 
@@ -136,13 +140,14 @@ def execute(
     mode: Mode = "guarded",
     seed: Seed = 0,
     save: Annotated[Path | None, typer.Option("--save", metavar="EPISODE.ttl", help="Write the episode here.")] = None,
+    iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
     from confab.live import spectator
     from confab.scene import load
 
-    loaded = load(scene)
+    loaded = load(scene, iri)
     remembered = _memory(memory, no_memory, loaded)
     links = remembered.links if remembered else None
     with spectator() as tell:
@@ -165,12 +170,13 @@ def query(
         str | None, typer.Option(metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
     ] = None,
     form: Annotated[str, typer.Option("--format", help="table, csv or json.")] = "table",
+    iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask a scene in SPARQL, or show the query that quantifies a behaviour."""
     from confab.scene import load
 
-    loaded = load(scene)
+    loaded = load(scene, iri)
     if show is not None:
         from reasoner.quantify import behavior_named, query_for
 
