@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from confab.interchange import step_json
 from planner.acting import Moment, Patience, act
+from planner.caution import Caution
 from planner.episode import Change, End, Episode, Intervention, World
 from planner.plan import Plan
 from planner.repair import Planner
@@ -285,7 +286,8 @@ def execute(
     seed: int = 0,
     tell: Callable[[Moment], None] | None = None,
     prepare: Callable[[Any], None] | None = None,
-    patience: Patience = Patience(),  # noqa: B008 - frozen
+    patience: Patience = Patience(),
+    caution: Caution | None = None,
 ) -> Execution:
     """Carry a task out in a closed loop.
 
@@ -308,6 +310,8 @@ def execute(
     prepare : callable, optional
         Called with the PyBullet world before it begins: plants a fault, say.
     patience : Patience
+    caution : Caution, optional
+        What failed in earlier episodes.
 
     Raises
     ------
@@ -318,9 +322,11 @@ def execute(
     wanted = [i for i in texts if isinstance(i, Intervention)]
     wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
     if not isinstance(world, str):
-        return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell))
+        return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
     if world == "symbolic":
-        return Execution(scene, act(problem, SymbolicWorld(problem), plan, wanted, planner, patience, tell))
+        return Execution(
+            scene, act(problem, SymbolicWorld(problem), plan, wanted, planner, patience, tell, True, caution)
+        )
     if world != "pybullet":
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
     from sim.live import LiveWorld
@@ -330,4 +336,4 @@ def execute(
         if prepare is not None:
             prepare(physics)
         live = LiveWorld(physics, problem.classes)
-        return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell))
+        return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell, True, caution))

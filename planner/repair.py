@@ -31,6 +31,9 @@ RESTING = Effort(depth=6, expansions=400)
 CLOSE = 1.1
 """A repair within this factor of the least that its goals can cost is taken without comparing it with replanning."""
 
+SHORT = 48.0
+"""A repair that costs no more than this is always compared: a detour would weigh much, and replanning takes little."""
+
 MOST = 5_000
 """So many expansions a repair may take, before the whole is planned anew."""
 
@@ -87,10 +90,11 @@ def mend(
     begin = perf_counter()
     using = using or compiled(problem)
     repaired = repair(problem, rest, planned, using, in_progress, limits)
-    if repaired is not None and repaired.cost <= CLOSE * repaired.least:
+    if repaired is not None and SHORT < repaired.cost <= CLOSE * repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
-    quick = partial(fast_plan, limits=limits, using=using, improve=0) if repaired is not None else planner
-    anew, outcome = replan(problem, quick, using, limits)
+    if repaired is not None and repaired.cost > SHORT and planner is None:
+        planner = partial(fast_plan, limits=limits, using=using, improve=0)  # good enough to compare with
+    anew, outcome = replan(problem, planner, using, limits)
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
     return Mended("replan", anew, cost(problem, anew or ()), perf_counter() - begin, outcome)

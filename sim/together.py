@@ -161,7 +161,7 @@ def _seen_to(world: World, step: Step) -> set[str]:
 
 def _where(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
     """Return a function that says where a primitive is at work now: at its last place or body, else where its hand is."""
-    named = [name for name in (*step.arguments, *step.bindings.values())]
+    named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 
     def now() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None:

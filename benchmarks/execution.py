@@ -1,0 +1,401 @@
+"""The closed loop: figure 8, random interventions, repair against replanning, learning from failure, both hands at once.
+
+``python -m benchmarks execution``; parts by name with ``python -m benchmarks.execution figure8 repair …``.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from random import Random
+from statistics import median
+from time import perf_counter
+
+import confab
+from confab.execution import execute
+from confab.gantt import save_gantt
+from planner.acting import Patience, act
+from planner.caution import Caution
+from planner.episode import Change, End, Episode, Intervention
+from planner.fast import compiled
+from planner.fast import plan as fast_plan
+from planner.plan import Limits, Plan, Step
+from planner.repair import cost, difference, mend, replan
+from planner.symbolic import Said, SymbolicWorld, disturbed, with_individual
+from planner.validation import successor
+from reasoner.generate import write_scene
+from reasoner.graph import load
+from reasoner.reading import read
+from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
+
+KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
+OUT = Path("confab-out/execution")
+SYMBOLIC, PHYSICAL = 1000, 50
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A problem, a plan for it, and the situation before each primitive and in the end."""
+
+    problem: Problem
+    plan: Plan
+    states: tuple[State, ...]
+
+    @classmethod
+    def of(cls, problem: Problem) -> Trial:
+        found = fast_plan(problem).plan
+        assert found is not None
+        states = [problem.initial]
+        for step in found.primitives:
+            after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, states[-1])
+            assert after is not None
+            states.append(after)
+        return cls(problem, found, tuple(states))
+
+
+def served(objects: int) -> Problem:
+    """Return a generated scene in which every cup shall be moved and filled, and every bottle be back."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"served-{objects}.ttl"
+        write_scene(path, "served", objects)
+        return read(load(path)).problem
+
+
+# ------------------------------------------------------------------------------------------------------- interventions
+
+
+def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
+    """Return something that a person could do in a situation: no two objects at one place, nothing unheard of.
+
+    What a place and what a content is, is taken from the domain: values that exist from a later level on (in the hand) mark the
+    situation type of places; the other one of the first level is that of contents.
+    """
+    first = [s for s in problem.domain.situations.values() if s.level == 1 and not s.boolean]
+    where = next(s for s in first if problem.value_levels.keys() & set(problem.classes[s.range]))
+    content = next(s for s in first if s is not where)
+    empty, drinks = _contents(problem, content)
+    taken = {*state.values(), *problem.goal.values()}
+    places = [v for v in problem.classes[where.range] if v not in problem.value_levels and v not in taken]
+    movable = [o for o in problem.classes[where.arguments[0]] if Symbol(where.name, (o,)) in state]
+    receivers = [s for s in problem.goal if s.situation == content.name and s in state]
+    standing = [s for s in problem.goal if s.situation == where.name and s in state]
+    one, place = Symbol(where.name, (random.choice(movable),)), random.choice(places)
+    if kind == "move":
+        return Intervention(Change.WORLD, (Fact(one, place),))
+    if kind == "remove":
+        return Intervention(Change.REMOVE, individual=one.arguments[0])
+    if kind == "add":
+        sort = min(
+            (k for k, m in problem.classes.items() if one.arguments[0] in m), key=lambda k: len(problem.classes[k])
+        )
+        facts = (Fact(Symbol(where.name, ("newcomer",)), place), Fact(Symbol(content.name, ("newcomer",)), empty))
+        return Intervention(Change.ADD, facts, individual="newcomer", kind=sort)
+    if kind == "empty":
+        return Intervention(Change.WORLD, (Fact(random.choice(receivers), empty),))
+    if kind == "fill":
+        return Intervention(Change.WORLD, (Fact(random.choice(receivers), random.choice(drinks)),))
+    if kind == "goal changed":
+        return Intervention(Change.GOAL, (Fact(random.choice(standing), place),))
+    if kind == "goal added":
+        free = [s for s in map(lambda o: Symbol(where.name, (o,)), movable) if s not in problem.goal]
+        return (
+            Intervention(Change.GOAL, (Fact(random.choice(free), place),))
+            if free
+            else (Intervention(Change.GOAL, (Fact(random.choice(receivers), random.choice(drinks)),)))
+        )
+    return Intervention(Change.DROP_GOAL, symbol=random.choice(sorted(problem.goal)))
+
+
+def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
+    """Return the value that means nothing, and the others: nothing is in no class below that of the values."""
+    below = {v for k, m in problem.classes.items() if content.range in problem.parents.get(k, ()) for v in m}
+    values = problem.classes[content.range]
+    return next(v for v in values if v not in below), [v for v in values if v in below]
+
+
+def timed(intervention: Intervention, trial: Trial, position: int, inside: bool, second: float) -> Intervention:
+    """Say when it happens: at a second inside a primitive, or once one is done; what is wanted changes between primitives."""
+    if inside and intervention.of_world:
+        return replace(intervention, at=second)
+    return replace(intervention, after=trial.plan.primitives[position].path)
+
+
+# ------------------------------------------------------------------------------------------------------- the measurements
+
+
+def figure8() -> None:
+    """Print the course of figure 8 in both worlds, by ID."""
+    scene = confab.load("beverage-serving")
+    texts = ["after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8"]
+    print(
+        "| world | status | IDs of the top level | IDs below 39 | dropped, added | simulated s |\n|---|---|---|---|---|---|"
+    )
+    for world in ("symbolic", "pybullet"):
+        episode = execute(scene, scene.problem, None, texts, world).episode
+        last = {m.id: [p.id for p in m.steps] for m in episode.done.steps[-1].steps}
+        (change,) = episode.replans
+        print(
+            f"| {world} | {episode.status.value} | {[s.id for s in episode.done.steps]} | {last} | {change.dropped}, "
+            f"{change.added} | {episode.seconds['simulated']:.1f} |",
+            flush=True,
+        )
+
+
+def interventions() -> None:
+    """Print how episodes with one random intervention end, in the symbolic world."""
+    trial, ends = Trial.of(served(20)), Counter[tuple[str, str]]()
+    begin, longest, wrong = perf_counter(), 0, 0
+    for seed in range(SYMBOLIC):
+        random, kind = Random(seed), KINDS[seed % len(KINDS)]
+        position = random.randrange(len(trial.plan.primitives))
+        intervention = random_intervention(trial.problem, trial.states[position], random, kind)
+        assert intervention is not None
+        happening = timed(intervention, trial, position, random.random() < 0.5, position + 0.5)
+        episode = act(trial.problem, SymbolicWorld(trial.problem), trial.plan, [happening])
+        ends[kind, episode.status.value] += 1
+        longest = max(longest, len(episode.events))
+        wrong += not _right(episode)
+    _table(ends)
+    print(
+        f"\n{SYMBOLIC} episodes at n = 20, half of what changes the world inside a primitive; {wrong} with a claim that isn't so; "
+        f"the longest began {longest} primitives (the plan has {len(trial.plan.primitives)}); {perf_counter() - begin:.0f} s."
+    )
+
+
+def physical() -> None:
+    """Print how episodes with one random intervention end, in PyBullet."""
+    scene = confab.load("beverage-serving")
+    trial, ends = Trial.of(scene.problem), Counter[tuple[str, str]]()
+    failures, wrong = Counter[str](), 0
+    for seed in range(PHYSICAL):
+        random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
+        position = random.randrange(len(trial.plan.primitives))
+        intervention = random_intervention(trial.problem, trial.states[position], random, kind)
+        assert intervention is not None
+        inside, second = random.random() < 0.5, 1 + 30 * random.random()
+        happening = timed(intervention, trial, position, inside, second)
+        episode = execute(scene, trial.problem, trial.plan, [happening], "pybullet", seed=seed).episode
+        ends[kind, episode.status.value] += 1
+        failures.update(failure.code for failure in episode.failures)
+        wrong += not _right(episode)
+        if episode.status is End.GAVE_UP:
+            print(
+                f"gave up, seed {seed}, {kind} {happening.facts or happening.individual}: {episode.reasons[-1].text}\n"
+            )
+    _table(ends)
+    print(f"\n{wrong} with a claim that isn't so; primitives failed: {dict(failures)}")
+
+
+def repair() -> None:
+    """Print cost, distance and latency of repair against replanning."""
+    print(
+        "| n | interventions | cost, sum | over 1.1 × | worst | distance, median | ratio, median | ms, median | ms, p95 | replanned |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for objects, count in ((4, 500), (20, 1000), (200, 60)):
+        _repair_row(objects, count)
+    print("\nEach cell: repair / replanning from scratch. Distance counts primitives dropped and added, in sequence.")
+
+
+def _repair_row(objects: int, count: int) -> None:
+    trial = Trial.of(served(objects))
+    problem, own, other = trial.problem, compiled(trial.problem), compiled(trial.problem)
+    costs, distances, seconds = list[tuple[float, float]](), list[tuple[int, int]](), list[tuple[float, float]]()
+    anew, limits = 0, Limits(seconds=20)
+    for seed in range(count):
+        random, kind = Random(seed), KINDS[seed % len(KINDS)]
+        position = random.randrange(len(trial.plan.primitives))
+        intervention = random_intervention(problem, trial.states[position], random, kind)
+        assert intervention is not None
+        rest = _rest_after(trial.plan, position)
+        before = replace(problem, initial=trial.states[position])
+        now = _changed(before, intervention)
+        ours, theirs = (compiled(now), compiled(now)) if kind == "add" else (own, other)
+        begin = perf_counter()
+        mended = mend(now, rest, before, None, ours, True, limits)
+        middle = perf_counter()
+        scratch, _ = replan(now, None, theirs, limits)
+        end = perf_counter()
+        if mended.steps is None or scratch is None:
+            assert mended.steps is None and scratch is None
+            continue
+        anew += mended.kind == "replan"
+        costs.append((mended.cost, cost(problem, scratch)))
+        distances.append((sum(difference(rest, mended.steps)), sum(difference(rest, scratch))))
+        seconds.append((middle - begin, end - middle))
+    worst = max((a / b for a, b in costs if b), default=1.0)
+    over = sum(a > 1.1 * b for a, b in costs)
+    ratio = median(a / b for a, b in distances if b)
+    sums, middles = [sum(c) for c in zip(*costs, strict=True)], [median(d) for d in zip(*distances, strict=True)]
+    times = [sorted(s) for s in zip(*seconds, strict=True)]
+    fifty, ninety_five = ([1000 * t[int(len(t) * q)] for t in times] for q in (0.5, 0.95))
+    print(
+        f"| {objects} | {len(costs)} | {sums[0]:.0f} / {sums[1]:.0f} ({sums[0] / sums[1]:.3f}) | {over} | {worst:.2f} | "
+        f"{middles[0]:g} / {middles[1]:g} | {ratio:.2f} | {fifty[0]:.1f} / {fifty[1]:.1f} | "
+        f"{ninety_five[0]:.1f} / {ninety_five[1]:.1f} | {anew} |",
+        flush=True,
+    )
+
+
+def _changed(before: Problem, intervention: Intervention) -> Problem:
+    """Return the situation and the goal after an intervention; of what is taken away nothing is wanted any more."""
+    goal = dict(before.goal)
+    if intervention.change is Change.GOAL:
+        goal.update((fact.symbol, fact.value) for fact in intervention.facts)
+    elif intervention.change is Change.DROP_GOAL and intervention.symbol is not None:
+        del goal[intervention.symbol]
+    elif intervention.change is Change.REMOVE:
+        goal = {s: v for s, v in goal.items() if intervention.individual not in s.arguments}
+    else:
+        wider = with_individual(before, intervention.individual, intervention.kind) if intervention.kind else before
+        return replace(wider, initial=disturbed(wider, before.initial, intervention))
+    return replace(
+        before,
+        goal=goal,
+        initial=disturbed(before, before.initial, intervention) if intervention.of_world else before.initial,
+    )
+
+
+def _rest_after(plan: Plan, count: int) -> list[Step]:
+    """Return what is left of a plan after so many primitives."""
+    gone = {step.path for step in plan.primitives[:count]}
+
+    def left(steps: Sequence[Step]) -> list[Step]:
+        kept = [
+            replace(s, steps=tuple(left(s.steps))) if s.steps else s for s in steps if s.steps or s.path not in gone
+        ]
+        return [s for s in kept if s.steps or s.path not in gone and s.level == plan.primitives[0].level]
+
+    return left(plan.steps)
+
+
+def learning() -> None:
+    """Print success over episodes with a planted obstacle, with and without learning from failure."""
+    scene = confab.load("beverage-serving")
+    patience = Patience(failures=2)
+    print("| world | learning | success by episode |\n|---|---|---|")
+    for learns in (False, True):
+        ends = [_obstructed(scene.problem, learns, seed, 8, patience) for seed in range(100)]
+        rates = [sum(run[i] for run in ends) for i in range(8)]
+        print(
+            f"| symbolic, obstacle fails 9 of 10, 100 robots | {learns} | {' '.join(f'{r} %' for r in rates)} |",
+            flush=True,
+        )
+    from sim.faults import hidden_wall
+
+    for learns in (False, True):
+        caution, ends_here = Caution(), list[str]()
+        for seed in range(4):
+            run = execute(
+                scene, scene.problem, None, (), "pybullet", None, seed, None, hidden_wall("bottle2"), patience, caution
+            )
+            ends_here.append(run.episode.status.value)
+            caution = caution.learned(run.episode) if learns else caution
+        print(
+            f"| PyBullet, a wall that isn't perceived before bottle2 | {learns} | {', '.join(ends_here)} |", flush=True
+        )
+
+
+def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, patience: Patience) -> list[bool]:
+    """Return which episodes of a robot succeed if its first way to the plan's last object is mostly blocked."""
+    random, caution, found = Random(seed), Caution(), list[bool]()
+    reach = next(
+        s
+        for s in reversed(Trial.of(problem).plan.primitives)
+        if len(s.arguments) == 2 and s.arguments[1] in problem.classes["Object"]
+    )
+    first = next(
+        s
+        for s in Trial.of(problem).plan.primitives
+        if s.arguments[0] == reach.arguments[0] and s.bindings.get("place") and _is_source(problem, s)
+    )
+
+    def fault(step: Step, state: State) -> Said | None:
+        hit = (
+            step.arguments == first.arguments
+            and state[Symbol(_where(problem), first.arguments[1:])] == first.bindings["place"]
+        )
+        return Said(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
+
+    for _ in range(episodes):
+        episode = act(problem, SymbolicWorld(problem, fault=fault), patience=patience, caution=caution)
+        found.append(episode.status is End.REACHED)
+        caution = caution.learned(episode) if learns else caution
+    return found
+
+
+def _where(problem: Problem) -> str:
+    return next(
+        s.name
+        for s in problem.domain.situations.values()
+        if s.level == 1 and problem.value_levels.keys() & set(problem.classes[s.range])
+    )
+
+
+def _is_source(problem: Problem, step: Step) -> bool:
+    """Whether a primitive reaches for something that another hand could take as well."""
+    rows = next(iter(problem.relations.values()))
+    return len(step.arguments) == 2 and sum(row[1] == step.bindings.get("place") for row in rows) > 1
+
+
+def both_hands() -> None:
+    """Print makespan with both hands against serial, and draw the Gantt strip."""
+    from sim.together import perform
+    from sim.verify import expectations, verify
+    from sim.world import World
+
+    scene = confab.load("beverage-serving")
+    plan = Trial.of(scene.problem).plan
+    steps = plan.primitives
+    promised = expectations(scene.problem, steps)
+    serial = verify(scene.embodiment, scene.problem.initial, steps, promised)
+    with World(scene.embodiment, scene.problem.initial) as world:
+        performed = perform(world, scene.problem, steps)
+        seconds, seen = world.seconds, world.observe()
+    same = all(promised[-1].get(symbol) == value for symbol, value in seen.items())
+    ratio = seconds / serial.simulated_seconds
+    print(
+        "| | simulated s | ratio | arms in contact | all primitives succeed | same end state |\n|---|---|---|---|---|---|"
+    )
+    print(f"| serial | {serial.simulated_seconds:.1f} | 1 | – | {serial.ok} | – |")
+    print(f"| both hands | {seconds:.1f} | {ratio:.2f} | {performed.touching:.2f} s | {performed.ok} | {same} |")
+    path = save_gantt(performed.slots, OUT / "gantt.png", serial.simulated_seconds)
+    print(f"\nThe Gantt strip: {path}")
+
+
+def _right(episode: Episode) -> bool:
+    """Whether what the episode claims is so: what is wanted in the end holds; nothing is said to be impossible for no reason."""
+    holds = all(episode.observed.get(s, FALSE) == v for s, v in episode.goal.items())
+    return holds and (episode.status is End.REACHED) == (not episode.reasons)
+
+
+def _table(ends: Counter[tuple[str, str]]) -> None:
+    statuses = [end.value for end in End]
+    print(f"| intervention | {' | '.join(statuses)} |\n|---|---|---|---|")
+    for kind in KINDS:
+        print(f"| {kind} | {' | '.join(str(ends[kind, status]) for status in statuses)} |")
+
+
+PARTS: dict[str, Callable[[], None]] = {
+    "figure8": figure8,
+    "repair": repair,
+    "interventions": interventions,
+    "learning": learning,
+    "both_hands": both_hands,
+    "physical": physical,
+}
+
+
+def main() -> None:
+    """Print all tables, or those named on the command line of this module."""
+    for name in [a for a in sys.argv[1:] if a in PARTS] or PARTS:
+        print(f"\n### {name}\n", flush=True)
+        PARTS[name]()
+
+
+if __name__ == "__main__":
+    main()
