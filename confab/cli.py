@@ -65,6 +65,13 @@ def plan(
     no_memory: NoMemory = False,
     mode: Mode = "guarded",
     time_limit: TimeLimit = None,
+    optimal: Annotated[
+        bool, typer.Option("--optimal", help="Improve until proved optimal, or a limit; tell the bound.")
+    ] = False,
+    observed: Annotated[
+        Path | None,
+        typer.Option("--from-observed", metavar="FILE", help="Start from what was seen, not from the scene."),
+    ] = None,
     diff: Annotated[
         str | None, typer.Option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
     ] = None,
@@ -82,7 +89,7 @@ def plan(
         _print(changed.json() if as_json else str(changed))
         raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
-    result = loaded.plan(goal or (), remembered, mode, time_limit)
+    result = loaded.plan(goal or (), remembered, mode, time_limit, optimal, observed)
     _print(result.json() if as_json else result)
     raise typer.Exit(EXIT[result.outcome.status.value])
 
@@ -400,7 +407,15 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
         for term in unknown_terms(path, scene.knowledge):
             print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
-    return Memory.load(path, scene) if path is not None else None
+    if path is None:
+        return None
+    try:
+        return Memory.load(path, scene)
+    except KnowledgeError as error:
+        if not path.is_file():
+            raise
+        print(f"confab: {error}\nconfab: planning goes on without memory", file=sys.stderr)
+        return None
 
 
 def _plan(path: Path, scene: Scene) -> Plan:

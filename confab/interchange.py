@@ -34,6 +34,8 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
     if outcome.plan is not None:
         data["length"] = {str(level): count for level, count in outcome.plan.length.items()}
         data["steps"] = [step_json(step) for step in outcome.plan.steps]
+    if outcome.bound is not None:
+        data["bound"] = outcome.bound
     if outcome.reason is not None:
         data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
     data["search"] = {

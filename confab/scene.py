@@ -190,6 +190,8 @@ class Scene:
         memory: Memory | Links | None = None,
         mode: str = DEFAULT_MODE,
         time_limit: float | None = None,
+        optimal: bool = False,
+        observed: str | Path | None = None,
     ) -> Result:
         """Plan in this scene.
 
@@ -205,12 +207,18 @@ class Scene:
             numbered among the individuals that were recognised.
         time_limit : float, optional
             Seconds after which the call gives up.
+        optimal : bool
+            Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
+        observed : str or Path, optional
+            File of observed facts, which replace the scene's.
 
         Raises
         ------
         KnowledgeError
-            A goal names what the scene doesn't have, or the mode is unknown.
+            A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
         """
+        if optimal and (mode == "paper" or memory is not None):
+            raise KnowledgeError("the optimal search uses neither memory nor the paper's mode; leave one out")
         self._pull()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
@@ -220,7 +228,7 @@ class Scene:
             from planner.refinement import plan as paper_plan
             from reasoner.quantify import quantify
 
-            problem = with_goals(self.reading, goals)
+            problem = with_goals(self._seen(self.reading, observed), goals)
             grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
             quantified = perf_counter() - begin
             links = memory if isinstance(memory, Links) or memory is None else memory.links
@@ -229,13 +237,24 @@ class Scene:
             from planner.fast import compiled
             from planner.guided import plan as guided_plan
 
-            problem = with_goals(recognise(self.knowledge, goals), goals)
+            seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
+            problem = with_goals(seen, goals)
             using = compiled(problem)
             quantified = perf_counter() - begin
-            advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
-            outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
+            if optimal:
+                from planner.optimal import plan as optimal_plan
+
+                outcome = optimal_plan(problem, limits=limits, using=using)
+            else:
+                advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
+                outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
         queries = self.knowledge.round_trips - asked
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
+
+    def _seen(self, reading: Reading, observed: str | Path | None) -> Reading:
+        from reasoner.observed import load_observed
+
+        return reading if observed is None else load_observed(Path(observed), reading)
 
     def execute(
         self,

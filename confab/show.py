@@ -51,8 +51,9 @@ def summary(outcome: Outcome) -> str:
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
-    lengths = " / ".join(map(str, outcome.plan.length.values()))
-    return f"solved: {lengths} steps per level, {expanded} expansions in all, {outcome.seconds * 1000:.0f} ms of search"
+    bound = "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
+    lengths = " / ".join(map(str, outcome.plan.length.values())) or "no"
+    return f"solved: {lengths} steps per level, {expanded} expansions in all, {outcome.seconds * 1000:.0f} ms of search{bound}"
 
 
 def plan_html(plan: Plan, notes: Notes | None = None) -> str:

@@ -1,0 +1,34 @@
+"""Planning from what was seen, and planning with a proved bound."""
+
+from pathlib import Path
+
+import pytest
+
+import confab
+from reasoner.observed import save_observed
+from reasoner.symbols import Symbol
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+def test_a_plan_can_start_from_what_was_seen(tmp_path: Path, scene: confab.Scene) -> None:
+    seen = {**scene.problem.initial, Symbol("LOCATION", ("cup1",)): "location7"}
+    save_observed(tmp_path / "seen.ttl", seen, scene.names, scene.iri)
+    steps = [str(step) for step in scene.plan(observed=tmp_path / "seen.ttl").plan.steps]
+    assert len(steps) == 3
+    assert not any("B1_MOVE cup1" in step for step in steps)
+
+
+def test_the_bound_is_no_more_than_the_plan_costs(scene: confab.Scene) -> None:
+    result = scene.plan(optimal=True, time_limit=2.0)
+    assert result.outcome.bound is not None
+    assert 0 < result.outcome.bound <= len(result.plan.primitives) <= 32
+    assert result.json()["bound"] == result.outcome.bound
+
+
+def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> None:
+    with pytest.raises(confab.KnowledgeError, match="neither memory nor the paper's mode"):
+        scene.plan(optimal=True, mode="paper")
