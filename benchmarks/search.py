@@ -259,7 +259,7 @@ def random_tables() -> None:
             sys.exit(f"a false answer: {outcome.status.value}, {outcome.reason}")
         if outcome.plan is not None:
             check(problem, outcome, "random table", easy=False)
-            over.append(len(outcome.plan.primitives) / max(len(truth.steps or ()), 1))
+            over += [len(outcome.plan.primitives) / len(truth.steps)] if truth.steps else []
     for what, number in sorted(found.items()):
         print(f"{what}: {number}")
     print(f"states searched for the truth: {min(sizes)} to {max(sizes)}, median {median(sizes):.0f}")

@@ -308,7 +308,7 @@ class Space:
         size = 1
         for members in choices:
             size *= len(members)
-        if size > 20 * self.most_operators:
+        if size > 5 * self.most_operators:
             raise TooLargeError(f"{behavior.name} has {size} quantifications")
         for arguments in product(*choices):
             for env, parts in self._grounded(

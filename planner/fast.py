@@ -19,23 +19,23 @@ from __future__ import annotations
 from contextlib import suppress
 from time import perf_counter
 
-from planner.exhaust import Space, TooLargeError
+from planner.exhaust import TooLargeError
 from planner.flat import plan_level
 from planner.improve import Improver
 from planner.plan import Limits, Outcome, Plan, Reason, Status
 from planner.proofs import contested, unattainable
 from planner.segments import Advice, LimitError
-from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled
+from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled, exhaust
 from reasoner.symbols import Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
-STATES_PER_EXPANSION = 10
+FIRST_TURN = 2_000
+"""Expansions of flat search before exhaustion has its first turn."""
+STATES_PER_EXPANSION = 20
 """Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
-SMALL = 36
-"""Bits of a state up to which exhaustion comes before flat search."""
 
 
 def plan(
@@ -88,20 +88,20 @@ def plan(
 
 
 def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:
-    """Decide a problem on its lowest level alone: every state if they are few enough to be counted, else flat search."""
-    level = problem.domain.levels[-1]
-    try:
-        space = Space(problem, level)
-        if space.bits <= SMALL:
-            found = space.search(limits.expansions * STATES_PER_EXPANSION, deadline)
-            if found.steps is not None:
-                return Status.SOLVED, Plan(found.steps), None
-            states = f"all {found.states} states of level {level} that can be reached were looked at"
-            return Status.UNSOLVABLE, None, Reason(f"no state with the goal's facts can be reached; {states}")
-    except TimeoutError:
-        return Status.GAVE_UP, None, Reason("stopped at the limit: the time limit")
-    except TooLargeError:
-        pass
-    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-    flat = plan_level(problem, level, limits=Limits(limits.expansions, left))
+    """Decide a problem on its lowest level alone: by its states if they are few enough to be counted, and by flat search.
+
+    The two take turns, each first with little: which of them is the right one can't be told beforehand.
+    """
+    for expansions in (min(limits.expansions, FIRST_TURN), limits.expansions):
+        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+        flat = plan_level(problem, limits=Limits(expansions, left))
+        if flat.status is not Status.GAVE_UP or (deadline is not None and perf_counter() > deadline):
+            break
+        try:
+            found = exhaust(problem, deadline, expansions * STATES_PER_EXPANSION)
+        except TooLargeError:
+            continue
+        except LimitError as limit:
+            return Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}")
+        return (Status.SOLVED, found, None) if isinstance(found, Plan) else (Status.UNSOLVABLE, None, found)
     return flat.status, flat.plan, flat.reason

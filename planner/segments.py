@@ -251,8 +251,7 @@ class Segments:
         self.expanded += 1
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
-        if self.expanded % 32 == 0:
-            self.check_time()
+        self.check_time()
 
     def exists(self, situation: str, key: object) -> bool:
         """Whether a boolean symbol exists that the table doesn't list."""
@@ -298,6 +297,7 @@ class Segments:
         wants: Iterable[Want] = [(*cell, (value,))]
         length = 0
         while wants and len(asked) < questions:
+            self.check_time()
             length += 1
             yield length, None
             blocked = []

