@@ -402,14 +402,14 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
-    if path is not None and path.is_file():
-        from confab.authoring import unknown_terms
-
-        for term in unknown_terms(path, scene.knowledge):
-            print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
     if path is None:
         return None
     try:
+        if path.is_file():
+            from confab.authoring import unknown_terms
+
+            for term in unknown_terms(path, scene.knowledge):
+                print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
         return Memory.load(path, scene)
     except KnowledgeError as error:
         if not path.is_file():

@@ -6,6 +6,7 @@ paper's links between facts and quantified behaviours, which the paper's mode re
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from confab.scene import Scene
     from planner.guided import Memory as Advisor
     from reasoner.symbols import Problem
-
-ENDPOINTS = ("http://", "https://")
 
 
 @dataclass
@@ -79,9 +78,10 @@ class Memory:
         KnowledgeError
             The memory is missing, broken or newer than this program; the message says what to do.
         """
-        if str(source).startswith(ENDPOINTS):
-            names, iri = (scene.names, scene.iri) if scene is not None else (Names(()), str(source))
-            found = cls(Links(), names, iri, pull(str(source), names))
+        url = endpoint(source)
+        if url is not None:
+            names, iri = (scene.names, scene.iri) if scene is not None else (Names(()), url)
+            found = cls(Links(), names, iri, pull(url, names))
         else:
             path = Path(source)
             iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path)
@@ -124,9 +124,10 @@ class Memory:
 
     def save(self, target: str | Path) -> Path:
         """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters."""
-        if str(target).startswith(ENDPOINTS):
-            push(str(target), self.experience, self.names, self.scene)
-            return Path(str(target))
+        url = endpoint(target)
+        if url is not None:
+            push(url, self.experience, self.names, self.scene)
+            return Path(target)
         links = [links_text(self.links, self.names, self.scene)] if len(self.links) else []
         write_whole(Path(target), chain(turtle(self.experience, self.names, self.scene), links))
         return Path(target)
@@ -182,6 +183,16 @@ class Memory:
 
     def _repr_html_(self) -> str:
         return f"<p>{self!r}</p>" + self.counts(20)._repr_html_() + self.table(20)._repr_html_()
+
+
+def endpoint(source: str | Path) -> str | None:
+    """Return the URL of a SPARQL endpoint, even one that a path has cut short; None for a file.
+
+    >>> endpoint(Path("http://localhost:7878/query")), endpoint("memory.ttl")
+    ('http://localhost:7878/query', None)
+    """
+    match = re.match(r"(https?):/+(.*)", str(source))
+    return f"{match[1]}://{match[2]}" if match else None
 
 
 def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = None) -> list[Decision]:
