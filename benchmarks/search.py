@@ -115,7 +115,7 @@ def scale() -> None:
             check(problem, first, f"served {n}")
             check(problem, better, f"served {n} improved")
         plans[n] = seconds
-        peer_seconds, peer_steps = gtpyhop(python, problem) if n <= 1000 else ("", "")
+        peer_seconds, peer_steps = gtpyhop(python, problem) if n <= 200 else ("", "")
         steps = "/".join(str(first.plan.length[level]) for level in (1, 2, 3))
         expansions = "/".join(str(count.expanded) for count in first.search.values())
         print(

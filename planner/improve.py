@@ -21,12 +21,12 @@ from reasoner.symbols import Problem, Symbol
 
 REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
-LARGEST = 5
+LARGEST = 7
 """So many steps a cluster has at most."""
 ALWAYS = 4
 """Classes of so few individuals (the hands) are part of every cluster's world."""
-OPERATORS, STATES = 250, 5_000
-"""The largest world in which a cluster is planned anew."""
+OPERATORS, STATES = 400, 5_000
+"""The largest world in which a cluster is planned anew, the states for each cluster allowed."""
 
 
 def length(steps: Sequence[Done]) -> int:
@@ -44,7 +44,7 @@ class Improver:
     known : dict
         For each shape of a cluster the steps that replace it, or None; kept between calls.
     clusters_left : int
-        So many shapes of clusters may be planned anew; each takes some hundredths of a second.
+        So many shapes of clusters may be planned anew, in worlds as much larger; each takes some hundredths of a second.
     """
 
     refiner: Refiner
@@ -54,6 +54,7 @@ class Improver:
     def __post_init__(self) -> None:
         self.table = self.refiner.table
         self.segments = self.refiner.segments
+        self.states = min(STATES * self.clusters_left, 40 * STATES)
         self.lowest = self.segments.program.levels[-1]
 
     def improve(self, steps: Sequence[Done]) -> list[Done]:
@@ -282,7 +283,7 @@ class Improver:
         goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in initial.items()}
         try:
             small = replace(problem, classes=classes, initial=initial, goal=goal)
-            found = Space(small, level, OPERATORS).search(STATES, self.segments.deadline)
+            found = Space(small, level, OPERATORS).search(self.states, self.segments.deadline)
         except TooLargeError:
             return None
         except TimeoutError as error:

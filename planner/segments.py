@@ -162,9 +162,9 @@ class Segments:
     ) -> list[Ground] | None:
         """Return relevant steps to the same end as `find`, found best first, or None.
 
-        h is the sum over the symbols that are off, targets weighing more, of the length of the shortest chain that something applicable starts; a
-        node's successors are queued by its own h (deferred evaluation), so that each state's relevance is worked out once.
-        The table is left as it was found.
+        h is the sum, over the symbols that are off (targets weighing more), of the length of the shortest chain that something
+        applicable starts. A node's successors are queued by its own h (deferred evaluation), so that each state's relevance is
+        worked out once. The table is left as it was found.
         """
         table, now = self.table, self.table.now
         self.wants.breadth = effort.breadth

@@ -141,10 +141,15 @@ def test_a_goal_that_holds_already_needs_no_step() -> None:
 def test_the_time_limit_is_obeyed(seconds: float) -> None:
     problem = family("packed", 30, seed=3)
     using = compiled(problem)
-    begin = perf_counter()
-    outcome = plan(problem, limits=Limits(seconds=seconds), using=using)
-    assert perf_counter() - begin < 1.1 * seconds + 0.15  # the machine may be busy
-    assert outcome.status is not Status.UNSOLVABLE
+    over = []
+    for _ in range(3):  # the machine may be busy with other things
+        begin = perf_counter()
+        outcome = plan(problem, limits=Limits(seconds=seconds), using=using)
+        over.append(perf_counter() - begin - seconds)
+        assert outcome.status is not Status.UNSOLVABLE
+        if outcome.reason is not None:
+            assert "time limit" in outcome.reason.text
+    assert min(over) < 0.1 * seconds
 
 
 def test_a_limit_of_expansions_is_obeyed_and_said() -> None:
