@@ -1,0 +1,186 @@
+"""Execution at the front desk: the command, what it prints, what it writes, and what it says to misuse."""
+
+import json
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+import confab
+from confab.execution import episode_json, execute, parse_interventions
+from confab.live import View, in_terminal
+from planner.acting import Moment
+from planner.episode import Change
+from planner.symbolic import SymbolicWorld
+from reasoner.episodes import EPISODES, PROV, assert_episode
+from reasoner.graph import KnowledgeError, KnowledgeGraph, read_into, text
+from reasoner.validate import validate
+
+FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
+
+
+def command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-c", "from confab.cli import main; main()", "execute", "beverage-serving", *arguments]
+    return subprocess.run(line, capture_output=True, text=True, cwd=cwd, timeout=60, check=False)
+
+
+def test_figure_8_from_the_command_line_as_json() -> None:
+    done = command("--intervene", FIGURE_8[0], "--intervene", FIGURE_8[1], "--json")
+    data = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert data["status"] == "reached"
+    assert [[m["id"] for m in step["steps"]] for step in data["steps"] if step["id"] == 39] == [[5, 15, 26]]
+    (change,) = data["replans"]
+    assert set(change) >= {"after", "kind", "steps", "cost", "dropped", "added"}
+    assert change["kind"] == "repair"
+    assert [i["text"] for i in data["interventions"]] == list(FIGURE_8)
+
+
+def test_interventions_come_from_a_file_too(tmp_path: Path) -> None:
+    (tmp_path / "day.txt").write_text("# the user\n" + "\n".join(FIGURE_8) + "\n")
+    done = command("--intervene", "day.txt", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "1 change of plan" in done.stdout
+
+
+def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
+    done = command("--intervene", "after=28 remove cup2")
+    assert done.returncode == 1
+    assert "cup2" in done.stdout.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--intervene", "28 cup2"], "wanted 'after=28"),
+        (["--intervene", "after=x cup2 LOCATION location8"], "wanted an ID"),
+        (["--intervene", "after=28 cup9 LOCATION location8"], "did you mean 'cup"),
+        (["--intervene", "after=28 remove cup9"], "did you mean 'cup"),
+        (["--intervene", "after=28 add Cpu cup9 LOCATION location5"], "did you mean 'Cup'"),
+        (["--intervene", "after=28 add Cup cup1 LOCATION location5"], "another name"),
+        (["--intervene", "after=28 drop-goal cup2 LOCATOIN"], "did you mean"),
+        (["--world", "moon"], "unknown world 'moon'"),
+        (["--mode", "magic"], "unknown mode 'magic'"),
+    ],
+)
+def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:
+    done = command(*arguments)
+    assert done.returncode == 2
+    assert word in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_every_form_of_intervention_is_read() -> None:
+    problem = confab.load("beverage-serving").problem
+    texts = [
+        *FIGURE_8,
+        "after=0.1.2 drop-goal cup2 LOCATION",
+        "at=12.5 remove cup2",
+        "after=28 add Cup cup9 LOCATION location5 BEVERAGE no_beverage",
+    ]
+    read = parse_interventions(problem, texts)
+    assert [i.change for i in read] == [Change.WORLD, Change.GOAL, Change.DROP_GOAL, Change.REMOVE, Change.ADD]
+    assert [i.after for i in read] == [28, 28, (0, 1, 2), None, 28]
+    assert read[3].at == 12.5
+    assert [str(fact) for fact in read[4].facts] == ["cup9 LOCATION location5", "cup9 BEVERAGE no_beverage"]
+    with pytest.raises(KnowledgeError):
+        parse_interventions(problem, ["after=28"])
+
+
+def test_an_episode_is_stored_in_the_terms_of_prov(tmp_path: Path) -> None:
+    scene = confab.load("beverage-serving")
+    execution = scene.execute(interventions=FIGURE_8)
+    path = execution.save(tmp_path / "visit.ttl")
+    graph = KnowledgeGraph("")
+    read_into(graph, path, "episodes")
+    count = "SELECT (COUNT(?x) AS ?n) WHERE { ?x a <%s> }"
+    for kind, number in (("Execution", 32), ("Planning", 2), ("Intervention", 2), ("Episode", 1)):
+        ((found,),) = graph.select(count % (EPISODES + kind))
+        assert int(text(found)) == number, kind
+    why = f"""SELECT ?text WHERE {{ ?change <{EPISODES}kind> "repair" ; <{PROV}wasInformedBy> ?person .
+      ?person a <{EPISODES}Intervention> ; <{EPISODES}text> ?text }} ORDER BY ?text"""
+    assert [text(row[0]) for row in graph.select(why)] == sorted(FIGURE_8)
+    assert not validate([path])
+
+
+def test_an_episode_goes_into_the_scenes_own_graph_of_episodes() -> None:
+    scene = confab.load("beverage-serving")
+    assert_episode(scene.knowledge, scene.execute().json(), scene.names)
+    table = scene.query(f"SELECT ?e WHERE {{ GRAPH <urn:confab:graph:episodes> {{ ?e a <{EPISODES}Execution> }} }}")
+    assert len(table) == 32
+
+
+def test_a_result_is_executed_as_it_was_planned() -> None:
+    result = confab.load("beverage-serving").plan()
+    execution = result.execute(interventions=FIGURE_8)
+    assert execution.episode.planned == result.plan
+    assert execution.reached
+    assert "repair" in execution._repr_html_()
+
+
+def test_any_world_with_observe_and_execute_will_do() -> None:
+    scene = confab.load("beverage-serving")
+    world = SymbolicWorld(scene.problem, {"B3_TILT": 5.0})
+    assert execute(scene, scene.problem, world=world).episode.seconds["simulated"] == 40.0
+
+
+def test_the_live_view_shows_step_expectation_intervention_and_change() -> None:
+    scene, view, moments = confab.load("beverage-serving"), View(), list[Moment]()
+    scene.execute(interventions=FIGURE_8, tell=moments.append)
+    shown = []
+    for moment in moments:
+        view.take(moment)
+        console = Console(file=StringIO(), width=150)
+        console.print(view)
+        shown.append(console.file.getvalue())  # type: ignore[attr-defined]
+    first = next(text for text, moment in zip(shown, moments, strict=True) if moment.what == "begin")
+    assert "◀ left_hand HAND_POSITION cup1" in first
+    assert "✋ after=28 cup2 LOCATION location8" in "".join(shown)
+    assert "↻ repair" in "".join(shown)
+    assert "✋" in view._repr_html_()
+
+
+def test_the_terminal_view_takes_every_moment() -> None:
+    console = Console(file=StringIO(), force_terminal=True, width=120)
+    with in_terminal(console) as tell:
+        confab.load("beverage-serving").execute(interventions=FIGURE_8, tell=tell)
+    assert "B1_POUR" in console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def test_the_json_of_an_episode_names_its_surprises() -> None:
+    data = episode_json(
+        confab.load("beverage-serving").execute(interventions=["at=3.5 cup1 LOCATION location6"]).episode
+    )
+    surprises = [s for event in data["events"] for s in event["surprises"]]
+    assert {"symbol": "<cup1, LOCATION>", "expected": "in_hand", "observed": "location6"} in surprises
+
+
+@pytest.mark.slow
+def test_figure_8_in_pybullet_with_the_cup_really_moved() -> None:
+    execution = confab.load("beverage-serving").execute(interventions=FIGURE_8, world="pybullet")
+    assert execution.reached
+    last = execution.episode.done.steps[-1]
+    assert {m.id: [p.id for p in m.steps] for m in last.steps} == {
+        5: [9, 29, 33],
+        15: [11, 35, 37, 33],
+        26: [22, 31, 33],
+    }
+    assert execution.episode.failures == ()
+
+
+@pytest.mark.slow
+def test_both_hands_in_pybullet_are_faster_and_never_touch() -> None:
+    from sim.together import perform
+    from sim.world import World
+
+    scene = confab.load("beverage-serving")
+    plan = scene.plan().plan
+    with World(scene.embodiment, scene.problem.initial) as world:
+        performed = perform(world, scene.problem, plan.primitives)
+        seen, seconds = world.observe(), world.seconds
+    assert performed.ok
+    assert all(seen.get(symbol) == value for symbol, value in scene.problem.goal.items())
+    assert seconds <= 0.75 * sum(slot.end - slot.begin for slot in performed.slots)

@@ -1,0 +1,97 @@
+"""Repair keeps what is still valid, and is a plan; where it is worse than replanning it gives way."""
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from planner.fast import plan
+from planner.plan import Limits, Plan, Step
+from planner.repair import CLOSE, cost, difference, mend, replan, vanished
+from planner.serialise import Compiled, compiled
+from planner.validation import successor
+from reasoner.graph import load
+from reasoner.reading import read
+from reasoner.symbols import Problem, State, Symbol
+
+
+@cache
+def serving() -> Problem:
+    return read(load("beverage-serving")).problem
+
+
+@cache
+def using() -> Compiled:
+    return compiled(serving())
+
+
+@cache
+def planned() -> Plan:
+    found = plan(serving()).plan
+    assert found is not None
+    return found
+
+
+def after(state: State, steps: tuple[Step, ...]) -> State:
+    for step in Plan(steps).primitives:
+        following = successor(serving(), serving().domain.behaviors[step.behavior], step.arguments, state)
+        assert following is not None, step
+        state = following
+    return state
+
+
+def location(individual: str) -> Symbol:
+    return Symbol("LOCATION", (individual,))
+
+
+@pytest.mark.parametrize("changes", [{}, {location("bottle1"): "location8"}, {location("cup1"): "location7"}])
+def test_what_comes_out_leads_to_the_goal_from_the_situation_as_it_is(changes: State) -> None:
+    now = replace(serving(), initial={**serving().initial, **changes})
+    mended = mend(now, planned().steps, serving(), using=using())
+    assert mended.steps is not None
+    end = after(now.initial, mended.steps)
+    assert all(end[symbol] == value for symbol, value in now.goal.items())
+
+
+def test_where_nothing_that_matters_has_changed_nothing_changes() -> None:
+    mended = mend(serving(), planned().steps, serving(), using=using())
+    assert mended.steps is not None
+    assert difference(planned().steps, mended.steps) == (0, 0)
+
+
+def test_what_somebody_else_has_done_is_dropped_and_no_more() -> None:
+    now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
+    mended = mend(now, planned().steps, serving(), using=using())
+    assert mended.steps is not None
+    assert difference(planned().steps, mended.steps) == (6, 0)
+
+
+def test_another_place_is_gone_to_in_place_of_the_old_one() -> None:
+    now = replace(serving(), goal={**serving().goal, location("cup2"): "location6"})
+    mended = mend(now, planned().steps, serving(), using=using())
+    assert mended.steps is not None
+    assert mended.kind == "repair"
+    assert sum(difference(planned().steps, mended.steps)) < 14
+
+
+def test_it_costs_at_most_a_tenth_more_than_replanning() -> None:
+    for place in ("location6", "location8"):
+        for individual in ("cup1", "cup2", "bottle1"):
+            now = replace(serving(), goal={**serving().goal, location(individual): place})
+            mended = mend(now, planned().steps, serving(), using=using())
+            scratch, _ = replan(now, None, using(), Limits())
+            assert (mended.steps is None) == (scratch is None)
+            if scratch is not None:
+                assert mended.cost <= CLOSE * cost(now, scratch)
+
+
+def test_what_is_not_there_is_named() -> None:
+    gone = {symbol: value for symbol, value in serving().initial.items() if symbol.arguments != ("cup2",)}
+    reasons = vanished(replace(serving(), initial=gone))
+    assert [symbol.arguments for symbol, _ in reasons] == [("cup2",), ("cup2",)]
+    assert all("cup2" in reason.terms for _, reason in reasons)
+
+
+def test_done_in_another_order_counts_as_dropped_and_added() -> None:
+    first, second, *others = planned().steps
+    assert sum(difference(planned().steps, (second, first, *others))) == 12
