@@ -11,36 +11,24 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+import numpy as np
 import pybullet
 
 import confab
-from planner.plan import Step
-from reasoner.embodiment import Embodiment
-from reasoner.symbols import State
-from sim.verify import Rollout, expectations, verify
+from sim.rollouts import Trial, rollouts, wilson
+from sim.verify import Rollout, expectations
 from sim.world import Perturbation, World
 
-
-@dataclass(frozen=True)
-class Case:
-    """What `sim.verify.verify` takes."""
-
-    embodiment: Embodiment
-    initial: State
-    steps: Sequence[Step]
-    expected: Sequence[State]
-
-    def rollout(self, seed: int = 0, perturb: Perturbation | None = None, beads: bool = True) -> Rollout:
-        """Carry the plan out once."""
-        return verify(self.embodiment, self.initial, self.steps, self.expected, seed=seed, perturb=perturb, beads=beads)
+WORKERS = 2
+"""Processes that share perturbed rollouts."""
 
 
-def case(name: str) -> Case:
+def case(name: str, perturb: Perturbation | None = None, beads: bool = True) -> Trial:
+    """Return the plan of a shipped scene, to be rolled out."""
     scene = confab.load(name)
     steps = scene.plan(mode="paper").plan.primitives
-    return Case(scene.embodiment, scene.problem.initial, steps, expectations(scene.problem, steps))
+    return Trial(scene.embodiment, scene.problem.initial, steps, expectations(scene.problem, steps), perturb, beads)
 
 
 def line(rollout: Rollout) -> str:
@@ -57,9 +45,9 @@ def line(rollout: Rollout) -> str:
     )
 
 
-def stepping_floor(one: Case, beads: bool, steps: int = 960) -> float:
+def stepping_floor(one: Trial, steps: int = 960) -> float:
     """Return CPU milliseconds per bare simulation step of the initial world, all asleep that can be."""
-    with World(one.embodiment, one.initial, beads=beads) as world:
+    with World(one.embodiment, one.initial, beads=one.beads) as world:
         begin = time.process_time()
         for _ in range(steps):
             pybullet.stepSimulation(physicsClientId=world.client)
@@ -69,20 +57,22 @@ def stepping_floor(one: Case, beads: bool, steps: int = 960) -> float:
 def main() -> None:
     """Print the nominal rollouts of the shipped scenes."""
     for name in ("beverage-serving", "beverage-serving-moved"):
-        one = case(name)
         for beads in (True, False):
-            print(f"{name:24} {'beads' if beads else 'none ':5}  {line(one.rollout(beads=beads))}")
-            print(f"{'':24} bare step {stepping_floor(one, beads):.3f} ms")
+            one = case(name, beads=beads)
+            print(f"{name:24} {'beads' if beads else 'none ':5}  {line(one.run(0))}")
+            print(f"{'':24} bare step {stepping_floor(one):.3f} ms")
 
 
-def perturbed(seeds: Sequence[int]) -> None:
-    one, good = case("beverage-serving"), 0
-    shares: list[float] = []
-    for seed in seeds:
-        rollout = one.rollout(seed, Perturbation())
-        good, shares = good + rollout.ok, [*shares, *rollout.poured]
-        print(seed, line(rollout), flush=True)
-    print(f"{good} of {len(seeds)} verified, mean poured {sum(shares) / max(len(shares), 1):.3f}")
+def perturbed(seeds: Sequence[int], workers: int | str = WORKERS) -> None:
+    """Print perturbed rollouts of the beverage-serving plan, and how many were verified."""
+    one, begin = case("beverage-serving", Perturbation()), time.perf_counter()
+    done = rollouts(one, seeds, workers, lambda rollout: print(rollout.seed, line(rollout), flush=True))
+    good, shares = sum(rollout.ok for rollout in done), [share for rollout in done for share in rollout.poured]
+    low, high = wilson(good, len(done))
+    print(
+        f"{good} of {len(done)} verified (95 % confidence: {low:.1%} to {high:.1%}), mean poured {np.mean(shares):.4f}"
+    )
+    print(f"{len(done) / (time.perf_counter() - begin) * 60:.1f} rollouts per minute with {workers} workers")
 
 
 if __name__ == "__main__":

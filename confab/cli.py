@@ -119,15 +119,22 @@ def verify(
         int, typer.Option("--rollouts", metavar="N", min=1, help="How often, with seeds S, S+1, …")
     ] = 1,
     seed: Seed = 0,
+    workers: Annotated[
+        str, typer.Option("--workers", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
+    ] = "1",
     perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
     video: Annotated[Path | None, typer.Option("--video", metavar="OUT.mp4", help="Film the first rollout.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Let a robot carry out a plan in physics, and check every primitive there."""
+    from confab.physics import counted
     from confab.scene import load
 
     loaded = load(scene)
-    report = loaded.verify(_plan(plan, loaded), rollouts=rollouts, seed=seed, perturb=perturb, video=video)
+    with counted(rollouts) as done:
+        report = loaded.verify(
+            _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done
+        )
     _print(report.json() if as_json else report)
     raise typer.Exit(YES if report.verified else NO)
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planner.plan import Plan
 from reasoner.graph import KnowledgeError
+from sim.rollouts import Done, Trial, wilson
+from sim.rollouts import rollouts as roll_out
 from sim.verify import Rollout, expectations
-from sim.verify import verify as verify_once
 from sim.world import Perturbation, World
 from sim.world import Step as PrimitiveStep
 
@@ -35,10 +36,25 @@ class Report:
         """Whether every rollout did what the plan promises."""
         return all(rollout.ok for rollout in self.rollouts)
 
+    @property
+    def good(self) -> int:
+        """How many rollouts did."""
+        return sum(rollout.ok for rollout in self.rollouts)
+
+    @property
+    def poured(self) -> float | None:
+        """Mean share of a serving that arrived, over all pours of all rollouts; None if nothing was poured."""
+        shares = [share for rollout in self.rollouts for share in rollout.poured]
+        return sum(shares) / len(shares) if shares else None
+
     def json(self) -> dict[str, Any]:
         """Return the report as JSON data (docs/command-line.md)."""
-        status = "verified" if self.verified else "failed"
-        return {"status": status, "rollouts": [rollout.as_json() for rollout in self.rollouts]}
+        interval = [round(bound, 6) for bound in wilson(self.good, len(self.rollouts))]
+        return {
+            "status": "verified" if self.verified else "failed",
+            "success": {"verified": self.good, "of": len(self.rollouts), "interval": interval, "poured": self.poured},
+            "rollouts": [rollout.as_json() for rollout in self.rollouts],
+        }
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return what the first rollout that failed, else the first, says of each step, by the step's path."""
@@ -47,19 +63,24 @@ class Report:
 
     def summary(self) -> str:
         """Return one line that says how it went."""
-        good = sum(rollout.ok for rollout in self.rollouts)
         first = next((r for r in self.rollouts if not r.ok), self.rollouts[0])
+        several = f"; {self.rate()}" if len(self.rollouts) > 1 else ""
         if first.failure is not None:
             step = first.failure.step
-            where = f"at step {'.'.join(map(str, step.path))} ({step}), seed {first.seed}: {first.failure.verdict}"
-            return f"failed {where}" + (
-                f" ({good} of {len(self.rollouts)} rollouts succeeded)" if len(self.rollouts) > 1 else ""
-            )
+            where = f"at step {'.'.join(map(str, step.path))} ({step}), seed {first.seed}"
+            return f"failed {where}: {first.failure.verdict}{several}"
         poured = ", ".join(f"{share:.0%}" for share in first.poured)
         return (
             f"verified: {len(first.steps)} primitives, poured {poured or 'nothing'}, {first.simulated_seconds:.1f} s simulated"
-            f" in {first.cpu_seconds:.1f} CPU s" + (f", {good} rollouts" if good > 1 else "")
+            f" in {first.cpu_seconds:.1f} CPU s{several}"
         )
+
+    def rate(self) -> str:
+        """Return how many rollouts were verified, with Wilson's confidence interval and the seeds."""
+        low, high = wilson(self.good, len(self.rollouts))
+        seeds = f"seeds {self.rollouts[0].seed} to {self.rollouts[-1].seed}"
+        poured = "" if self.poured is None else f", poured {self.poured:.1%} on average"
+        return f"{self.good} of {len(self.rollouts)} rollouts verified ({seeds}; 95 % confidence: {low:.1%} to {high:.1%}){poured}"
 
     def __rich__(self) -> Tree:
         """Return the plan with a verdict behind each primitive, for rich."""
@@ -87,45 +108,68 @@ def verify(
     video: Path | None = None,
     prepare: Callable[[World], None] | None = None,
     progress: Callable[[int, PrimitiveStep], None] | None = None,
+    workers: int | str = 1,
+    done: Done | None = None,
 ) -> Report:
     """Carry out the primitives of a plan in PyBullet, once or with several seeds.
+
+    Parameters
+    ----------
+    scene, plan
+    rollouts, seed
+        How often, with the seeds `seed`, `seed` + 1, …
+    perturb
+        Vary poses, friction, masses and fill.
+    video
+        Film the first rollout.
+    prepare
+        Called with each world before the first step (`sim.faults`).
+    progress
+        Called before each step of a single or filmed rollout, with the number of steps done.
+    workers
+        A number of processes, or a Ray cluster: see `sim.rollouts.rollouts`.
+    done
+        Called with each rollout that is done.
 
     Raises
     ------
     KnowledgeError
-        The plan can't be done from the scene's situation, or the scene has no geometry.
+        The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers.
     """
     steps = plan.primitives
     try:
         expected = expectations(scene.problem, steps)
-    except ValueError as error:
+        trial = Trial(
+            scene.embodiment,
+            scene.problem.initial,
+            steps,
+            expected,
+            perturb=Perturbation() if perturb else None,
+            prepare=prepare,
+        )
+        seeds = list(range(seed, seed + rollouts))
+        finished: list[Rollout] = []
+        if video is not None:
+            finished.append(_filmed(trial, seeds.pop(0), video, plan, progress))
+        elif rollouts == 1 and str(workers) == "1":
+            finished.append(trial.run(seeds.pop(0), progress=progress))
+        if finished and done is not None:
+            done(finished[0])
+        finished += roll_out(trial, seeds, workers, done) if seeds else []
+    except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
-    once = partial(
-        verify_once,
-        scene.embodiment,
-        scene.problem.initial,
-        steps,
-        expected,
-        perturb=Perturbation() if perturb else None,
-        prepare=prepare,
-        progress=progress,
-    )
-    done: list[Rollout] = []
-    for number in range(rollouts):
-        if number == 0 and video is not None:
-            done.append(_filmed(once, seed, video, plan))
-        else:
-            done.append(once(seed=seed + number))
-    return Report(plan, tuple(done), video)
+    return Report(plan, tuple(finished), video)
 
 
-def _filmed(once: Callable[..., Rollout], seed: int, video: Path, plan: Plan) -> Rollout:
+def _filmed(
+    trial: Trial, seed: int, video: Path, plan: Plan, progress: Callable[[int, PrimitiveStep], None] | None
+) -> Rollout:
     from sim.film import Film
 
     titles = {step.path: str(step) for step in plan.walk() if step.steps}
     video.parent.mkdir(parents=True, exist_ok=True)
     with Film(video, plan.primitives, titles, stills=video.with_suffix("")) as film:
-        return once(seed=seed, watch=film)
+        return trial.run(seed, film, progress)
 
 
 def progress_bar() -> Progress:
@@ -135,3 +179,17 @@ def progress_bar() -> Progress:
 
     columns = (TextColumn("{task.description:<44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     return Progress(*columns, console=Console(stderr=True), transient=True)
+
+
+@contextmanager
+def counted(rollouts: int) -> Iterator[Done]:
+    """Show a progress bar on stderr; give what counts a rollout as done."""
+    with progress_bar() as bar:
+        task, good = bar.add_task("rollouts", total=rollouts), 0
+
+        def done(rollout: Rollout) -> None:
+            nonlocal good
+            good += rollout.ok
+            bar.update(task, advance=1, description=f"rollouts, {good} verified")
+
+        yield done
