@@ -40,6 +40,7 @@ from tests.planner.lessons import problem, teach
 
 TRAINING = ("served", "swap", "rotate", "full", "handover", "blocked", "random")
 FAMILIES = TRAINING[:-1]
+LIMITS = Limits(expansions=2000)
 SIZES, LESSONS, HELD_OUT = (4, 6, 8), range(100, 105), 5000
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "learning-curve.png"
 
@@ -92,22 +93,22 @@ def shown(ratios: Sequence[float | None]) -> str:
     return f"{median(solved):.2f} (worst {max(solved):.2f}; {good}/{len(solved)} within 1.05)"
 
 
-def transfer(seeds: int = 5) -> None:
+def transfer(seeds: int = 3) -> None:
     """Expansions for each step on scenes 5 to 10 times as large as the lessons; beside them the memoryless search."""
     print(f"{'level':<6}{'family':<10}{'n':<4}{'memory leads':<44}{'strict':<44}none")
     for level in (1, 2):
         for family in TRAINING:
             for objects in (20,) if family == "random" else (40,):
                 rows: dict[str, list[float | None]] = {"guarded": [], "strict": [], "none": []}
-                for seed in range(HELD_OUT, HELD_OUT + (20 if family == "random" else seeds)):
+                for seed in range(HELD_OUT, HELD_OUT + (12 if family == "random" else seeds)):
                     within = single_level(problem(family, objects, seed), level)
                     using = fast.compiled(within)
-                    alone = fast.plan(within, using=using, limits=Limits(expansions=5000))
+                    alone = fast.plan(within, using=using, limits=LIMITS)
                     if alone.plan is None:
                         continue
                     rows["none"].append(ratio(alone, level))
                     for mode in ("guarded", "strict"):
-                        found = guided.plan(within, trained(level), mode, using=using)
+                        found = guided.plan(within, trained(level), mode, LIMITS, using)
                         assert found.plan is None or validate(within, found.plan) == []
                         rows[mode].append(ratio(found, level))
                 print(f"{level:<6}{family:<10}{objects:<4}", end="")
@@ -194,7 +195,7 @@ def bad_memories(level: int = 1) -> dict[str, Memory]:
     return {name: Memory(experience) for name, experience in found.items()}
 
 
-def harm(seeds: int = 5) -> None:
+def harm(seeds: int = 3) -> None:
     """Worst expansions over the memoryless ones, of every instance; untrusted memory without being told."""
     print(
         f"{'memory':<14}{'strict, worst ratio':<22}{'guarded, worst ratio':<22}{'guarded, worst excess':<24}untrusted = strict"
@@ -202,11 +203,11 @@ def harm(seeds: int = 5) -> None:
     for name, memory in {"trained": trained(), **bad_memories()}.items():
         strict, guarded, excess, same = [], [], [], True
         for family in TRAINING:
-            for objects in (4, 8, 20):
+            for objects in (4, 8, 12):
                 for seed in range(HELD_OUT, HELD_OUT + seeds):
                     within = problem(family, objects, seed)
                     using = fast.compiled(within)
-                    limits = Limits(expansions=3000, seconds=20)
+                    limits = LIMITS
                     alone = fast.plan(within, using=using, limits=limits).search[1].expanded
                     here = guided.plan(within, memory, "strict", limits, using).search[1].expanded
                     free = guided.plan(within, memory, "guarded", limits, using).search[1].expanded
@@ -310,9 +311,9 @@ def killed(path: Path, kills: int) -> int:
     return lost
 
 
-def curve(most: int = 42) -> None:
+def curve(most: int = 36) -> None:
     """Expansions for each step, and time, over episodes: level 1 of held-out scenes, beside the memoryless search."""
-    checks = (0, 1, 2, 4, 7, 14, 21, 28, most)
+    checks = (0, 1, 2, 4, 6, 12, 18, 24, most)
     tests = [problem(family, 20, HELD_OUT) for family in FAMILIES]
     small = [replace_levels(problem(family, 4, HELD_OUT)) for family in ("served", "swap", "handover")]
     none = [ratio(fast.plan(within), 1) for within in tests]

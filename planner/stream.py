@@ -117,14 +117,15 @@ class Stream:
     # ------------------------------------------------------------------------------------------------------- expanding
 
     def _expand(self, node: Node, d: int, left: int) -> None:
-        ground = self._most_cogent() if node.quick else None
-        node.quick = False
-        if ground is None:
-            self._rank(node, d, left)
-        else:
+        quick, node.quick = node.quick, False
+        while quick and (ground := self._most_cogent(node)) is not None:
             node.tried.add(ground)
-            self._push(node, ground, d, left)
-            self._push(node, None, d + 1, left)
+            child = self._child(node, ground)
+            if child is not None:  # else it leads where the search has been: the next best
+                self._push(node, None, d + 1, left)
+                self._push(child, None, d, left)
+                return
+        self._rank(node, d, left)
 
     def _rank(self, node: Node, d: int, left: int) -> None:
         """Push all candidates of a node that weren't tried, the most cogent with the least discrepancy."""
@@ -142,34 +143,36 @@ class Stream:
             node.tried.add(ground)
             self._push(node, ground, d + rank, left)
 
-    def _most_cogent(self) -> Ground | None:
+    def _most_cogent(self, node: Node) -> Ground | None:
         """Return the most cogent candidate of all goals, looking again only at those near which something changed."""
         now, focus = self.field.table.now, self.focus
         open_goals = [cell for cell, value in self.field.goal.items() if now[cell[0]].get(cell[1], FALSE) != value]
         for cell in open_goals:
-            if cell in self.stale or cell not in focus:
-                self._look(cell)
+            if cell in self.stale or cell not in focus or focus[cell][1] in node.tried:
+                self._look(cell, node)
         self.stale.clear()
         fresh: set[Cell] = set()
         while looked := [(*focus[cell], cell) for cell in open_goals if cell in focus]:
             odds, ground, cell = max(looked, key=lambda entry: entry[0])
             if odds <= SURE and self.fruitless and len(fresh) < len(open_goals):
                 for other in open_goals:
-                    self._look(other)
+                    self._look(other, node)
                 fresh.update(open_goals)
             elif cell in fresh or (self.field.roles(ground) is not None and abs(self._odds(ground) - odds) < 1e-9):
                 return ground
             else:
-                self._look(cell)
+                self._look(cell, node)
                 fresh.add(cell)
         return None
 
-    def _look(self, cell: Cell) -> None:
+    def _look(self, cell: Cell, node: Node) -> None:
         """Find the most cogent candidate for one goal."""
         self.focus.pop(cell, None)
         found: tuple[float, Ground] | None = None
         for reach in (NEAR, FAR):
             for ground in self.field.proposals([cell], reach):
+                if ground in node.tried:
+                    continue
                 self.generated += 1
                 odds = self._odds(ground)
                 if found is None or odds > found[0]:
