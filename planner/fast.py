@@ -16,7 +16,9 @@ flat search             the rest, until a limit comes                   `planner
 
 from __future__ import annotations
 
-from contextlib import suppress
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from time import perf_counter
 
 from planner.exhaust import TooLargeError
@@ -63,6 +65,23 @@ def plan(
     -------
     Outcome
     """
+    with paused_collection():
+        return _plan(problem, advice, limits, improve, using)
+
+
+@contextmanager
+def paused_collection() -> Iterator[None]:
+    """Pause the garbage collector: what planning makes has no cycles, and going through it all took a third of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _plan(problem: Problem, advice: Advice | None, limits: Limits, improve: int, using: Compiled | None) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + limits.seconds
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)

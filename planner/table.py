@@ -10,6 +10,7 @@ Copying a state costs time in the size of the world; a change and its undoing co
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from typing import TypeAlias
 
 from reasoner.symbols import FALSE, Problem, State, Symbol
@@ -136,19 +137,26 @@ def representatives(
     who: Mapping[str, Mapping[Key, None]],
     wanted: Mapping[str, object],
     breadth: int = 1,
+    cursors: dict[int, int] | None = None,
 ) -> list[str]:
     """Return one value per group: the first that nobody has and no goal wants.
 
-    Where there is none, a few that nobody has; where there are none of these either, the first `breadth`.
+    Where there is none, a few that nobody has; where there are none of these either, the first `breadth`. With `cursors` (by
+    the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone through anew.
 
     >>> representatives([["a", "b", "c"], ["d"]], {"a": {"x": None}}, {"b": True})
     ['c', 'd']
     """
     found = []
     for group in groups:
-        best = next((value for value in group if not who.get(value) and value not in wanted), None)
-        if best is not None:
-            found.append(best)
+        start = cursors.get(id(group), 0) if cursors is not None else 0
+        for position in chain(range(start, len(group)), range(start)):
+            value = group[position]
+            if not who.get(value) and value not in wanted:
+                found.append(value)
+                if cursors is not None:
+                    cursors[id(group)] = position
+                break
         else:
             found.extend([value for value in group if not who.get(value)][:4] or group[:breadth])
     return found

@@ -44,6 +44,7 @@ class Wants:
         self.table = table
         self.goal = goal
         self.breadth = 1
+        self._cursors: dict[int, int] = {}
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, tuple[str, ...], Condition]] = {}
         self.wanted: dict[str, dict[str, None]] = {}
@@ -130,7 +131,9 @@ class Wants:
         if len(members) <= FEW:
             return members
         groups = self.program.alike.groups(members)
-        found = representatives(groups, self.table.who[situation], self.wanted.get(situation, {}), self.breadth)
+        found = representatives(
+            groups, self.table.who[situation], self.wanted.get(situation, {}), self.breadth, self._cursors
+        )
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
             found.insert(0, goal)
