@@ -47,6 +47,7 @@ class Trial:
 
     @classmethod
     def of(cls, problem: Problem) -> Trial:
+        """Plan, and go through the plan."""
         found = fast_plan(problem).plan
         assert found is not None
         states = [problem.initial]
@@ -101,7 +102,7 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
     if kind == "goal changed":
         return Intervention(Change.GOAL, (Fact(random.choice(standing), place),))
     if kind == "goal added":
-        free = [s for s in map(lambda o: Symbol(where.name, (o,)), movable) if s not in problem.goal]
+        free = [s for o in movable if (s := Symbol(where.name, (o,))) not in problem.goal]
         return (
             Intervention(Change.GOAL, (Fact(random.choice(free), place),))
             if free
@@ -161,7 +162,8 @@ def interventions() -> None:
         wrong += not _right(episode)
     _table(ends)
     print(
-        f"\n{SYMBOLIC} episodes at n = 20, half of what changes the world inside a primitive; {wrong} with a claim that isn't so; "
+        f"\n{SYMBOLIC} episodes at n = 20, half of what changes the world inside a primitive; "
+        f"{wrong} with a claim that isn't so; "
         f"the longest began {longest} primitives (the plan has {len(trial.plan.primitives)}); {perf_counter() - begin:.0f} s."
     )
 
@@ -268,7 +270,7 @@ def _rest_after(plan: Plan, count: int) -> list[Step]:
         kept = [
             replace(s, steps=tuple(left(s.steps))) if s.steps else s for s in steps if s.steps or s.path not in gone
         ]
-        return [s for s in kept if s.steps or s.path not in gone and s.level == plan.primitives[0].level]
+        return [s for s in kept if s.steps or (s.path not in gone and s.level == plan.primitives[0].level)]
 
     return left(plan.steps)
 
