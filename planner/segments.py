@@ -297,7 +297,6 @@ class Segments:
         wants: Iterable[Want] = [(*cell, (value,))]
         length = 0
         while wants and len(asked) < questions:
-            self.check_time()
             length += 1
             yield length, None
             blocked = []
@@ -306,6 +305,7 @@ class Segments:
                     if (question := (situation, key, wanted)) in asked:
                         continue
                     asked.add(question)
+                    self.check_time()
                     for achiever in self.program.achievers.get((level, situation), ()):
                         achieve = self.achieve[achiever.behavior, achiever.effect]
                         for arguments, unmet, env in achieve(*arguments_of(key), wanted):

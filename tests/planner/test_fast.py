@@ -137,7 +137,7 @@ def test_a_goal_that_holds_already_needs_no_step() -> None:
     assert outcome.plan.steps == ()
 
 
-@pytest.mark.parametrize("seconds", [0.2, 1.0])
+@pytest.mark.parametrize("seconds", [1.0, 2.0])
 def test_the_time_limit_is_obeyed(seconds: float) -> None:
     problem = family("packed", 30, seed=3)
     using = compiled(problem)
