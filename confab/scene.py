@@ -237,17 +237,24 @@ class Scene:
             from planner.fast import compiled
             from planner.guided import plan as guided_plan
 
+            from planner.optimal import plan as optimal_plan
+
+            advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
+
+            def search(problem: Problem) -> Outcome:
+                using = compiled(problem)
+                if optimal:
+                    return optimal_plan(problem, limits=limits, using=using)
+                return guided_plan(problem, advisor, mode, limits=limits, using=using)
+
             seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
             problem = with_goals(seen, goals)
-            using = compiled(problem)
             quantified = perf_counter() - begin
-            if optimal:
-                from planner.optimal import plan as optimal_plan
-
-                outcome = optimal_plan(problem, limits=limits, using=using)
-            else:
-                advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
-                outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
+            outcome = search(problem)
+            if outcome.status is Status.UNSOLVABLE and not seen.whole:
+                # A "no" is worth a look at the whole world, whatever task recognition left out of it.
+                problem = with_goals(self.reading, goals)
+                outcome = search(problem)
         queries = self.knowledge.round_trips - asked
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
 

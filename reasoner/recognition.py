@@ -127,10 +127,15 @@ def routes(known: Frame, schema: Schema, more_situations: Iterable[str] = ()) ->
                     effect.value.startswith("?") or effect.value in looked_up[effect.situation]
                 ):
                     starts.append({effect.value})
-                for scope in _scopes((*behavior.preconditions, *effect.when), kinds):
-                    counting |= {c.situation for c in scope.conditions if isinstance(c, ValueCondition)}
-                    for start in starts:
-                        _span(scope, start, known, schema, found, looked_up)
+                scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
+                counting |= {c.situation for s in scopes for c in s.conditions if isinstance(c, ValueCondition)}
+                own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, effect.value}
+                own &= kinds.keys()
+                for start in starts:
+                    # What must not hold, or need not, leads to nothing that the behaviour itself is done with.
+                    _span(scopes[0], start, own, known, schema, found, looked_up)
+                    for scope in scopes[1:]:
+                        _span(scope, start | own, set(), known, schema, found, looked_up)
     return found
 
 
@@ -167,11 +172,17 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
 
 
 def _span(
-    scope: _Scope, start: set[str], known: Frame, schema: Schema, found: Routes, looked_up: dict[str, set[str]]
+    scope: _Scope,
+    start: set[str],
+    more: set[str],
+    known: Frame,
+    schema: Schema,
+    found: Routes,
+    looked_up: dict[str, set[str]],
 ) -> None:
-    """Add the steps by which all terms of a conjunction are reached from some of them, by the cheapest first."""
+    """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known, schema)]
-    in_use = {t for c in scope.conditions for t in _terms(c)}
+    in_use = {t for c in scope.conditions for t in _terms(c)} | more
     waiting = (in_use | {t for t in start if t.startswith("?")}) - start
     reached = set(start) | {t for t in in_use if not t.startswith("?")}
     waiting -= reached

@@ -5,7 +5,11 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.authoring import new_domain
+from planner.plan import Status
+from reasoner.generate import write_scene
 from reasoner.observed import save_observed
+from reasoner.recognition import recognise
 from reasoner.symbols import Symbol
 
 
@@ -32,3 +36,19 @@ def test_the_bound_is_no_more_than_the_plan_costs(scene: confab.Scene) -> None:
 def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> None:
     with pytest.raises(confab.KnowledgeError, match="neither memory nor the paper's mode"):
         scene.plan(optimal=True, mode="paper")
+
+
+def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:
+    # Nothing leads from the plate to the sink but that a behaviour may take it to any free place.
+    new_domain("tearoom", tmp_path)
+    tearoom = confab.load(tmp_path / "tearoom" / "tearoom-scene.ttl")
+    assert "sink" in recognise(tearoom.knowledge).problem.classes["Place"]
+    assert [step.behavior for step in tearoom.plan().plan.steps] == ["B1_CARRY", "B1_WASH", "B1_CARRY"]
+
+
+def test_a_no_is_given_only_after_a_look_at_the_whole_world(tmp_path: Path) -> None:
+    write_scene(tmp_path / "table.ttl", "unsolvable", objects=4, clutter=20)
+    scene = confab.load(tmp_path / "table.ttl")
+    result = scene.plan()
+    assert result.outcome.status is Status.UNSOLVABLE
+    assert result.problem.initial == scene.problem.initial
