@@ -34,6 +34,8 @@ __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
+SEARCHING = 0.93
+"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 FIRST_TURN = 2_000
 """Expansions of flat search before exhaustion has its first turn."""
 STATES_PER_EXPANSION = 20
@@ -83,7 +85,7 @@ def paused_collection() -> Iterator[None]:
 
 def _plan(problem: Problem, advice: Advice | None, limits: Limits, improve: int, using: Compiled | None) -> Outcome:
     begin = perf_counter()
-    deadline = None if limits.seconds is None else begin + limits.seconds
+    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
