@@ -41,7 +41,7 @@ def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> Non
 def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:
     # Nothing leads from the plate to the sink but that a behaviour may take it to any free place.
     new_domain("tearoom", tmp_path)
-    tearoom = confab.load(tmp_path / "tearoom" / "tearoom-scene.ttl")
+    tearoom = confab.load(tmp_path / "tearoom-scene.ttl")
     assert "sink" in recognise(tearoom.knowledge).problem.classes["Place"]
     assert [step.behavior for step in tearoom.plan().plan.steps] == ["B1_CARRY", "B1_WASH", "B1_CARRY"]
 
