@@ -108,7 +108,11 @@ class Model:
         """Compile conditions in an order that binds before it uses; `bound` grows by what they determine."""
         tests, waiting = [], list(conditions)
         while waiting:
-            ready = next((c for c in waiting if not needs(c) - bound), None)
+            # A nested condition waits for every variable that another one may still determine; else it determines its own.
+            ready = next(
+                (c for c in waiting if not (mentions(c) if isinstance(c, Witness | AnyOf) else needs(c)) - bound), None
+            )
+            ready = ready or next((c for c in waiting if not needs(c) - bound), None)
             if ready is None:
                 unbound = ", ".join(sorted(set().union(*(needs(c) for c in waiting)) - bound))
                 raise DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
@@ -202,6 +206,18 @@ def needs(condition: Condition) -> set[str]:
         case AnyOf(alternatives):
             found = set().union(*(_needs_all(group) for group in alternatives))
     return {term for term in found if term.startswith("?")}
+
+
+def mentions(condition: Condition) -> set[str]:
+    """Return all variables of a condition but those that a witness inside it looks for."""
+    match condition:
+        case Witness(variable, _, conditions):
+            return set().union(*map(mentions, conditions)) - {variable}
+        case AnyOf(alternatives):
+            return {term for group in alternatives for c in group for term in mentions(c)}
+        case ValueCondition(_, arguments, value):
+            return {term for term in (*arguments, value) if term.startswith("?")}
+    return needs(condition)
 
 
 def _needs_all(conditions: Sequence[Condition]) -> set[str]:
