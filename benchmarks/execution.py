@@ -35,6 +35,8 @@ from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
 OUT = Path("confab-out/execution")
 SYMBOLIC, PHYSICAL = 1000, 50
+LARGEST_WITH_PROOFS = 50
+"""Beyond that, replanning for a filled object that shall stand elsewhere grounds the whole lowest level, in gigabytes."""
 
 
 @dataclass(frozen=True)
@@ -210,6 +212,8 @@ def _repair_row(objects: int, count: int) -> None:
     anew, limits = 0, Limits(seconds=20)
     for seed in range(count):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]
+        if objects > LARGEST_WITH_PROOFS and kind in ("goal changed", "goal added"):
+            continue
         position = random.randrange(len(trial.plan.primitives))
         intervention = random_intervention(problem, trial.states[position], random, kind)
         assert intervention is not None
