@@ -236,7 +236,6 @@ class Scene:
         else:
             from planner.fast import compiled
             from planner.guided import plan as guided_plan
-
             from planner.optimal import plan as optimal_plan
 
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
