@@ -197,7 +197,7 @@ def physical() -> None:
 def repair() -> None:
     """Print cost, distance and latency of repair against replanning."""
     print(
-        "| n | interventions | cost, sum | over 1.1 × | worst | distance, median | ratio, median | ms, median | ms, p95 | replanned |"
+        "| n | interventions | cost, sum | over 1.1 × | worst | distance | ratio, median | ms, median | ms, p95 | replanned |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
     for objects, count in ((4, 500), (20, 1000), (200, 60)):

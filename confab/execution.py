@@ -286,7 +286,7 @@ def execute(
     seed: int = 0,
     tell: Callable[[Moment], None] | None = None,
     prepare: Callable[[Any], None] | None = None,
-    patience: Patience = Patience(),
+    patience: Patience = Patience(),  # noqa: B008 - frozen
     caution: Caution | None = None,
 ) -> Execution:
     """Carry a task out in a closed loop.
