@@ -234,7 +234,7 @@ def learn(
         loaded = load(name)
         if remembered is None:
             remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
-        shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered.links).plan
+        shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered).plan
         remembered.learn(loaded, shown)
     assert remembered is not None
     remembered.save(memory)

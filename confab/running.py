@@ -40,7 +40,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
         return NO
     scene = with_reach(load(name))
     remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
-    result = scene.plan(memory=remembered.links, mode=mode)
+    result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
         console.print(result)
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
