@@ -30,6 +30,7 @@ FORMAT = 2
 SPACE = "https://w3id.org/confab/memory#"
 ROLES = ("about", *(f"argument{position}" for position in range(2, 10)))
 TALLY = ("chosen", "passedOver", "failed")
+BETWEEN = " | "  # facts of a pattern; no line break, which the OWL API turns into an n when it saves Turtle
 PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
 
 HEAD = """@prefix : <{core}> .
@@ -112,7 +113,7 @@ def turtle(experience: Experience, names: Names, domain: str, only: str | None =
                 name = ids.get(pattern) or ids.setdefault(pattern, _pattern(pattern))
                 if pattern not in written:
                     written.add(pattern)
-                    facts = "\n".join(f"{fact}: {value}" for fact, value in pattern)
+                    facts = BETWEEN.join(f"{fact}: {value}" for fact, value in pattern)
                     yield f"m:{name} a owl:NamedIndividual, :Pattern ; :facts {_text(facts)} .\n"
                 yield LINK.format(counter=counter, pattern=name, t=tally, p=probability(tally))
 
@@ -215,7 +216,7 @@ def _meaning(node: Mapping[str, str], names: Names | None) -> tuple[tuple[str, i
 
 
 def _facts(text: str) -> Pattern:
-    return tuple((fact, value) for fact, _, value in (line.rpartition(": ") for line in text.splitlines()))
+    return tuple((fact, value) for fact, _, value in (said.rpartition(": ") for said in text.split(BETWEEN) if said))
 
 
 def _id(term: object) -> str:
