@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -77,7 +78,7 @@ class Attempt:
     def body(self, name: str) -> str:
         """Return the name of a body, or raise if the world has no such body any more."""
         if name not in self.world.bodies:
-            raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen")
+            raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen", seen=0.0)
         return name
 
     @contextmanager
@@ -142,7 +143,15 @@ class Attempt:
         with self.planning():
             q = np.concatenate([self.hand.posture[None], q[1:]])
             positions, velocities = timed(self.hand.arm, smooth(q), self.limits, self.world.rate)
-        self.world.follow(self.hand, positions, velocities)
+        try:
+            self.world.follow(self.hand, positions, velocities)
+        except SkillError as failure:
+            if self.held is None or self.world.held(self.hand.hand.name) == self.held:
+                raise
+            stopped = failure.verdict
+            raise SkillError(
+                "slip or drop", named(self.held, *stopped.objects), "it was lost on the way", **stopped.measured
+            ) from failure
 
     def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str) -> int:
         """Move to the first goal pose that a free path leads to; return its position in the sequence."""
@@ -210,6 +219,8 @@ class Attempt:
         """Return how far the held object slipped in the hand since it was grasped; raise if too far or if it's lost."""
         if self.held is None or self.hand.grasp is None:
             return {}
+        if self.held not in self.world.bodies:
+            raise SkillError("slip or drop", (self.held,), f"{self.held} is nowhere to be seen", seen=0.0)
         rotation, base = self.world.in_hand(self.hand, self.held)
         first_rotation, first_base = self.hand.grasp
         slip = float(np.linalg.norm(base - first_base))
@@ -235,22 +246,32 @@ def _free(
 ) -> list[int]:
     """Return the first few candidates, in `order`, that touch nothing at any stage; raise if none does."""
     chosen: list[int] = []
-    gaps: dict[str, float] = {}
+    blocked: Counter[str] = Counter()
+    best: dict[str, float] = {}
     for start in range(0, len(order), BATCH):
         batch = order[start : start + BATCH]
         free = np.ones(len(batch), dtype=bool)
-        for stage, q in zip(stages, postures, strict=True):
-            for name, gap in reacher.mover.clearances(q[batch], reacher.around.without(*stage.ignored)).items():
-                free &= gap > reacher.margin
-                gaps[name] = max(gaps.get(name, -np.inf), float(gap.max()))
+        for name, gap in _gaps(reacher, stages, [q[batch] for q in postures]).items():
+            free &= gap > reacher.margin
+            blocked[name] += int(np.sum(gap <= reacher.margin))
+            best[name] = max(best.get(name, -np.inf), float(gap.max()))
         chosen += [int(i) for i in batch[free]]
         if len(chosen) >= ENOUGH:
             break
     if not chosen:
-        blocking = sorted(gaps, key=gaps.__getitem__)
-        blocking = [name for name in blocking if gaps[name] <= reacher.margin] or blocking[:1]
-        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=gaps[blocking[0]])
+        most = blocked.most_common(1)[0][1]
+        blocking = sorted((name for name, count in blocked.items() if count == most), key=best.__getitem__)
+        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=best[blocking[0]])
     return chosen
+
+
+def _gaps(reacher: Reacher, stages: Sequence[Stage], postures: Sequence[Array]) -> dict[str, Array]:
+    """Return how near to each thing the candidates come, at the stage where they come nearest."""
+    nearest: dict[str, Array] = {}
+    for stage, q in zip(stages, postures, strict=True):
+        for name, gap in reacher.mover.clearances(q, reacher.around.without(*stage.ignored)).items():
+            nearest[name] = np.minimum(gap, nearest.get(name, np.inf))
+    return nearest
 
 
 def named(*objects: str) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ def _reach_place(attempt: Attempt, place: str, numbers: Numbers) -> dict[str, fl
     objects = (place,) if attempt.held is None else (place, attempt.held)
     chosen = attempt.choose([Stage(hover), Stage(down), Stage(back), Stage(above)], objects, opened=True)
     best = attempt.go([hover[i] for i in chosen], objects)
-    measured = attempt.check_arrival(hover[chosen[best]], numbers)
+    measured = attempt.check_grip(numbers) | attempt.check_arrival(hover[chosen[best]], numbers)
     reached = attempt.hand.frame()[1] if attempt.held is None else world.truth(attempt.held)[1]
     off = float(np.hypot(*(reached - point)[:2]))
     if off > numbers["place_tolerance"]:

@@ -290,21 +290,26 @@ class World:
         self.check_lag(hand)
 
     def check_lag(self, hand: Manipulator) -> None:
-        """Raise `SkillError` if a joint is too far from its command, naming what the arm touches."""
+        """Raise `SkillError` if a joint is too far from its command, naming what the arm touches, else the hand."""
         lag = float(np.abs(hand.measured() - hand.posture).max())
         if lag > LAG:
-            raise SkillError("tracking error", self.touching(hand), joint_lag_rad=lag)
+            raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
 
     def touching(self, hand: Manipulator) -> tuple[str, ...]:
-        """Return what a hand's robot, or the object that the hand holds, is in contact with, the held object excepted."""
+        """Return what a hand's robot, or a body that it touches or holds, is in contact with, the held one excepted."""
         held = self.held(hand.hand.name)
-        found = set()
-        for body in [hand.body, *([self.bodies[held].body] if held else [])]:
-            for contact in pybullet.getContactPoints(body, physicsClientId=self.client):
-                other = contact[2]
-                if contact[9] > 0.5 and other != hand.body and self.names.get(other, held) != held:
-                    found.add(self.names[other])
-        return tuple(sorted(found))
+        around = self._contacts(hand.body)
+        if held is not None:
+            around.add(held)
+        furniture = {fixture.name for fixture in self.embodiment.fixtures}
+        for name in sorted(around & self.bodies.keys()):
+            around |= self._contacts(self.bodies[name].body) - furniture
+        return tuple(sorted(around - {held, hand.robot.name}))
+
+    def _contacts(self, body: int) -> set[str]:
+        """Return what presses against a body."""
+        found = pybullet.getContactPoints(body, physicsClientId=self.client)
+        return {self.names[c[2]] for c in found if c[9] > 0.5 and c[2] != body and c[2] in self.names}
 
     @property
     def rate(self) -> float:
@@ -319,7 +324,15 @@ class World:
     # ------------------------------------------------------------------------------------------------- sensing
 
     def truth(self, name: str) -> tuple[Array, Array]:
-        """Return where a body is: its rotation (3, 3) and the middle of its base (3,) in metres."""
+        """Return where a body is: its rotation (3, 3) and the middle of its base (3,) in metres.
+
+        Raises
+        ------
+        SkillError
+            The world has no such body any more.
+        """
+        if name not in self.bodies:
+            raise SkillError("misplaced", (name,), f"{name} is nowhere to be seen", seen=0.0)
         thing = self.bodies[name]
         position, orientation = pybullet.getBasePositionAndOrientation(thing.body, physicsClientId=self.client)
         rotation = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)

@@ -1,0 +1,30 @@
+"""Planted faults stop the plan at the right primitive, with code, objects and number (all of them: benchmarks/faults.py)."""
+
+import pickle
+
+import pytest
+
+from benchmarks.faults import PLANTED, Planted
+from sim.faults import PLANTS
+from sim.rollouts import Trial
+from sim.verdict import CODES
+
+from .conftest import Case
+
+QUICK = [planted for planted in PLANTED if planted.step <= 3 and not planted.beads]
+
+
+@pytest.mark.parametrize("planted", QUICK, ids=[planted.kind for planted in QUICK])
+def test_a_planted_fault_stops_the_plan_where_and_as_it_must(serving: Case, planted: Planted) -> None:
+    end = planted.step + 1
+    trial = Trial(serving.embodiment, serving.initial, serving.steps[:end], serving.expected[:end])
+    rollout = planted.run(trial)
+    assert planted.found(rollout), rollout.failure
+
+
+def test_at_least_twenty_kinds_are_planted_and_every_one_can_be_sent_to_another_process() -> None:
+    assert len({planted.kind for planted in PLANTED}) >= 20
+    assert {planted.fault.kind for planted in PLANTED} == PLANTS.keys()
+    assert {planted.code for planted in PLANTED} <= CODES.keys()
+    for planted in PLANTED:
+        assert pickle.loads(pickle.dumps(planted.fault)) == planted.fault
