@@ -3,6 +3,7 @@
     python -m benchmarks search
     CONFAB_SEARCH=scale,random …     some of: scale, peers, lengths, random, parts, hands
     CONFAB_TABLES=2000 …             so many random tables (200 if not given)
+    CONFAB_SECONDS=480 …             no further random table after so many seconds
 
 Seconds are CPU seconds, which a busy machine changes little; medians of several runs. Nothing here was looked at while the
 planner was developed with other seeds than those below 60,000: random tables come from seeds 1,000,000 on, families from 100 on.
@@ -20,10 +21,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import takewhile
 from math import log
 from pathlib import Path
 from statistics import mean, median
-from time import process_time
+from time import perf_counter, process_time
 from typing import Any
 
 from benchmarks.pddl import peers, planners, run
@@ -129,8 +131,8 @@ def scale() -> None:
 
 def hands() -> None:
     """Plan all families up to n = 50, and with more hands."""
-    print("| family | hands | n | plan ms | steps 1/2/3 | expansions 1/2/3 | fallbacks |")
-    print("|---|---|---|---|---|---|---|")
+    print("| family | hands | n | plan ms | steps 1/2/3 | expansions 1/2/3 | cache hits/misses | fallbacks |")
+    print("|---|---|---|---|---|---|---|---|")
     cases = [(family, 2, n) for family in FAMILIES for n in (4, 10, 20, 50)]
     cases += [(family, number, n) for family in ("served", "swap", "rotate") for number in (4, 8) for n in (20, 50)]
     for family, number, n in cases:
@@ -141,7 +143,8 @@ def hands() -> None:
         steps = "/".join(str(outcome.plan.length.get(level, 0)) for level in (1, 2, 3))
         expansions = "/".join(str(count.expanded) for count in outcome.search.values())
         print(
-            f"| {family} | {number} | {n} | {seconds * 1e3:.1f} | {steps} | {expansions} | {outcome.fallbacks} |",
+            f"| {family} | {number} | {n} | {seconds * 1e3:.1f} | {steps} | {expansions} | {outcome.hits}/{outcome.misses} | "
+            f"{outcome.fallbacks} |",
             flush=True,
         )
 
@@ -246,9 +249,10 @@ def lengths() -> None:
 def random_tables() -> None:
     """Plan random tables with at least a thousand reachable states, against exhaustive search of the primitive level."""
     wanted = int(os.environ.get("CONFAB_TABLES", "200"))
+    end = perf_counter() + float(os.environ.get("CONFAB_SECONDS", "inf"))
     found: Counter[str] = Counter()
     seconds, sizes, over = [], [], []
-    for problem in tables(wanted):
+    for problem in takewhile(lambda _: perf_counter() < end, tables(wanted)):
         begin = process_time()
         outcome = plan(problem)
         seconds.append(process_time() - begin)

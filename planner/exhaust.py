@@ -44,6 +44,10 @@ Formula: TypeAlias = "bool | Fact | tuple[str, tuple[Formula, ...]]"
 Env: TypeAlias = "dict[str, str]"
 
 
+FEW = 20_000
+"""Over so few states a formula is worked out once for all operators that need it; over more, for those that fit else."""
+
+
 class TooLargeError(Exception):
     """The states don't fit: more bits than 63, more operators or more states than allowed.
 
@@ -57,7 +61,10 @@ class TooLargeError(Exception):
 
 @dataclass
 class Operator:
-    """A behaviour with everything put in. Masks and bits are filled in once the fields are laid out."""
+    """A behaviour with everything put in. Masks and bits are filled in once the fields are laid out.
+
+    If no effect is conditional (`plain`), the state after is the state without the bits `kept` leaves out, and with `given`.
+    """
 
     behavior: str
     arguments: tuple[str, ...]
@@ -67,6 +74,9 @@ class Operator:
     effects: tuple[tuple[Formula, Fact], ...]
     mask: int = 0
     bits: int = 0
+    plain: bool = False
+    kept: int = 2**64 - 1
+    given: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,6 +108,7 @@ class Space:
     level: int
     most_operators: int = 5_000
     operators: list[Operator] = field(default_factory=list)
+    same: dict[Formula, Formula] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.members = {kind: frozenset(members) for kind, members in self.problem.classes.items()}
@@ -128,6 +139,11 @@ class Space:
                 mask, bits = self._place(fact)
                 operator.mask |= mask
                 operator.bits |= bits
+            operator.plain = all(when is True for when, _ in operator.effects)
+            for _, fact in operator.effects:
+                mask, bits = self._place(fact)
+                operator.kept &= ~mask
+                operator.given = (operator.given & ~mask) | bits
 
     def _given(self) -> dict[Symbol, dict[str, int]]:
         """Return the values that each symbol can take, the initial one first."""
@@ -140,8 +156,11 @@ class Space:
 
     # ------------------------------------------------------------------------------------------------------- searching
 
-    def search(self, most: int, deadline: float | None = None) -> Exhausted:
+    def search(self, most: int, deadline: float | None = None, longest: int | None = None) -> Exhausted:
         """Search breadth first from the initial state until the goal is reached or there is nothing new.
+
+        With `longest`, only plans of at most so many steps are looked for: what can't reach the goal with the steps left is
+        dropped. No plan then means none that short.
 
         Raises
         ------
@@ -153,6 +172,7 @@ class Space:
         wanted: Formula = _all(self._fact(Fact(symbol, value)) for symbol, value in sorted(self.problem.goal.items()))
         layers = [np.zeros(1, np.uint64)]
         known = layers[0]
+        ways = [] if longest is None else self._ways()
         while True:
             reached = layers[-1][self._holds(wanted, layers[-1])]
             if len(reached):
@@ -163,6 +183,8 @@ class Space:
             new = np.unique(np.concatenate(found)) if found else np.zeros(0, np.uint64)
             places = np.minimum(np.searchsorted(known, new), len(known) - 1)
             new = new[known[places] != new]
+            if longest is not None:
+                new = new[self._away(ways, new) <= longest - len(layers)]
             known = np.sort(np.concatenate([known, new]), kind="stable")
             if len(known) > most:
                 raise TooLargeError(f"more than {most} states", len(layers))
@@ -170,15 +192,25 @@ class Space:
 
     def _successors(self, codes: Codes, deadline: float | None = None) -> Iterator[tuple[Operator, Codes]]:
         """Yield each operator that is applicable in any of the states, with the states that it leads to."""
+        truths: dict[int, Truth] | None = {} if len(codes) <= FEW else None
         for operator in self.operators:
             if deadline is not None and perf_counter() > deadline:
                 raise TimeoutError
-            before = self._applicable(operator, codes)
+            before = self._applicable(operator, codes, truths)
             if len(before):
                 yield operator, self._after(operator, before)
 
-    def _applicable(self, operator: Operator, codes: Codes) -> Codes:
-        before: Codes = codes[(codes & np.uint64(operator.mask)) == np.uint64(operator.bits)]
+    def _applicable(self, operator: Operator, codes: Codes, truths: dict[int, Truth] | None = None) -> Codes:
+        """Return the states that an operator is applicable in; `truths` keeps what formulas are over these codes."""
+        fits = (codes & np.uint64(operator.mask)) == np.uint64(operator.bits)
+        if truths is not None and operator.rest and fits.any():
+            for formula in operator.rest:
+                if id(formula) not in truths:
+                    truths[id(formula)] = self._holds(formula, codes)
+                fits &= truths[id(formula)]
+            found: Codes = codes[fits]
+            return found
+        before: Codes = codes[fits]
         for formula in operator.rest:
             if not len(before):
                 break
@@ -186,6 +218,9 @@ class Space:
         return before
 
     def _after(self, operator: Operator, before: Codes) -> Codes:
+        if operator.plain:
+            plain: Codes = (before & np.uint64(operator.kept)) | np.uint64(operator.given)
+            return plain
         after: Codes = before.copy()
         for when, fact in operator.effects:
             mask, bits = self._place(fact)
@@ -193,10 +228,50 @@ class Space:
             after = changed if when is True else np.where(self._holds(when, before), changed, after)
         return after
 
+    def _ways(self) -> list[tuple[Symbol, NDArray[np.int64]]]:
+        """Return for each goal how many steps each value of its symbol is away from it.
+
+        Every operator counts for one symbol only, so that the sum over the goals is no more than any plan has.
+        """
+        wanted = [symbol for symbol in self.problem.goal if symbol in self.values]
+        wanted.sort(key=lambda symbol: (-len(self.values[symbol]), symbol))
+        counted: set[int] = set()
+        ways = []
+        for symbol in wanted:
+            values = self.values[symbol]
+            moves: set[tuple[int, int]] = set()
+            for number, operator in enumerate(self.operators):
+                after = {values[fact.value] for _, fact in operator.effects if fact.symbol == symbol}
+                if after:
+                    needed = [values[fact.value] for fact in operator.facts if fact.symbol == symbol]
+                    free = number in counted
+                    moves.update((u, v) if not free else (~u, v) for u in needed or values.values() for v in after)
+                    counted.add(number)
+            far = len(self.operators) + 1
+            away = np.full(len(values), far, np.int64)
+            if self.problem.goal[symbol] in values:
+                away[values[self.problem.goal[symbol]]] = 0
+            for _ in values:
+                for u, v in moves:
+                    before, cost = (u, 1) if u >= 0 else (~u, 0)
+                    away[before] = min(away[before], away[v] + cost)
+            ways.append((symbol, away))
+        return ways
+
+    def _away(self, ways: Sequence[tuple[Symbol, NDArray[np.int64]]], codes: Codes) -> NDArray[np.int64]:
+        """Return how many steps each state is away from the goal at least."""
+        total = np.zeros(len(codes), np.int64)
+        for symbol, away in ways:
+            mask = (1 << self.width[symbol]) - 1
+            total += away[(codes >> np.uint64(self.shift[symbol])) & np.uint64(mask)]
+        return total
+
     def _path(self, layers: Sequence[Codes], last: np.uint64) -> tuple[Step, ...]:
         steps: list[Operator] = []
         for layer in reversed(layers[:-1]):
             for operator in self.operators:
+                if operator.plain and int(last) & ~operator.kept != operator.given:
+                    continue
                 before = self._applicable(operator, layer)
                 hits = before[self._after(operator, before) == last]
                 if len(hits):
@@ -323,7 +398,7 @@ class Space:
                             effects.append((_all(when), fact))
                 bindings = {n[1:]: v for n, v in sorted(env.items()) if n not in names}
                 facts = tuple(part for part in parts if isinstance(part, Fact))
-                rest = tuple(part for part in parts if not isinstance(part, Fact))
+                rest = tuple(self.same.setdefault(part, part) for part in parts if not isinstance(part, Fact))
                 yield Operator(behavior.name, arguments, bindings, facts, rest, tuple(effects))
 
 

@@ -89,7 +89,9 @@ def _plan(problem: Problem, advice: Advice | None, limits: Limits, improve: int,
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
-        return Outcome(status, plan, reason, call.segments.counts, call.fallbacks, perf_counter() - begin)
+        seconds, cache = perf_counter() - begin, call.refiner
+        counts = call.segments.counts
+        return Outcome(status, plan, reason, counts, call.fallbacks, seconds, hits=cache.hits, misses=cache.misses)
 
     impossible = unattainable(call.segments) or contested(call.segments)
     if impossible:

@@ -3,6 +3,7 @@
 Both work below the most abstract level, where a step "hands empty again" costs something, and leave a step of the upper level
 in the plan only where its own refinement is still intact. Every change is played through on the table before it is kept.
 
+whole    a task so small that its states are few is planned anew as a whole, one level above the lowest
 detour   two steps of which the second undoes what the first did (put down, picked up again), and nothing between needed it
 cluster  steps close together that change the same symbols, or one of which takes the place that another leaves
 """
@@ -15,7 +16,7 @@ from itertools import groupby, product
 
 from planner.exhaust import Space, TooLargeError
 from planner.lifted import Done, Refiner, Template
-from planner.segments import LimitError
+from planner.segments import Ground, LimitError
 from planner.table import Cell, Key, arguments_of, key_of
 from reasoner.symbols import Problem, Symbol
 
@@ -27,11 +28,13 @@ ALWAYS = 4
 """Classes of so few individuals (the hands) are part of every cluster's world."""
 OPERATORS, STATES = 400, 5_000
 """The largest world in which a cluster is planned anew, the states for each cluster allowed."""
+WHOLE_BITS, WHOLE_STATES = 48, 20_000
+"""The largest world, in bits of a state if every symbol could take every value, and the most states for a whole plan anew."""
 
 
-def length(steps: Sequence[Done]) -> int:
-    """Return the number of primitives."""
-    return sum(length(step[4]) if step[4] else 1 for step in steps)
+def length(steps: Sequence[Done], level: int | None = None) -> int:
+    """Return the number of primitives, or of steps at a level."""
+    return sum(length(step[4], level) if step[4] and step[0] != level else 1 for step in steps)
 
 
 @dataclass
@@ -62,13 +65,63 @@ class Improver:
         best = list(steps)
         if len(self.segments.program.levels) < 2:
             return best
+        self.table.undo(0)
+        anew = self.whole(best)
+        self.table.undo(0)
+        if anew is not None:
+            return anew if length(anew) < length(best) else best
         for shorten in (self.clusters, self.detours):
-            self.table.undo(0)
             found = shorten(best)
             self.table.undo(0)
             if length(found) < length(best):
                 best = found
         return best
+
+    # ------------------------------------------------------------------------------------------------------------ whole
+
+    def whole(self, steps: Sequence[Done]) -> list[Done] | None:
+        """Return all planned anew, the same steps if that is no shorter, None if the world isn't small or refining fails.
+
+        What these steps leave as it was is left so, too.
+        """
+        problem = self.segments.program.problem
+        level = self.segments.program.levels[-2]
+        changing = {effect.situation for behavior in problem.domain.at_level(level) for effect in behavior.effects}
+        kinds = {situation: problem.domain.situations[situation].range for situation in changing}
+        bits = sum(
+            len(problem.classes.get(kind, ())).bit_length() * len(self.table.now[s]) for s, kind in kinds.items()
+        )
+        if bits > WHOLE_BITS or any(self.again(step) is None for step in steps):
+            return None
+        targets = self.table.since(0)
+        self.table.undo(0)
+        initial = {
+            symbol: value
+            for symbol, value in self.table.state().items()
+            if problem.domain.situations[symbol.situation].level <= level
+        }
+        goal = {s: value for s, value in initial.items() if (s.situation, key_of(s.arguments)) not in targets}
+        goal |= {Symbol(s, arguments_of(key)): value for (s, key), value in self.segments.goal.items()}
+        shortest = self._shortest(replace(problem, initial=initial, goal=goal), level, WHOLE_STATES, steps)
+        if not shortest:
+            return None if shortest is None else list(steps)
+        found = []
+        for name, arguments in shortest:
+            step = self.refiner.do(level, name, arguments)
+            if step is None:
+                return None
+            found.append(step)
+        return found
+
+    def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[Done]) -> list[Ground] | None:
+        """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
+        try:
+            found = Space(problem, level, OPERATORS).search(states, self.segments.deadline, length(old, level) - 1)
+        except TooLargeError:
+            return None
+        except TimeoutError as error:
+            raise LimitError("the time limit") from error
+        return [(step.behavior, step.arguments) for step in found.steps or ()]
 
     # ---------------------------------------------------------------------------------------------------------- detours
 
@@ -253,7 +306,7 @@ class Improver:
         key = tuple(shape), tuple(sorts.get(individual, -1) for individual in individuals)
         roles = tuple(individuals)
         if key not in self.known:
-            self.known[key] = self._plan(level, roles, targets)
+            self.known[key] = self._plan(level, roles, targets, old)
         template = self.known[key]
         if template is None:
             return None
@@ -263,7 +316,9 @@ class Improver:
                 return list(found)
         return None
 
-    def _plan(self, level: int, roles: tuple[str, ...], targets: dict[Cell, str]) -> Template | None:
+    def _plan(
+        self, level: int, roles: tuple[str, ...], targets: dict[Cell, str], old: Sequence[Done]
+    ) -> Template | None:
         """Return a shortest way to make these changes in a world of these individuals and the few that are always there."""
         if self.clusters_left <= 0:
             return None
@@ -281,14 +336,8 @@ class Improver:
             if problem.domain.situations[symbol.situation].level <= level
         }
         goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in initial.items()}
-        try:
-            small = replace(problem, classes=classes, initial=initial, goal=goal)
-            found = Space(small, level, OPERATORS).search(self.states, self.segments.deadline)
-        except TooLargeError:
-            return None
-        except TimeoutError as error:
-            raise LimitError("the time limit") from error
-        steps = [(step.behavior, step.arguments) for step in found.steps or ()]
+        small = replace(problem, classes=classes, initial=initial, goal=goal)
+        steps = self._shortest(small, level, self.states, old)
         return self.refiner.template(steps, roles) if steps else None
 
     def _around(self, problem: Problem, inside: set[str]) -> Iterator[tuple[Symbol, str]]:

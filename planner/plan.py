@@ -100,7 +100,8 @@ class Outcome:
     """How a planning call ended, and with what.
 
     `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
-    calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it.
+    calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it; `hits` and `misses`
+    count the refinements that the cache had and those that had to be searched.
     `bound` is what any plan costs at least on the lowest level, where that was proved.
     """
 
@@ -111,6 +112,8 @@ class Outcome:
     fallbacks: int = 0
     seconds: float = 0.0
     bound: float | None = None
+    hits: int = 0
+    misses: int = 0
 
 
 @dataclass(frozen=True)
