@@ -1,0 +1,62 @@
+"""What is perceived is what is there, over random worlds, and noise up to the thresholds changes nothing."""
+
+import numpy as np
+import pytest
+
+from reasoner.symbols import State
+from sim.faults import displaced, drained, lying
+from sim.world import Perturbation, World
+
+from .conftest import Case
+
+
+def shuffled(case: Case, seed: int) -> State:
+    """Return the case's facts with objects at other places and cups filled or not, by a seed."""
+    rng = np.random.default_rng(seed)
+    places = iter(rng.permutation(list(case.embodiment.places)).tolist())
+    fillings = [*case.embodiment.fillings, "no_beverage"]
+    state = dict(case.initial)
+    for symbol in case.initial:
+        if symbol.situation == "LOCATION":
+            state[symbol] = next(places)
+        elif symbol.situation == "BEVERAGE":
+            state[symbol] = fillings[rng.integers(len(fillings))]
+    return state
+
+
+@pytest.mark.parametrize("seed", range(5000, 5006))
+def test_random_worlds_are_perceived_as_they_were_set_up_in_spite_of_noise(serving: Case, seed: int) -> None:
+    truth = shuffled(serving, seed)
+    with World(serving.embodiment, truth, seed, Perturbation(), noise=0.002) as world:
+        for _ in range(5):
+            assert dict(world.observe()) == dict(truth)
+
+
+def test_what_lies_or_stands_beside_every_place_is_at_none(serving: Case) -> None:
+    where = {s.arguments[0]: s for s in serving.initial if s.situation == "LOCATION"}
+    for plant, name in ((lying("cup1"), "cup1"), (displaced("cup2", (0.08, 0.0)), "cup2")):
+        with World(serving.embodiment, serving.initial, beads=False) as world:
+            plant(world)
+            seen = world.observe()
+            assert where[name] not in seen
+            assert {s: v for s, v in seen.items() if s != where[name]} == {
+                s: v for s, v in serving.initial.items() if s != where[name]
+            }
+
+
+def test_a_vessel_is_filled_from_a_tenth_of_a_serving_on(serving: Case) -> None:
+    (symbol,) = (s for s in serving.initial if s.situation == "BEVERAGE" and s.arguments == ("bottle1",))
+    for left, seen in ((2, serving.initial[symbol]), (1, "no_beverage")):
+        with World(serving.embodiment, serving.initial) as world:
+            drained("bottle1", left)(world)
+            assert world.observe()[symbol] == seen
+
+
+def test_errors_of_perception_under_strong_noise_are_counted_not_hidden(serving: Case) -> None:
+    with World(serving.embodiment, serving.initial, 5000, beads=False, noise=0.02) as world:
+        looks = [dict(world.observe()) for _ in range(40)]
+    located = [s for s in serving.initial if s.situation == "LOCATION"]
+    wrong = sum(look[s] != serving.initial[s] for look in looks for s in located if s in look)
+    missed = sum(s not in look for look in looks for s in located)
+    assert wrong == 0
+    assert 0 < missed < 0.9 * len(looks) * len(located)
