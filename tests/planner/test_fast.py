@@ -226,3 +226,28 @@ def test_a_domain_with_booleans_disjunction_and_keys_is_planned(seed: int) -> No
 
 def test_the_shipped_scene_is_the_table_that_the_families_build_on() -> None:
     assert set(tabletop().domain.behaviors) == set(paper_table().domain.behaviors)
+
+
+@pytest.mark.parametrize("name", ["swap", "rotate", "blocked"])
+def test_a_small_task_takes_as_few_steps_of_the_middle_level_as_any_plan(name: str) -> None:
+    problem = family(name, 4)
+    better = plan(problem).plan
+    assert better is not None
+    assert validate(problem, better) == []
+    end = {symbol: value for symbol, value in problem.initial.items() if symbol.situation == "HOLDS"}
+    shortest = Space(replace(problem, goal=end | dict(problem.goal)), 2).search(10**6).steps
+    assert shortest is not None
+    assert len(better.at_level(2)) == len(shortest)
+
+
+def test_looking_for_short_plans_only_finds_the_same_shortest_ones() -> None:
+    for seed in range(40_000, 40_020):
+        problem = random_table(seed)
+        try:
+            truth = Space(problem, 2).search(50_000)
+        except TooLargeError:
+            continue
+        bounded = Space(problem, 2).search(50_000, longest=len(truth.steps or range(30)))
+        assert (bounded.steps and len(bounded.steps)) == (truth.steps and len(truth.steps)), seed
+        if truth.steps:
+            assert Space(problem, 2).search(50_000, longest=len(truth.steps) - 1).steps is None, seed
