@@ -1,6 +1,10 @@
-"""Physics, measured: the paper's plans with and without beads, stepping alone, and perturbed rollouts.
+"""Physics, measured: plans beside stepping alone, film, determinism, speed by workers, perturbed rollouts.
 
-    python -m benchmarks.physics              the plans of the shipped scenes, and the stepping floor
+    python -m benchmarks.physics              everything below, then development seeds and reporting seeds
+    python -m benchmarks.physics plans        the plans of the shipped scenes beside the cost of stepping alone
+    python -m benchmarks.physics film         what filming costs
+    python -m benchmarks.physics same         the same seed in several processes and with several workers
+    python -m benchmarks.physics speed        rollouts per minute by workers, and on a Ray cluster
     python -m benchmarks.physics 5000 5020    perturbed rollouts of the beverage-serving plan, one per seed
 
 Seeds from 5000 are for development: what fails there may be mended. Seeds from 9000 are for reporting only.
@@ -8,9 +12,16 @@ Seeds from 5000 are for development: what fails there may be mended. Seeds from 
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pybullet
@@ -45,22 +56,92 @@ def line(rollout: Rollout) -> str:
     )
 
 
-def stepping_floor(one: Trial, steps: int = 960) -> float:
-    """Return CPU milliseconds per bare simulation step of the initial world, all asleep that can be."""
-    with World(one.embodiment, one.initial, beads=one.beads) as world:
+def floor_of(trial: Trial) -> tuple[Rollout, float]:
+    """Return a rollout and the CPU seconds that it spent inside PyBullet's step: the cost of stepping alone."""
+    bare, spent = pybullet.stepSimulation, 0.0
+
+    def step(**options: int) -> None:
+        nonlocal spent
         begin = time.process_time()
-        for _ in range(steps):
-            pybullet.stepSimulation(physicsClientId=world.client)
-        return (time.process_time() - begin) / steps * 1000
+        bare(**options)
+        spent += time.process_time() - begin
+
+    pybullet.stepSimulation = step
+    try:
+        return trial.run(0), spent
+    finally:
+        pybullet.stepSimulation = bare
 
 
-def main() -> None:
-    """Print the nominal rollouts of the shipped scenes."""
-    for name in ("beverage-serving", "beverage-serving-moved"):
+def plans() -> None:
+    """Print the nominal rollouts of the shipped scenes, second robot and table included, beside the stepping floor."""
+    for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving"):
         for beads in (True, False):
-            one = case(name, beads=beads)
-            print(f"{name:24} {'beads' if beads else 'none ':5}  {line(one.run(0))}")
-            print(f"{'':24} bare step {stepping_floor(one):.3f} ms")
+            rollout, floor = floor_of(case(name, beads=beads))
+            ratio = rollout.cpu_seconds / floor
+            print(
+                f"{name:24} {'beads' if beads else 'none ':5}  {line(rollout)}; {ratio:.2f} x stepping alone",
+                flush=True,
+            )
+
+
+def film() -> None:
+    """Print what filming the paper's plan adds."""
+    with TemporaryDirectory() as folder:
+        scene = confab.load("beverage-serving")
+        (rollout,) = scene.plan(mode="paper").verify(video=Path(folder) / "run.mp4").rollouts
+    print(f"film: {rollout.clock.rendering:.1f} CPU s beside {rollout.cpu_seconds:.1f} CPU s for the rollout")
+
+
+def same_seed() -> None:
+    """Print whether a seed gives the same in this process, in three others, and with one and two workers."""
+    one, seeds = case("beverage-serving-moved", Perturbation()), range(5000, 5003)
+    alone = rollouts(one, seeds)
+    shared = [rollouts(one, seeds, workers) == alone for workers in (2, 3)]
+    script = f"from benchmarks.physics import *; print(case({'beverage-serving-moved'!r}, Perturbation()).run(5000).as_json())"
+    prints = set()
+    for _ in range(3):
+        run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        prints.add(re.sub(r"'cpu_seconds': [0-9.]+", "", run.stdout.splitlines()[-1]))
+    print(f"seeds {seeds.start} to {seeds.stop - 1}: 2 workers as 1: {shared[0]}, 3 workers as 1: {shared[1]}")
+    print(f"seed {seeds.start} in three new processes: {'identical' if len(prints) == 1 else 'DIFFERENT'}")
+
+
+def speed() -> None:
+    """Print rollouts per minute by number of workers, and on a Ray cluster of two nodes if Ray is installed."""
+    one, seeds = case("beverage-serving-moved", Perturbation()), range(5000, 5004)
+    alone: list[Rollout] = []
+    for workers in (1, WORKERS):
+        begin = time.perf_counter()
+        alone = rollouts(one, seeds, workers)
+        print(
+            f"{workers} workers: {len(seeds) / (time.perf_counter() - begin) * 60:.1f} rollouts per minute (10 primitives)"
+        )
+    try:
+        from ray.cluster_utils import Cluster
+    except ImportError:
+        print("Ray isn't installed: no figures on a cluster")
+        return
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    cluster.add_node(num_cpus=1)
+    os.environ["RAY_ADDRESS"] = cluster.address
+    with TemporaryDirectory() as folder:
+        killed = replace(one, prepare=partial(die_once, Path(folder) / "died"))
+        begin = time.perf_counter()
+        same = rollouts(killed, seeds, "ray") == alone
+    rate = len(seeds) / (time.perf_counter() - begin) * 60
+    print(f"Ray, two nodes, one worker killed: {rate:.1f} rollouts per minute, same results: {same}")
+    cluster.shutdown()
+
+
+def die_once(mark: Path, world: World) -> None:
+    """Kill the process that builds the first world."""
+    del world
+    try:
+        mark.touch(exist_ok=False)
+    except FileExistsError:
+        return
+    os._exit(9)
 
 
 def perturbed(seeds: Sequence[int], workers: int | str = WORKERS) -> None:
@@ -75,8 +156,19 @@ def perturbed(seeds: Sequence[int], workers: int | str = WORKERS) -> None:
     print(f"{len(done) / (time.perf_counter() - begin) * 60:.1f} rollouts per minute with {workers} workers")
 
 
+def main() -> None:
+    """Print everything but the faults, which `benchmarks.faults` prints; the reporting seeds last."""
+    for part in (plans, film, same_seed, speed):
+        part()
+    for title, seeds in (("development", range(5000, 5022)), ("reporting", range(9000, 9100))):
+        print(f"perturbed rollouts, {title} seeds")
+        perturbed(seeds)
+
+
 if __name__ == "__main__":
     if len(sys.argv) == 3:
         perturbed(range(int(sys.argv[1]), int(sys.argv[2])))
+    elif len(sys.argv) == 2:
+        {"plans": plans, "film": film, "same": same_seed, "speed": speed}[sys.argv[1]]()
     else:
         main()

@@ -54,8 +54,8 @@ class Film:
         steps: Sequence[Step],
         titles: Mapping[tuple[int, ...], str] | None = None,
         camera: Camera | None = None,
-        frames: int = 20,
-        speed: float = 2.0,
+        frames: int = 15,
+        speed: float = 2.5,
         stills: str | Path | None = None,
         width: int = 960,
         height: int = 544,
@@ -77,7 +77,12 @@ class Film:
         self.close()
 
     def __call__(self, world: World) -> None:
-        """Take a frame if it is time for one."""
+        """Take a frame if it is time for one; what that costs is rendering, by the world's clock."""
+        begin = time.process_time()
+        self._take(world)
+        world.clock.rendering += time.process_time() - begin
+
+    def _take(self, world: World) -> None:
         if world.current != self._number:
             if self._number < 0:
                 hide_vessels(world)
@@ -90,10 +95,7 @@ class Film:
     def frame(self, world: World) -> Array:
         """Return the picture of now, captioned."""
         self.camera = self.camera or view_of(world.embodiment, self.width, self.height)
-        begin = time.process_time()
-        image = picture(world, self.camera)
-        world.clock.rendering += time.process_time() - begin
-        return self._caption(image, world.current)
+        return self._caption(picture(world, self.camera), world.current)
 
     def close(self) -> None:
         """Finish the file."""

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from reasoner.embodiment import Embodiment, Shape
 from sim.bodies import outline, wall
@@ -117,17 +118,17 @@ def picture(world: World, camera: Camera) -> Array:
     eye = np.array(camera.eye)
     for (rotation, base), shape in sorted(vessels, key=lambda v: -float(np.linalg.norm(v[0][1] - eye))):
         _draw_glass(image, depth, camera, rotation, base, shape)
-    return np.clip(image, 0, 255).astype(np.uint8)
+    shown: Array = np.clip(image, 0, 255).astype(np.uint8)
+    return shown
 
 
 def _cast_shadows(world: World, image: Array, depth: Array, camera: Camera) -> None:
     """Darken table tops where hands and bodies keep the light off, more softly the higher these are."""
-    points = np.array(camera.eye) + depth[..., None] * camera.rays
     casters = list(_casters(world))
     for fixture in world.embodiment.fixtures:
         top = fixture.position[2] + fixture.size[2] / 2
-        on_top = np.abs(points[..., 2] - top) < 0.004
-        dark = np.ones(depth.shape)
+        distance, x, y = _plane(camera, top)
+        dark = np.ones(depth.shape, dtype=np.float32)
         for center, radius in casters:
             height = center[2] - top
             if not 0 <= height <= 0.35:
@@ -136,11 +137,22 @@ def _cast_shadows(world: World, image: Array, depth: Array, camera: Camera) -> N
             soft = 0.006 + 0.12 * height
             window = camera.window(spot, radius + soft)
             if window is not None:
-                away = np.hypot(points[window][..., 0] - spot[0], points[window][..., 1] - spot[1])
-                lit = np.clip((away - radius + soft) / (2 * soft), 0.0, 1.0)
-                lit = 1 - 0.34 * min(1.0, radius / soft) * (1 - lit * lit * (3 - 2 * lit))
+                away = np.hypot(x[window] - np.float32(spot[0]), y[window] - np.float32(spot[1]))
+                lit = np.clip((away - np.float32(radius - soft)) / np.float32(2 * soft), 0.0, 1.0)
+                lit = 1 - np.float32(0.34 * min(1.0, radius / soft)) * (1 - lit * lit * (3 - 2 * lit))
                 np.minimum(dark[window], lit, out=dark[window])
-        image[on_top] *= dark[on_top][:, None]
+        dark[np.abs(depth - distance) > 0.01] = 1.0
+        image *= dark[..., None]
+
+
+@lru_cache(maxsize=8)
+def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
+    """Return for each pixel the distance at which its ray meets a level plane, and x and y there."""
+    with np.errstate(divide="ignore"):
+        distance = (height - camera.eye[2]) / camera.rays[..., 2]
+    distance = np.where(np.isfinite(distance) & (distance > 0), distance, 1e6)
+    x, y = (camera.eye[axis] + distance * camera.rays[..., axis] for axis in (0, 1))
+    return distance.astype(np.float32), x.astype(np.float32), y.astype(np.float32)
 
 
 def _casters(world: World) -> Iterator[tuple[Array, float]]:
@@ -155,7 +167,7 @@ def _casters(world: World) -> Iterator[tuple[Array, float]]:
             yield base + rotation[:, 2] * height, float(np.interp(height, heights, radii)) * 0.9
 
 
-def _opaque(world: World, camera: Camera) -> tuple[Array, Array]:
+def _opaque(world: World, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return PyBullet's picture on a backdrop, and the depth of each pixel along the forward axis."""
     _, _, colors, buffer, _ = pybullet.getCameraImage(
         camera.width,
@@ -173,10 +185,12 @@ def _opaque(world: World, camera: Camera) -> tuple[Array, Array]:
         renderer=pybullet.ER_TINY_RENDERER,
         physicsClientId=world.client,
     )
-    image = np.asarray(colors, dtype=np.uint8).reshape(camera.height, camera.width, 4)[..., :3].astype(float)
-    buffer = np.asarray(buffer, dtype=float).reshape(camera.height, camera.width)
-    depth = FAR * NEAR / (FAR - (FAR - NEAR) * buffer)
-    return np.where((buffer > 0.9999)[..., None], camera.backdrop, image), depth
+    image = np.asarray(colors, dtype=np.uint8).reshape(camera.height, camera.width, 4)[..., :3].astype(np.float32)
+    buffer = np.asarray(buffer, dtype=np.float32).reshape(camera.height, camera.width)
+    depth = np.float32(FAR * NEAR) / (np.float32(FAR) - np.float32(FAR - NEAR) * buffer)
+    nothing = buffer > 0.9999
+    image[nothing] = camera.backdrop[nothing]
+    return image, depth
 
 
 def _drops(world: World) -> Iterator[tuple[Array, float, Array]]:
@@ -204,7 +218,7 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
     seen = (root > 0) & (distance < depth[window])
     normal = (offset + distance[..., None] * rays) / radius
     light = np.clip(normal @ SUN, 0.0, 1.0)
-    shade = (0.5 + 0.5 * light)[..., None] * color + 45 * (light**30)[..., None]
+    shade = (0.5 + 0.5 * light)[..., None] * color + 18 * (light**30)[..., None]
     image[window][seen] = shade[seen]
     depth[window][seen] = distance[seen]
 

@@ -30,7 +30,11 @@ class StepReport:
 
 @dataclass(frozen=True)
 class Rollout:
-    """One execution of a plan. `poured` is the share of a serving that arrived, per pour; `state` what was perceived last."""
+    """One execution of a plan.
+
+    `poured` is the share of a serving that arrived, per pour; `state` what was perceived last; `cpu_seconds` leaves out what
+    filming took (`clock.rendering`).
+    """
 
     seed: int
     ok: bool
@@ -134,7 +138,7 @@ def verify(
                 break
         poured = tuple(min(1.0, r.verdict.measured["poured"]) for r in reports if "poured" in r.verdict.measured)
         ok = len(reports) == len(steps) and all(report.verdict.ok for report in reports)
-        cpu = time.process_time() - begin
+        cpu = time.process_time() - begin - world.clock.rendering
         return Rollout(seed, ok, tuple(reports), poured, cpu, world.seconds, world.observe(), world.clock)
 
 
