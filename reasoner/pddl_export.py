@@ -131,6 +131,7 @@ class _Export:
         self.arity: dict[str, int] = {}
         self.contrary: dict[str, set[str]] = {}  # situation types whose contrary is kept, and of which last terms
         self.free: dict[tuple[str, str], None] = {}  # (class, situation type)
+        self.asked: dict[tuple[str, str], frozenset[str]] = {}  # for each, the values that anything asks to be free
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
         """Return the PDDL name for one of ours; no two of a kind are the same."""
@@ -214,15 +215,18 @@ class _Export:
         self.arity[name] = len(words)
         return f"({' '.join([name, *words])})"
 
-    def different(self, one: str, other: str, values: Iterable[str]) -> str:
-        """Return a condition for two terms not to be the same, where the second may be one of `values`."""
+    def different(self, one: str, other: str, among: Iterable[str], values: Iterable[str]) -> str:
+        """Return a condition for two terms not to be the same: the first one of `among`, the second one of `values`."""
         self.arity["different"] = 2
         rows = self.statics.setdefault("different", set())
         others = [other] if not other.startswith("?") else list(values)
-        kinds = {*self.types, *(s.range for s in self.situations.values() if not s.boolean)}
-        everyone = sorted(set().union(*(self.sets[kind] for kind in kinds)))
-        rows |= {(a, b) for a in everyone for b in others if a != b}
+        rows |= {(a, b) for a in among for b in others if a != b}
         return f"(different {self.term(one)} {self.term(other)})"
+
+    def range_of(self, situation: str) -> list[str]:
+        """Return the values that a symbol of a situation type can have."""
+        initial = (v for s, v in self.problem.initial.items() if s.situation == situation)
+        return list(dict.fromkeys([*self.problem.classes[self.situations[situation].range], *initial]))
 
     def condition(self, one: Condition, action: _Action, where: list[str]) -> None:
         """Add a conjunct to `where`, with parameters that it needs."""
@@ -241,13 +245,14 @@ class _Export:
                 else:
                     other = self.fresh(action, "other")
                     where.append(self.predicate(situation, arguments, other))
-                    where.append(self.different(other, value, self.problem.classes[self.situations[situation].range]))
+                    values = self.range_of(situation)
+                    where.append(self.different(other, value, values, values))
             case ClassCondition(term, kind, False):
                 where.append(self.is_a(term, kind))
             case RelationCondition(relation, arguments, False):
                 where.append(self.relation(relation, arguments))
             case EqualityCondition(left, right, True):
-                where.append(self.different(left, right, self.members(action, right)))
+                where.append(self.different(left, right, *(self.possible(action, t) for t in (left, right))))
             case Witness(variable, kind, conditions, False):
                 inner = self.fresh(action, variable[1:], self.type_of.get(kind, "object"))
                 if kind not in self.type_of:
@@ -282,6 +287,7 @@ class _Export:
             for c in behavior.preconditions:
                 if _absent(c) == (kind, situation):
                     asked |= self.members_of(behavior, c.conditions[0].value)  # type: ignore[union-attr]
+        self.asked[kind, situation] = asked
         held = [
             v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in self.sets[kind]
         ]
@@ -306,6 +312,11 @@ class _Export:
 
     def members(self, action: _Action, term: str) -> frozenset[str]:
         return self.members_of(action.behavior, term)
+
+    def possible(self, action: _Action, term: str) -> frozenset[str]:
+        """Return what a term can stand for, everything where that isn't known."""
+        known = self.members(action, term)
+        return frozenset().union(*self.sets.values()) if term in known and term.startswith("?") else known
 
     def relation(self, relation: str, arguments: Sequence[str]) -> str:
         name = self.name("predicate", f"relation {relation}", relation)
@@ -443,7 +454,7 @@ class _Export:
         asked = self.sets[situation.range] if free else frozenset(self.contrary.get(situation.name, ()))
         news = self.members(action, value)
         if news & asked and (old.startswith(("?other", "?old")) or self.members(action, old) & news):
-            action.needs.append(self.different(old, value, news))
+            action.needs.append(self.different(old, value, self.range_of(situation.name), news))
         action.ends.append(self.predicate(situation.name, arguments, old))
         action.begins.append(self.predicate(situation.name, arguments, value))
         action.begins.append(f"?contrary {situation.name} {' '.join((*arguments, old))}")
@@ -496,7 +507,9 @@ class _Export:
             return [
                 f"({self.free_name(kind, situation)} {self.term(words[-1])})"
                 for kind, situation in self.free
-                if situation == words[1] and len(words) == 4
+                if situation == words[1]
+                and len(words) == 4
+                and (words[-1].startswith("?") or words[-1] in self.asked[kind, situation])
             ]
         return [text]
 
@@ -588,7 +601,9 @@ class _Export:
                     facts += self.resolve(f"?contrary {situation} {' '.join(row)}")
         for kind, situation in self.free:
             held = {row[1] for name, row in true if name == situation and row[0] in self.sets[kind]}
-            values = self.problem.classes[self.situations[situation].range]
+            values = (
+                v for v in self.problem.classes[self.situations[situation].range] if v in self.asked[kind, situation]
+            )
             facts += [f"({self.free_name(kind, situation)} {self.term(v)})" for v in values if v not in held]
         for predicate, rows in sorted(self.statics.items()):
             facts += [f"({' '.join([predicate, *map(self.term, row)])})" for row in sorted(rows)]
