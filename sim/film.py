@@ -54,7 +54,7 @@ class Film:
         steps: Sequence[Step],
         titles: Mapping[tuple[int, ...], str] | None = None,
         camera: Camera | None = None,
-        frames: int = 15,
+        frames: int = 12,
         speed: float = 2.5,
         stills: str | Path | None = None,
         width: int = 960,
