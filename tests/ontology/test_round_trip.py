@@ -18,6 +18,8 @@ pytestmark = [
     pytest.mark.skipif(owlapi.jvm() is None or not owlapi.jars(), reason="no Java, or no jars of the OWL API"),
 ]
 
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+
 
 def canonical(file: Path) -> ox.Dataset:
     """Return a file's triples with blank nodes named by RDFC-1.0."""
@@ -41,7 +43,16 @@ def test_shipped_files_and_a_learned_memory_come_back_equal_and_inside_owl_2_dl(
     memory = confab.Memory.of(scene)
     memory.learn(scene, scene.plan(mode="paper").plan)
     memory.save(tmp_path / "memory.ttl")
-    files = [*ontology.shipped().values(), skeleton(tmp_path), tmp_path / "washing.ttl", tmp_path / "memory.ttl"]
+    assert ontology.ROOT / "alignments" / "soma-alignment.ttl" in ontology.shipped().values()
+    examples = sorted(EXAMPLES.rglob("*.ttl"))
+    assert examples
+    files = [
+        *ontology.shipped().values(),
+        *examples,
+        skeleton(tmp_path),
+        tmp_path / "washing.ttl",
+        tmp_path / "memory.ttl",
+    ]
     violations = through_the_owl_api(files, tmp_path / "back")
     assert {file: found for file, found in violations.items() if found} == {}
     assert [file.name for file in files if canonical(file) != canonical(tmp_path / "back" / file.name)] == []
