@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from planner import fast
@@ -151,7 +151,7 @@ def plan(
     for level, expanded in race.spent.items() if stream.solution is not None else ():
         search.setdefault(level, Counts()).expanded += expanded
     search.setdefault(first, Counts()).add(Counts(stream.generated, stream.evaluated, stream.expanded))
-    return Outcome(outcome.status, outcome.plan, outcome.reason, search, outcome.fallbacks, perf_counter() - began)
+    return replace(outcome, search=search, seconds=perf_counter() - began)
 
 
 def refined(problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None) -> Outcome | None:
@@ -165,4 +165,5 @@ def refined(problem: Problem, using: fast.Compiled, stream: Stream, deadline: fl
             stream.forbid(stream.solution[: position + 1])
             return None
         call.steps.append(step)
-    return Outcome(Status.SOLVED, call.tree(), None, call.segments.counts, call.fallbacks)
+    cache, counts = call.refiner, call.segments.counts
+    return Outcome(Status.SOLVED, call.tree(), None, counts, call.fallbacks, hits=cache.hits, misses=cache.misses)
