@@ -264,8 +264,8 @@ class _Writer:
             label = _quoted(self.labels.get(name, name))
             yield f"{self.iri(name)} a {said} ; c:index {index} ; rdfs:label {label}@en ."
         if len(names) > 1:
-            members = " ".join(sorted(map(self.iri, names)))  # the OWL API, and so Protégé, saves them in this order
-            yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {members} ) ] ."
+            different = " ".join(sorted(map(self.iri, names)))  # the OWL API, and so Protégé, saves them in this order
+            yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {different} ) ] ."
 
     def above(self, kind: str) -> Iterator[str]:
         yield kind
