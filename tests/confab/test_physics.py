@@ -54,7 +54,7 @@ def test_a_wall_before_a_bottle_fails_at_its_step_with_code_object_and_number(sc
 
 
 def test_the_committed_reach_facts_fit_the_geometry() -> None:
-    for name in ("beverage-serving", "beverage-serving-moved"):
+    for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving"):
         shipped = confab.load(name)
         assert reach_hash(shipped.knowledge) == fingerprint(shipped.embodiment)
         assert shipped.problem.relations["canReach"] == reach(shipped.embodiment).pairs

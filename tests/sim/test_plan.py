@@ -13,7 +13,7 @@ from sim.picture import hide_vessels, picture, view_of
 from sim.verify import verify
 from sim.world import World
 
-from .conftest import Case
+from .conftest import Case, case
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -27,6 +27,15 @@ def test_the_paper_s_plan_verifies_and_both_cups_are_filled(serving: Case) -> No
     assert rollout.simulated_seconds <= 45
     assert rollout.clock.planning <= 2
     assert dict(rollout.state) == dict(serving.expected[-1])
+
+
+def test_another_robot_at_another_table_serves_without_a_change_of_python() -> None:
+    one = case("one-arm-serving")
+    (robot,) = one.embodiment.robots
+    assert len(robot.hands) == 1
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
+    assert rollout.failure is None
+    assert rollout.poured == (1.0,)
 
 
 @pytest.mark.slow
@@ -65,9 +74,9 @@ def test_a_step_whose_promise_the_world_does_not_keep_fails(serving: Case) -> No
 
 
 def test_a_new_world_is_perceived_as_the_facts_that_it_was_set_up_with(serving: Case, moved: Case) -> None:
-    for case in (serving, moved):
-        with World(case.embodiment, case.initial) as world:
-            assert dict(world.observe()) == dict(case.initial)
+    for one in (serving, moved):
+        with World(one.embodiment, one.initial) as world:
+            assert dict(world.observe()) == dict(one.initial)
 
 
 def test_the_beverage_can_be_seen_through_the_glass(serving: Case) -> None:
