@@ -33,6 +33,24 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from confab import __version__
+
+        print(f"confab {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Plan what a robot does from an ontology, and verify it in physics."""
+
+
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Shipped name, file, or URL of a SPARQL endpoint.")]
 SceneIri = Annotated[
     str | None, typer.Option("--scene", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
@@ -66,7 +84,7 @@ def plan(
     mode: Mode = "guarded",
     time_limit: TimeLimit = None,
     optimal: Annotated[
-        bool, typer.Option("--optimal", help="Improve until proved optimal, or a limit; tell the bound.")
+        bool, typer.Option("--optimal", help="Improve until proved optimal or the limit (10 s); tell the bound.")
     ] = False,
     observed: Annotated[
         Path | None,
@@ -304,6 +322,7 @@ def explain(
 ) -> None:
     """Say why this behaviour was chosen and not that one; or why there is no plan."""
     from confab.explaining import explain as explain_step
+    from confab.interchange import ground_named
     from confab.scene import load
 
     loaded = load(scene)
@@ -315,8 +334,11 @@ def explain(
         _print(result.json() if as_json else result)
         raise typer.Exit(EXIT[result.outcome.status.value])
     steps = [(s.behavior, s.arguments) for s in result.plan.at_level(level)]
-    words = against.split() if against else None
-    other = (words[0], tuple(words[1:])) if words else None
+    if level not in result.problem.domain.levels:
+        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise KnowledgeError(f"{plot}: can't draw into '{plot.suffix}'; wanted .png, .svg or .pdf")
+    other = ground_named(result.problem, against) if against else None
     found = explain_step(result.problem, remembered, steps, step, other)
     if plot is not None:
         found.plot(plot)
@@ -370,7 +392,7 @@ def generate(
     """Write a scene for trials as an ordinary ontology file."""
     from reasoner.generate import write_scene
 
-    write_scene(out, family, objects, hands, clutter, seed)
+    write_scene(_turtle(out), family, objects, hands, clutter, seed)
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
@@ -379,12 +401,12 @@ def import_(
     domain: Annotated[Path, typer.Argument(metavar="DOMAIN.pddl")],
     problem: Annotated[Path, typer.Argument(metavar="PROBLEM.pddl")],
     out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
-    level: Annotated[int, typer.Option(help="Level of its behaviours; abstract ones can be added above.")] = 1,
+    level: Annotated[int, typer.Option(min=1, help="Level of its behaviours; abstract ones can be added above.")] = 1,
 ) -> None:
     """Turn a PDDL problem into a scene, to be edited in Protégé and planned in."""
     from confab.pddl_commands import import_pddl
 
-    imported = import_pddl(domain, problem, out, level)
+    imported = import_pddl(domain, problem, _turtle(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
     print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
@@ -425,6 +447,13 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
         return None
 
 
+def _turtle(path: Path) -> Path:
+    """Return the path of a scene to write, if a scene can be read from there again."""
+    if path.suffix.lower() != ".ttl":
+        raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
+    return path
+
+
 def _plan(path: Path, scene: Scene) -> Plan:
     """Return the plan in a file: JSON of ours, else a list of actions as PDDL planners write it for our export."""
     if path.suffix.lower() in (".json", ""):
@@ -433,7 +462,10 @@ def _plan(path: Path, scene: Scene) -> Plan:
         return read_plan(path, scene.problem)
     from confab.pddl_commands import read_pddl_plan
 
-    return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"))
+    try:
+        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"))
+    except (KnowledgeError, UnicodeDecodeError) as error:
+        raise KnowledgeError(f"{path}: {error}") from error
 
 
 def _print(what: Any) -> None:

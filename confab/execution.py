@@ -329,9 +329,12 @@ def execute(
         )
     if world != "pybullet":
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
+    from confab.physics import require_skills
     from sim.live import LiveWorld
     from sim.world import World as Physics
 
+    lowest = problem.domain.at_level(problem.domain.levels[-1])
+    require_skills(scene, [behavior.name for behavior in lowest])
     with Physics(scene.embodiment, problem.initial, seed) as physics:
         if prepare is not None:
             prepare(physics)

@@ -10,7 +10,7 @@ from typing import Any
 from planner.plan import Outcome, Plan, Status, Step
 from reasoner.graph import KnowledgeError
 from reasoner.names import nearest
-from reasoner.symbols import Problem
+from reasoner.symbols import Behavior, Problem
 
 
 def step_json(step: Step) -> dict[str, Any]:
@@ -63,11 +63,39 @@ def read_plan(path: Path, problem: Problem) -> Plan:
         raise KnowledgeError(f"{path}: not JSON: {error}") from error
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
     if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
-        what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no list of 'steps'"
+        what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no 'steps'"
         raise KnowledgeError(
             f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene"
         )
     return Plan(tuple(_step(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
+
+
+def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
+    """Return a quantified behaviour that is written like ``B2_PICK right_hand cup1``.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such behaviour, or it doesn't take these arguments.
+    """
+    name, *arguments = text.split() or [""]
+    behavior = problem.domain.behaviors.get(name)
+    if behavior is None:
+        raise KnowledgeError(f"unknown behaviour '{name}'{nearest(name, problem.domain.behaviors)}")
+    check_arguments(problem, behavior, tuple(arguments), f"'{text}'")
+    return name, tuple(arguments)
+
+
+def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, ...], where: str) -> None:
+    """Raise `KnowledgeError` if a behaviour doesn't take some arguments; the message begins with `where`."""
+    if len(arguments) != len(behavior.parameters):
+        raise KnowledgeError(
+            f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}"
+        )
+    for parameter, argument in zip(behavior.parameters, arguments, strict=True):
+        members = problem.classes.get(parameter.kind, ())
+        if argument not in members:
+            raise KnowledgeError(f"{where}: '{argument}' is no {parameter.kind}{nearest(argument, members)}")
 
 
 def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
@@ -79,14 +107,7 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
         hint = nearest(data["behavior"], problem.domain.behaviors)
         raise KnowledgeError(f"{where}: the scene has no behaviour '{data['behavior']}'{hint}")
     arguments = tuple(map(str, data.get("arguments", ())))
-    if len(arguments) != len(behavior.parameters):
-        raise KnowledgeError(
-            f"{where}: {behavior.name} takes {len(behavior.parameters)} arguments, got {len(arguments)}"
-        )
-    for parameter, argument in zip(behavior.parameters, arguments, strict=True):
-        members = problem.classes.get(parameter.kind, ())
-        if argument not in members:
-            raise KnowledgeError(f"{where}: '{argument}' is no {parameter.kind}{nearest(argument, members)}")
+    check_arguments(problem, behavior, arguments, where)
     return Step(
         path=position,
         id=data["id"] if isinstance(data.get("id"), int) else problem.id_of(behavior.name, arguments),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from planner.plan import Plan
 from reasoner.graph import KnowledgeError
+from reasoner.symbols import Fact, State
 from sim.rollouts import Done, Trial, wilson
 from sim.rollouts import rollouts as roll_out
 from sim.verify import Rollout, expectations
@@ -25,21 +26,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Report:
-    """What physics said about a plan: one or more rollouts, and the film of the first."""
+    """What physics said about a plan: one or more rollouts, and the film of the first.
+
+    A rollout is good if every primitive did what it promises and the goal's facts were seen in the end.
+    """
 
     plan: Plan
+    goal: State
     rollouts: tuple[Rollout, ...]
     video: Path | None = None
 
     @property
     def verified(self) -> bool:
-        """Whether every rollout did what the plan promises."""
-        return all(rollout.ok for rollout in self.rollouts)
+        """Whether every rollout is good."""
+        return self.good == len(self.rollouts)
 
     @property
     def good(self) -> int:
-        """How many rollouts did."""
-        return sum(rollout.ok for rollout in self.rollouts)
+        """How many rollouts are good."""
+        return sum(rollout.ok and not self.missed(rollout) for rollout in self.rollouts)
+
+    def missed(self, rollout: Rollout) -> list[Fact]:
+        """Return the facts of the goal of which something else was seen in the end; what nothing perceives isn't judged."""
+        wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
+        return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
     @property
     def poured(self) -> float | None:
@@ -63,16 +73,20 @@ class Report:
 
     def summary(self) -> str:
         """Return one line that says how it went."""
-        first = next((r for r in self.rollouts if not r.ok), self.rollouts[0])
+        first = next((r for r in self.rollouts if not r.ok or self.missed(r)), self.rollouts[0])
         several = f"; {self.rate()}" if len(self.rollouts) > 1 else ""
         if first.failure is not None:
             step = first.failure.step
             where = f"at step {'.'.join(map(str, step.path))} ({step}), seed {first.seed}"
             return f"failed {where}: {first.failure.verdict}{several}"
-        poured = ", ".join(f"{share:.0%}" for share in first.poured)
+        if missed := self.missed(first):
+            seen = "; ".join(f"{fact} (seen: {first.state[fact.symbol]})" for fact in missed)
+            return f"failed: {len(first.steps)} primitives did what they promise, but the goal isn't reached: {seen}{several}"
+        poured = " and ".join(f"{share:.0%}" for share in first.poured)
         return (
-            f"verified: {len(first.steps)} primitives, poured {poured or 'nothing'}, {first.simulated_seconds:.1f} s simulated"
-            f" in {first.cpu_seconds:.1f} CPU s{several}"
+            f"verified: {len(first.steps)} primitives"
+            + (f", poured {poured} of a serving" if poured else "")
+            + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s{several}"
         )
 
     def rate(self) -> str:
@@ -110,6 +124,7 @@ def verify(
     progress: Callable[[int, PrimitiveStep], None] | None = None,
     workers: int | str = 1,
     done: Done | None = None,
+    goal: State | None = None,
 ) -> Report:
     """Carry out the primitives of a plan in PyBullet, once or with several seeds.
 
@@ -130,6 +145,8 @@ def verify(
         A number of processes, or a Ray cluster: see `sim.rollouts.rollouts`.
     done
         Called with each rollout that is done.
+    goal
+        What shall be seen in the end; the scene's goal if left out.
 
     Raises
     ------
@@ -137,6 +154,7 @@ def verify(
         The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers.
     """
     steps = plan.primitives
+    require_skills(scene, [step.behavior for step in steps])
     try:
         expected = expectations(scene.problem, steps)
         trial = Trial(
@@ -158,7 +176,22 @@ def verify(
         finished += roll_out(trial, seeds, workers, done) if seeds else []
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
-    return Report(plan, tuple(finished), video)
+    return Report(plan, scene.problem.goal if goal is None else goal, tuple(finished), video)
+
+
+def require_skills(scene: Scene, behaviors: Iterable[str]) -> None:
+    """Raise `KnowledgeError` if physics has no skill for one of some behaviours, or the scene no robot."""
+    skills = scene.embodiment.skills
+    for behavior in behaviors:
+        if behavior not in skills:
+            raise KnowledgeError(
+                f"behaviour {behavior} names no skill, so physics can't carry it out; give it one (docs/authoring.md), "
+                "or act in the symbolic world (confab execute)"
+            )
+    if not scene.embodiment.robots:
+        raise KnowledgeError(
+            f"{scene.iri} has no robot with a body, so physics can't carry anything out (docs/authoring.md)"
+        )
 
 
 def _filmed(
@@ -178,7 +211,8 @@ def progress_bar() -> Progress:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description:<44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 @contextmanager

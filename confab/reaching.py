@@ -7,7 +7,7 @@ import logging
 import pyoxigraph as ox
 
 from confab.scene import Scene
-from reasoner.graph import BASE
+from reasoner.graph import BASE, KnowledgeError
 from reasoner.reach import reach_hash, reach_relation, save_reach
 
 log = logging.getLogger(__name__)
@@ -29,7 +29,10 @@ def with_reach(scene: Scene) -> Scene:
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):
         return scene
     log.info("computing what the hands of %s reach", scene.iri)
-    reached = reach(scene.embodiment)
+    try:
+        reached = reach(scene.embodiment)
+    except ValueError as error:
+        raise KnowledgeError(f"{scene.iri}: {error}; physics needs bodies and skills (docs/authoring.md)") from error
     graph, names, target = scene.knowledge, scene.names, ox.NamedNode(BASE + "reach")
     relation = ox.NamedNode(reach_relation(graph))
     graph.store.clear_graph(target)

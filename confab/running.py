@@ -82,5 +82,5 @@ def written(scene: Scene, result: Result, report: Report, memory: Memory, out: P
     save_observed(paths["observed"], report.rollouts[0].state, scene.names, scene.iri)
     write_whole(paths["report"], report_html(scene, result, report))
     if report.video is not None:
-        paths["video"] = report.video
+        paths |= {"video": report.video, "stills": report.video.with_suffix("")}
     return paths

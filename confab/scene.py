@@ -21,7 +21,7 @@ from reasoner.links import Links
 from reasoner.names import Names, nearest
 from reasoner.reading import Reading, read, with_goals
 from reasoner.recognition import recognise
-from reasoner.symbols import Fact, Problem
+from reasoner.symbols import FALSE, TRUE, Fact, Problem
 
 if TYPE_CHECKING:
     import networkx
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 MODES = ("guarded", "strict", "paper")
 DEFAULT_MODE = MODES[0]
+OPTIMAL_SECONDS = 10.0
+"""Where the search for the best plan stops if no time limit is given."""
 
 
 @dataclass
@@ -206,7 +208,7 @@ class Scene:
             ``strict``: the fast planner over what the task can need, and how far experience may lead it; behaviours are then
             numbered among the individuals that were recognised.
         time_limit : float, optional
-            Seconds after which the call gives up.
+            Seconds after which the call gives up; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
         optimal : bool
             Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
         observed : str or Path, optional
@@ -222,7 +224,7 @@ class Scene:
         self._pull()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
-        limits = Limits(seconds=time_limit)
+        limits = Limits(seconds=OPTIMAL_SECONDS if optimal and time_limit is None else time_limit)
         begin, asked, goals = perf_counter(), self.knowledge.round_trips, list(goals)
         if mode == "paper":
             from planner.refinement import plan as paper_plan
@@ -231,6 +233,7 @@ class Scene:
             problem = with_goals(self._seen(self.reading, observed), goals)
             grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
             quantified = perf_counter() - begin
+            self._check_goal(problem)
             links = memory if isinstance(memory, Links) or memory is None else memory.links
             outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
         else:
@@ -249,6 +252,7 @@ class Scene:
             seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
             problem = with_goals(seen, goals)
             quantified = perf_counter() - begin
+            self._check_goal(problem)
             outcome = search(problem)
             if outcome.status is Status.UNSOLVABLE and not seen.whole:
                 # A "no" is worth a look at the whole world, whatever task recognition left out of it.
@@ -256,6 +260,17 @@ class Scene:
                 outcome = search(problem)
         queries = self.knowledge.round_trips - asked
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
+
+    def _check_goal(self, problem: Problem) -> None:
+        """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type."""
+        if not problem.goal:
+            raise KnowledgeError(f"{self.iri} has no task with goals; plan in a scene that has one, or give a goal")
+        for symbol, value in problem.goal.items():
+            values = problem.classes.get(problem.domain.situations[symbol.situation].range, ())
+            if value not in (*values, TRUE, FALSE):
+                raise KnowledgeError(
+                    f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}"
+                )
 
     def _seen(self, reading: Reading, observed: str | Path | None) -> Reading:
         from reasoner.observed import load_observed
@@ -319,7 +334,7 @@ class Result:
 
     def verify(self, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
         """Carry out the plan in PyBullet: see `confab.physics.verify`."""
-        return self.scene.verify(self.plan, rollouts, seed, **options)
+        return self.scene.verify(self.plan, rollouts, seed, goal=self.problem.goal, **options)
 
     def execute(self, interventions: Iterable[str] = (), **options: Any) -> Execution:
         """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.authoring import new_domain
 from confab.physics import Report
+from planner.plan import Plan
 from reasoner.reach import reach_hash
 from sim.faults import hidden_wall
 from sim.reach import fingerprint, reach
@@ -51,6 +53,22 @@ def test_a_wall_before_a_bottle_fails_at_its_step_with_code_object_and_number(sc
     assert failure.verdict.measured
     assert json.loads(json.dumps(failed.json()))["status"] == "failed"
     assert "hidden wall" in failed.notes()[failure.step.path]
+
+
+def test_a_plan_that_stops_before_the_goal_is_not_verified(scene: confab.Scene) -> None:
+    first = Plan(scene.plan().plan.steps[:1])
+    short = scene.verify(first)
+    assert all(rollout.ok for rollout in short.rollouts)
+    assert not short.verified
+    assert "the goal isn't reached: " in short.summary()
+    assert "cup2 LOCATION location5 (seen: location1)" in short.summary()
+
+
+def test_a_behaviour_without_a_skill_is_refused_by_name(tmp_path: Path) -> None:
+    new_domain("tearoom", tmp_path)
+    tearoom = confab.load(tmp_path / "tearoom-scene.ttl")
+    with pytest.raises(confab.KnowledgeError, match="B1_CARRY names no skill"):
+        tearoom.plan().verify()
 
 
 def test_the_committed_reach_facts_fit_the_geometry() -> None:
