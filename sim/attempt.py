@@ -112,14 +112,15 @@ class Attempt:
         """
         with self.planning():
             reacher = self.reacher(opened=opened)
-            solved = [reacher.solve(stage.poses) for stage in stages]
-            valid = np.all([ok for _, ok in solved], axis=0)
-            if not valid.any():
-                missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
-                raise SkillError("unreachable", objects, beyond_m=missing)
-            cost = self._discomfort(stages[0].poses, [q for q, _ in solved])
-            order = np.argsort(np.where(valid, cost, np.inf), kind="stable")[: int(valid.sum())]
-            return _free(reacher, stages, [q for q, _ in solved], order, objects)
+            left, solved = np.arange(len(stages[0].poses)), list[Array]()
+            for stage in stages:
+                q, valid = reacher.solve(stage.poses[left])
+                left, solved = left[valid], [before[valid] for before in (*solved, q)]
+                if not len(left):
+                    missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
+                    raise SkillError("unreachable", objects, beyond_m=missing)
+            order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
+            return [int(left[i]) for i in _free(reacher, stages, solved, order, objects)]
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
         """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""

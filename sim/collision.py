@@ -117,7 +117,7 @@ def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
     """Return the arm's moving spheres, with finger joints at `openings` (metres)."""
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():
-        chain = model.chain(link)
+        chain = model.chains[link]
         moved = [arm.joints.index(joint.name) for joint in chain if joint.name in arm.joints]
         if moved:
             slide = sum((joint.axis * openings[joint.name] for joint in chain if joint.name in openings), np.zeros(3))
@@ -130,7 +130,7 @@ def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
 def fixed_spheres(model: Model, arms: Sequence[Arm]) -> Spheres:
     """Return the spheres of the robot that no arm moves."""
     joints = {name for arm in arms for name in arm.joints}
-    still = [s for link, s in model.spheres.items() if not joints & {joint.name for joint in model.chain(link)}]
+    still = [s for link, s in model.spheres.items() if not joints & {joint.name for joint in model.chains[link]}]
     return Spheres(np.concatenate([s.centers for s in still]), np.concatenate([s.radii for s in still]))
 
 

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from sim.urdf import Array, Model
 
-DOWN = np.array([0.0, 0.0, -1.0])
+DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,11 @@ class Arm:
     def lower_length(self) -> float:
         """Metres from elbow to wrist."""
         return float(np.linalg.norm(self.wrist - self.elbow))
+
+    @cached_property
+    def crosses(self) -> Array:
+        """Cross-product matrices (7, 3, 3) of the axes."""
+        return np.stack([cross_matrix(axis) for axis in self.axes])
 
 
 def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
@@ -93,14 +99,28 @@ def _meeting(origins: Array, axes: Array, what: str, joints: Sequence[str]) -> A
     return point
 
 
+def cross_matrix(axis: Array) -> Array:
+    """Return the matrix (3, 3) that takes a vector to its product ``axis x vector``."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return vector products (..., 3); `numpy.cross` takes four times as long over a few of them."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    u, v, w = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], -1)
+
+
 def turn(axis: Array, angle: Array) -> Array:
-    """Return rotation matrices (n, 3, 3) about a unit `axis` (3,) or axes (n, 3) by `angle` (n,) radians."""
-    a = np.broadcast_to(axis, (*np.shape(angle), 3))
-    zero = np.zeros(np.shape(angle))
-    k = np.stack([zero, -a[..., 2], a[..., 1], a[..., 2], zero, -a[..., 0], -a[..., 1], a[..., 0], zero], -1)
-    cross = k.reshape(*np.shape(angle), 3, 3)
+    """Return rotation matrices (n, 3, 3) about a unit `axis` (3,) by `angle` (n,) radians."""
+    return _turned(cross_matrix(axis), angle)
+
+
+def _turned(crosses: Array, angle: Array) -> Array:
+    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given by their cross-product matrices."""
     sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    matrices: Array = np.eye(3) + sin * cross + (1 - cos) * (cross @ cross)
+    matrices: Array = EYE + sin * crosses + (1 - cos) * (crosses @ crosses)
     return matrices
 
 
@@ -111,11 +131,13 @@ def link_transforms(arm: Arm, q: Array) -> tuple[Array, Array]:
     """
     count = len(q)
     rotations, shifts = np.empty((count, 7, 3, 3)), np.empty((count, 7, 3))
-    r, t = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
-    for i in range(7):
-        local = turn(arm.axes[i], q[:, i])
-        t = t + np.einsum("nij,nj->ni", r, arm.origins[i] - local @ arm.origins[i])
-        r = r @ local
+    local = _turned(arm.crosses, q)
+    offset = arm.origins - np.einsum("nkij,kj->nki", local, arm.origins)
+    r, t = local[:, 0], offset[:, 0]
+    rotations[:, 0], shifts[:, 0] = r, t
+    for i in range(1, 7):
+        t = t + np.einsum("nij,nj->ni", r, offset[:, i])
+        r = r @ local[:, i]
         rotations[:, i], shifts[:, i] = r, t
     return rotations, shifts
 
@@ -155,16 +177,16 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) ->
     cosine = np.clip(cosine, -0.9999, 0.9999)
     hang = DOWN - (n @ DOWN)[:, None] * n
     hang = hang / np.maximum(np.linalg.norm(hang, axis=-1), 1e-9)[:, None]
-    out = np.cos(swivel)[:, None] * hang + np.sin(swivel)[:, None] * np.cross(n, hang)
+    out = np.cos(swivel)[:, None] * hang + np.sin(swivel)[:, None] * cross(n, hang)
     u = cosine[:, None] * n + np.sqrt(1 - cosine**2)[:, None] * out
     f = (wrist - arm.shoulder - a * u) / b
     u0, f0, hinge = (arm.elbow - arm.shoulder) / a, (arm.wrist - arm.elbow) / b, arm.axes[3]
-    bent = np.arctan2(np.cross(u0, f0) @ hinge, u0 @ f0)
+    bent = np.arctan2(cross(u0, f0) @ hinge, u0 @ f0)
     side = 1.0 if (arm.lower[3] + arm.upper[3]) / 2 + bent > 0 else -1.0
-    normal = np.cross(u, f)
+    normal = cross(u, f)
     normal = side * normal / np.maximum(np.linalg.norm(normal, axis=-1), 1e-9)[:, None]
-    zero = np.stack([u0, hinge, np.cross(u0, hinge)], -1)
-    upper = np.stack([u, normal, np.cross(u, normal)], -1) @ zero.T
+    zero = np.stack([u0, hinge, cross(u0, hinge)], -1)
+    upper = np.stack([u, normal, cross(u, normal)], -1) @ zero.T
     elbow = side * np.arccos(np.clip(np.einsum("ni,ni->n", u, f), -1, 1)) - bent
     hand = np.swapaxes(upper @ turn(hinge, elbow), -1, -2) @ last
     q = np.concatenate([three_angles(upper, arm.axes[:3]), elbow[:, None], three_angles(hand, arm.axes[4:])], -1)
@@ -177,7 +199,7 @@ def three_angles(r: Array, axes: Array) -> Array:
     Neighbouring axes are at right angles (Davenport's angles): the third is parallel to the first or completes the frame.
     """
     a1, a2, a3 = axes
-    c = np.cross(a1, a2)
+    c = cross(a1, a2)
     if abs(a1 @ a3) > 0.5:
         v = np.einsum("nij,j->ni", r, a1)
         y = np.arccos(np.clip(v @ a1, -1, 1))
@@ -188,7 +210,7 @@ def three_angles(r: Array, axes: Array) -> Array:
         x = np.arctan2(-(v @ a2), v @ c)
     rest = np.swapaxes(turn(a1, x) @ turn(a2, y), -1, -2) @ r
     moved = np.einsum("nij,j->ni", rest, a2)
-    return np.stack([x, y, np.arctan2(moved @ np.cross(a3, a2), moved @ a2)], -1)
+    return np.stack([x, y, np.arctan2(moved @ cross(a3, a2), moved @ a2)], -1)
 
 
 def swivel_of(arm: Arm, q: Array) -> Array:
@@ -198,5 +220,5 @@ def swivel_of(arm: Arm, q: Array) -> Array:
     wrist = np.einsum("nij,j->ni", r[:, 3], arm.wrist) + t[:, 3] - arm.shoulder
     n = wrist / np.linalg.norm(wrist, axis=-1, keepdims=True)
     hang = DOWN - (n @ DOWN)[:, None] * n
-    swivel: Array = np.arctan2(np.einsum("ni,ni->n", elbow, np.cross(n, hang)), np.einsum("ni,ni->n", elbow, hang))
+    swivel: Array = np.arctan2(np.einsum("ni,ni->n", elbow, cross(n, hang)), np.einsum("ni,ni->n", elbow, hang))
     return swivel

@@ -6,6 +6,7 @@ vessel back when enough has left. What is left behind stays behind the vessel's 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -164,7 +165,11 @@ class _Way:
 
     def at(self, angle: float) -> Array:
         """Return the posture at a tilt angle."""
-        return np.array([np.interp(angle, self.angles, joint) for joint in self.q.T])
+        i = min(max(int(self.angles.searchsorted(angle)) - 1, 0), len(self.angles) - 2)
+        low, high = self.angles[i], self.angles[i + 1]
+        part = min(max((angle - low) / (high - low), 0.0), 1.0)
+        posture: Array = self.q[i] * (1 - part) + self.q[i + 1] * part
+        return posture
 
 
 def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
@@ -228,13 +233,13 @@ class _Servo:
     def _approach(self, goal: float, speed: float) -> None:
         """Advance for one step towards an angle, at most at `speed`."""
         gap, most = goal - self.angle, self.ACCELERATION * self.tick
-        wanted = np.sign(gap) * min(speed, np.sqrt(2 * self.ACCELERATION * abs(gap)))
-        self.rate += float(np.clip(wanted - self.rate, -most, most))
+        wanted = math.copysign(min(speed, math.sqrt(2 * self.ACCELERATION * abs(gap))), gap)
+        self.rate += max(-most, min(most, wanted - self.rate))
         advance = self.rate * self.tick
         if abs(gap) < 1e-4 or (advance * gap > 0 and abs(advance) >= abs(gap)):
             self.angle, self.rate = goal, 0.0
         else:
             self.angle += advance
-        q = self.way.at(float(np.clip(self.angle, self.way.angles[0], self.way.angles[-1])))
+        q = self.way.at(self.angle)
         self.hand.command(q, (q - self.hand.posture) / self.tick)
         self.world.run(1)

@@ -17,6 +17,9 @@ from sim.urdf import Array, Model, Spheres, read_urdf
 CENTERING = 400.0
 """Newtons per metre by which a finger that is ahead of the other one yields, as the gear of a parallel gripper does."""
 
+STILL, POSITION_GAINS, VELOCITY_GAINS = (0.0,) * 7, (0.4,) * 7, (1.0,) * 7
+"""Target velocities of an arm at rest, and the gains of its motors."""
+
 CLOSING = 0.12
 """Metres per second at which fingers close."""
 
@@ -84,10 +87,10 @@ class Manipulator:
             self.joints,
             pybullet.POSITION_CONTROL,
             targetPositions=q.tolist(),
-            targetVelocities=[0.0] * 7 if velocity is None else velocity.tolist(),
+            targetVelocities=STILL if velocity is None else velocity.tolist(),
             forces=self.efforts,
-            positionGains=[0.4] * 7,
-            velocityGains=[1.0] * 7,
+            positionGains=POSITION_GAINS,
+            velocityGains=VELOCITY_GAINS,
             physicsClientId=self.client,
         )
 
@@ -104,17 +107,17 @@ class Manipulator:
         """Drive closing fingers for one step: equal force on both, with the one that is ahead giving way."""
         if not self.closing:
             return
-        first, second = self.openings()
-        lead = np.clip(CENTERING * (first - second), -self.hand.grip * 0.6, self.hand.grip * 0.6)
-        for joint, force in zip(self.fingers, (self.hand.grip + lead, self.hand.grip - lead), strict=True):
-            pybullet.setJointMotorControl2(
-                self.body,
-                joint,
-                pybullet.VELOCITY_CONTROL,
-                targetVelocity=-CLOSING,
-                force=force,
-                physicsClientId=self.client,
-            )
+        (first, *_), (second, *_) = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
+        grip = self.hand.grip
+        lead = max(-grip * 0.6, min(grip * 0.6, CENTERING * (first - second)))
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self.fingers,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=(-CLOSING, -CLOSING),
+            forces=(grip + lead, grip - lead),
+            physicsClientId=self.client,
+        )
 
     def _fingers_to(self, opening: float) -> None:
         for joint in self.fingers:

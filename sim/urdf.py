@@ -9,6 +9,7 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,12 @@ class Model:
     spheres: Mapping[str, Spheres]
     parents: Mapping[str, Joint]
 
-    def chain(self, link: str) -> tuple[Joint, ...]:
-        """Return the joints from the base to `link`, fixed ones included."""
+    @cached_property
+    def chains(self) -> Mapping[str, tuple[Joint, ...]]:
+        """The joints from the base to each link that has spheres, fixed ones included."""
+        return {link: self._chain(link) for link in self.spheres}
+
+    def _chain(self, link: str) -> tuple[Joint, ...]:
         joints: list[Joint] = []
         while link in self.parents:
             joints.append(self.parents[link])
