@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 from time import perf_counter
 from typing import TypeAlias
@@ -42,8 +43,11 @@ Truth: TypeAlias = "NDArray[np.bool_]"
 Formula: TypeAlias = "bool | Fact | tuple[str, tuple[Formula, ...]]"
 """True, False, a fact, or ``("and" | "or" | "not", parts)``."""
 Env: TypeAlias = "dict[str, str]"
+Schedule: TypeAlias = "tuple[list[tuple[Condition, list[str]]], Sequence[Condition], ValueCondition | None]"
 
 
+AT_ONCE = 300_000
+"""So many pairs of a state and an operator are looked at in one array operation."""
 FEW = 20_000
 """Over so few states a formula is worked out once for all operators that need it; over more, for those that fit else."""
 
@@ -109,6 +113,9 @@ class Space:
     most_operators: int = 5_000
     operators: list[Operator] = field(default_factory=list)
     same: dict[Formula, Formula] = field(default_factory=dict)
+    known: dict[tuple[object, ...], Formula] = field(default_factory=dict)
+    schedules: dict[tuple[object, ...], Schedule] = field(default_factory=dict)
+    tests: dict[Fact, tuple[np.uint64, np.uint64, bool]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.members = {kind: frozenset(members) for kind, members in self.problem.classes.items()}
@@ -179,8 +186,7 @@ class Space:
                 return Exhausted(self._path(layers, reached[0]), len(known), len(layers))
             if not len(layers[-1]):
                 return Exhausted(None, len(known), len(layers) - 1)
-            found = [after for _, after in self._successors(layers[-1], deadline)]
-            new = np.unique(np.concatenate(found)) if found else np.zeros(0, np.uint64)
+            new = self._next(layers[-1], deadline)
             places = np.minimum(np.searchsorted(known, new), len(known) - 1)
             new = new[known[places] != new]
             if longest is not None:
@@ -189,6 +195,38 @@ class Space:
             if len(known) > most:
                 raise TooLargeError(f"more than {most} states", len(layers))
             layers.append(new)
+
+    def _next(self, codes: Codes, deadline: float | None) -> Codes:
+        """Return all successors of some states, each once: operator by operator, or of few states all at once."""
+        if len(codes) * len(self.operators) > AT_ONCE:
+            found = [after for _, after in self._successors(codes, deadline)]
+        else:
+            if deadline is not None and perf_counter() > deadline:
+                raise TimeoutError
+            masks, bits, kept, given, formulas, others = self._columns
+            fits = (masks & codes) == bits  # operators by states
+            for formula, needing in formulas:
+                fits[needing] &= self._holds(formula, codes)
+            found = [self._after(self.operators[o], codes[fits[o]]) for o in others]
+            fits[others] = False
+            operator = np.repeat(np.arange(len(fits)), np.count_nonzero(fits, axis=1))
+            state = np.flatnonzero(fits) - operator * len(codes)
+            found.append((codes[state] & kept[operator]) | given[operator])
+        return _distinct(np.concatenate(found)) if found else np.zeros(0, np.uint64)
+
+    @cached_property
+    def _columns(self) -> tuple[Codes, Codes, Codes, Codes, list[tuple[Formula, list[int]]], list[int]]:
+        """What operators need and give, as arrays; each formula with the operators that need it; those that aren't plain."""
+        masks, bits, kept, given = (
+            np.array([getattr(operator, name) for operator in self.operators], np.uint64)
+            for name in ("mask", "bits", "kept", "given")
+        )
+        formulas: dict[int, tuple[Formula, list[int]]] = {}
+        for o, operator in enumerate(self.operators):
+            for formula in operator.rest:
+                formulas.setdefault(id(formula), (formula, []))[1].append(o)
+        others = [o for o, operator in enumerate(self.operators) if not operator.plain]
+        return masks[:, None], bits[:, None], kept, given, list(formulas.values()), others
 
     def _successors(self, codes: Codes, deadline: float | None = None) -> Iterator[tuple[Operator, Codes]]:
         """Yield each operator that is applicable in any of the states, with the states that it leads to."""
@@ -235,18 +273,21 @@ class Space:
         """
         wanted = [symbol for symbol in self.problem.goal if symbol in self.values]
         wanted.sort(key=lambda symbol: (-len(self.values[symbol]), symbol))
+        setting: dict[Symbol, dict[int, set[int]]] = {}
+        for number, operator in enumerate(self.operators):
+            for _, fact in operator.effects:
+                value = self.values[fact.symbol][fact.value]
+                setting.setdefault(fact.symbol, {}).setdefault(number, set()).add(value)
         counted: set[int] = set()
         ways = []
         for symbol in wanted:
             values = self.values[symbol]
             moves: set[tuple[int, int]] = set()
-            for number, operator in enumerate(self.operators):
-                after = {values[fact.value] for _, fact in operator.effects if fact.symbol == symbol}
-                if after:
-                    needed = [values[fact.value] for fact in operator.facts if fact.symbol == symbol]
-                    free = number in counted
-                    moves.update((u, v) if not free else (~u, v) for u in needed or values.values() for v in after)
-                    counted.add(number)
+            for number, after in setting.get(symbol, {}).items():
+                needed = [values[fact.value] for fact in self.operators[number].facts if fact.symbol == symbol]
+                free = number in counted
+                moves.update((u, v) if not free else (~u, v) for u in needed or values.values() for v in after)
+                counted.add(number)
             far = len(self.operators) + 1
             away = np.full(len(values), far, np.int64)
             if self.problem.goal[symbol] in values:
@@ -289,10 +330,12 @@ class Space:
         if isinstance(formula, bool):
             return np.full(len(codes), formula)
         if isinstance(formula, Fact):
-            if not self._possible(formula):
-                return np.zeros(len(codes), np.bool_)
-            mask, bits = self._place(formula)
-            equal: Truth = (codes & np.uint64(mask)) == np.uint64(bits)
+            test = self.tests.get(formula)
+            if test is None:
+                possible = self._possible(formula)
+                mask, bits = self._place(formula) if possible else (0, 0)
+                test = self.tests[formula] = np.uint64(mask), np.uint64(bits), possible
+            equal: Truth = (codes & test[0]) == test[1] if test[2] else np.zeros(len(codes), np.bool_)
             return equal
         kind, parts = formula
         inner = [self._holds(part, codes) for part in parts]
@@ -348,20 +391,21 @@ class Space:
 
     def _conjunction(self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str]) -> Formula:
         """Return a conjunction; over what it determines itself, as an alternative per value."""
-        return _any(_all(parts) for _, parts in self._grounded(list(conditions), env, kinds))
+        return _any(_all(parts) for _, parts in self._grounded(conditions, env, kinds))
 
     def _grounded(
-        self, waiting: list[Condition], env: Env, kinds: Mapping[str, str]
+        self, waiting: Sequence[Condition], env: Env, kinds: Mapping[str, str]
     ) -> Iterator[tuple[Env, tuple[Formula, ...]]]:
         """Yield each way to put values in for what the conditions determine, with what is left of the conditions."""
         parts: list[Formula] = []
-        waiting = list(waiting)
         while True:
-            pending = {c.value for c in waiting if isinstance(c, ValueCondition) and _binds(c, env)}
-            ready = [c for c in waiting if not needs(c) - env.keys() and not mentioned(c) & pending]
-            for condition in ready:
-                waiting.remove(condition)
-                part = self.formula(condition, env, kinds)
+            ready, waiting, binding = self._schedule(waiting, env)
+            for condition, names in ready:
+                key = (id(condition), *[env[name] for name in names])
+                part = self.known.get(key)
+                if part is None:
+                    part = self.formula(condition, env, kinds)
+                    part = self.known[key] = self.same.setdefault(part, part)
                 if part is False:
                     return
                 if part is not True:
@@ -369,14 +413,28 @@ class Space:
             if not waiting:
                 yield env, tuple(parts)
                 return
-            binding = next(c for c in waiting if not needs(c) - env.keys())
-            assert isinstance(binding, ValueCondition)
-            for value in self.problem.classes.get(kinds[binding.value], ()):
-                for bound, more in self._grounded(waiting, {**env, binding.value: value}, kinds):
-                    yield bound, (*parts, *more)
-            return
+            if binding is not None:
+                break
+        for value in self.problem.classes.get(kinds[binding.value], ()):
+            for bound, more in self._grounded(waiting, {**env, binding.value: value}, kinds):
+                yield bound, (*parts, *more)
+
+    def _schedule(self, waiting: Sequence[Condition], env: Env) -> Schedule:
+        """Return the conditions that can be put in now, each with its variables; those that can't; one that binds a variable."""
+        key = (*map(id, waiting), *env)
+        if key not in self.schedules:
+            pending = {c.value for c in waiting if isinstance(c, ValueCondition) and _binds(c, env)}
+            ready = [c for c in waiting if not needs(c) - env.keys() and not mentioned(c) & pending]
+            ready.sort(key=lambda c: isinstance(c, ValueCondition) + 2 * isinstance(c, Witness | AnyOf))
+            rest = [c for c in waiting if not any(c is other for other in ready)]
+            binders = (c for c in rest if isinstance(c, ValueCondition) and not needs(c) - env.keys())
+            binding = next(binders) if rest and not ready else None
+            pairs = [(c, sorted(mentioned(c) & env.keys())) for c in ready]
+            self.schedules[key] = pairs, rest, binding
+        return self.schedules[key]
 
     def _operators(self, behavior: Behavior) -> Iterator[Operator]:
+        self.known.clear()  # the classes of variables may differ from those of another behaviour
         kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
         names = [parameter.name for parameter in behavior.parameters]
         choices = [self.problem.classes.get(parameter.kind, ()) for parameter in behavior.parameters]
@@ -386,20 +444,27 @@ class Space:
         if size > 5 * self.most_operators:
             raise TooLargeError(f"{behavior.name} has {size} quantifications")
         for arguments in product(*choices):
-            for env, parts in self._grounded(
-                list(behavior.preconditions), dict(zip(names, arguments, strict=True)), kinds
-            ):
+            for env, parts in self._grounded(behavior.preconditions, dict(zip(names, arguments, strict=True)), kinds):
                 effects: list[tuple[Formula, Fact]] = []
                 for effect in behavior.effects:
-                    for inner, when in self._grounded(list(effect.when), env, kinds):
+                    for inner, when in self._grounded(effect.when, env, kinds):
                         symbol = Symbol(effect.situation, tuple(inner.get(a, a) for a in effect.arguments))
                         fact = Fact(symbol, inner.get(effect.value, effect.value))
                         if self._exists(symbol):
                             effects.append((_all(when), fact))
                 bindings = {n[1:]: v for n, v in sorted(env.items()) if n not in names}
                 facts = tuple(part for part in parts if isinstance(part, Fact))
-                rest = tuple(self.same.setdefault(part, part) for part in parts if not isinstance(part, Fact))
+                rest = tuple(part for part in parts if not isinstance(part, Fact))
                 yield Operator(behavior.name, arguments, bindings, facts, rest, tuple(effects))
+
+
+def _distinct(codes: Codes) -> Codes:
+    """Return codes in order, each once; several times as fast as `np.unique`, which hashes."""
+    codes = np.sort(codes)
+    first = np.ones(len(codes), np.bool_)
+    np.not_equal(codes[1:], codes[:-1], out=first[1:])
+    found: Codes = codes[first]
+    return found
 
 
 def _binds(condition: Condition, env: Mapping[str, str]) -> bool:

@@ -28,6 +28,9 @@ ALWAYS = 4
 """Classes of so few individuals (the hands) are part of every cluster's world."""
 OPERATORS, STATES = 400, 5_000
 """The largest world in which a cluster is planned anew, the states for each cluster allowed."""
+WORK, WHOLE_WORK, PER_OPERATOR = 1_200_000, 1_700_000, 4_000
+"""For each cluster allowed so many pairs of a state and an operator may be looked at in all, in clusters and in a whole plan; putting
+an operator in counts as so many. A million take some 8 ms: an effort that is small beside the clock without depending on it."""
 WHOLE_BITS, WHOLE_STATES = 48, 20_000
 """The largest world, in bits of a state if every symbol could take every value, and the most states for a whole plan anew."""
 
@@ -47,7 +50,7 @@ class Improver:
     known : dict
         For each shape of a cluster the steps that replace it, or None; kept between calls.
     clusters_left : int
-        So many shapes of clusters may be planned anew, in worlds as much larger; each takes some hundredths of a second.
+        So many shapes of clusters may be planned anew, in worlds as much larger, with an effort of `WORK` for each.
     """
 
     refiner: Refiner
@@ -58,6 +61,7 @@ class Improver:
         self.table = self.refiner.table
         self.segments = self.refiner.segments
         self.states = min(STATES * self.clusters_left, 40 * STATES)
+        self.work = WHOLE_WORK * self.clusters_left
         self.lowest = self.segments.program.levels[-1]
 
     def improve(self, steps: Sequence[Done]) -> list[Done]:
@@ -70,6 +74,7 @@ class Improver:
         self.table.undo(0)
         if anew is not None:
             return anew if length(anew) < length(best) else best
+        self.work = min(self.work, WORK * self.clusters_left)
         for shorten in (self.clusters, self.detours):
             found = shorten(best)
             self.table.undo(0)
@@ -115,9 +120,15 @@ class Improver:
 
     def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[Done]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
+        space = None
         try:
-            found = Space(problem, level, OPERATORS).search(states, self.segments.deadline, length(old, level) - 1)
+            space = Space(problem, level, min(OPERATORS, self.work // PER_OPERATOR))
+            self.work -= PER_OPERATOR * len(space.operators)
+            most = min(states, self.work // max(len(space.operators), 1))
+            found = space.search(most, self.segments.deadline, length(old, level) - 1)
+            self.work -= found.states * len(space.operators)
         except TooLargeError:
+            self.work -= PER_OPERATOR * OPERATORS if space is None else most * len(space.operators)
             return None
         except TimeoutError as error:
             raise LimitError("the time limit") from error
@@ -279,6 +290,9 @@ class Improver:
         old = [span[position - first] for position in members]
         if len(old) < 2 or old[0][0] == self.lowest:
             return None
+        key, roles = self._shape(old)
+        if self.known.get(key) is None and (key in self.known or self.clusters_left <= 0 or self.work <= 0):
+            return None
         mark = len(self.table.trail)
         if any(self.again(step) is None for step in old):
             self.table.undo(mark)
@@ -286,7 +300,7 @@ class Improver:
         targets = self.table.since(mark)
         self.table.undo(mark)
         level = min(max(step[0] for step in old) + 1, self.segments.program.levels[-2])
-        new = self._anew(level, old, targets)
+        new = self._anew(level, key, roles, old, targets)
         if new is not None and length(new) < length(old):
             middle = len(self.table.trail)
             between = (step for position, step in enumerate(span, first) if position not in members)
@@ -296,15 +310,19 @@ class Improver:
         self.table.undo(mark)
         return None
 
-    def _anew(self, level: int, old: Sequence[Done], targets: dict[Cell, str]) -> list[Done] | None:
-        """Do what brings about the same changes, from what is known of this shape of cluster or by planning."""
+    def _shape(self, steps: Sequence[Done]) -> tuple[object, tuple[str, ...]]:
+        """Return what steps have in common with others of their shape, and their individuals in the order of its roles."""
         individuals: dict[str, int] = {}
         shape = []
-        for _, name, arguments, bindings, _ in old:
-            shape.append((name, tuple(individuals.setdefault(a, len(individuals)) for a in (*arguments, *bindings))))
+        for _, name, arguments, bindings, _ in steps:
+            shape.append((name, tuple([individuals.setdefault(a, len(individuals)) for a in (*arguments, *bindings)])))
         sorts = self.segments.program.alike.sort
-        key = tuple(shape), tuple(sorts.get(individual, -1) for individual in individuals)
-        roles = tuple(individuals)
+        return (tuple(shape), tuple([sorts.get(individual, -1) for individual in individuals])), tuple(individuals)
+
+    def _anew(
+        self, level: int, key: object, roles: tuple[str, ...], old: Sequence[Done], targets: dict[Cell, str]
+    ) -> list[Done] | None:
+        """Do what brings about the same changes, from what is known of this shape of cluster or by planning."""
         if key not in self.known:
             self.known[key] = self._plan(level, roles, targets, old)
         template = self.known[key]
@@ -320,8 +338,6 @@ class Improver:
         self, level: int, roles: tuple[str, ...], targets: dict[Cell, str], old: Sequence[Done]
     ) -> Template | None:
         """Return a shortest way to make these changes in a world of these individuals and the few that are always there."""
-        if self.clusters_left <= 0:
-            return None
         self.clusters_left -= 1
         problem = self.segments.program.problem
         inside = {*roles, *self.segments.program.named}
