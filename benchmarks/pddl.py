@@ -3,14 +3,19 @@
     python -m benchmarks pddl                        with problems in ../shared/pddl
     CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
+    CONFAB_ALL=1 …                                   every problem, not only four per folder
+    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``)
 
 Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and ``…/pNN.pddl``, the problems
-beside the domain or one folder below it.
+beside the domain or one folder below it. What a run gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem
+and what the planner's code is; a benchmark that was interrupted goes on from there. Delete the folder to measure anew.
 """
 
 from __future__ import annotations
 
 import gc
+import hashlib
+import json
 import os
 import re
 import resource
@@ -20,7 +25,7 @@ import tempfile
 import venv
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import exp, log
 from pathlib import Path
 from time import process_time
@@ -28,15 +33,25 @@ from time import process_time
 SECONDS, BYTES = 30, 4 * 2**30
 ROOT = Path(__file__).resolve().parents[1]
 PER_FOLDER = 4
+RUNS = ROOT / "confab-out" / "pddl-runs"
+OURS = (
+    *(
+        "planner/" + name
+        for name in ("flat", "grounding", "schemas", "joins", "task", "relaxed", "kernel", "reasons", "windows")
+    ),
+    *("reasoner/" + name for name in ("pddl_import", "pddl_syntax", "symbols")),
+)
+"""The files that say what our plans are."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What became of one problem: `plan` is None where there is none."""
+    """What became of one problem: `plan` is None where there is none, `accepted` what unified-planning's validator says."""
 
     plan: tuple[str, ...] | None
     seconds: float
     output: str
+    accepted: bool | None = None
 
 
 def main() -> None:
@@ -61,11 +76,18 @@ def wanted() -> list[str]:
 def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
     """Yield (domain's name, domain, problem): four per folder, evenly spread, the first and the last included."""
     for domain in sorted(folder.rglob("domain.pddl")):
-        for place in [domain.parent, *sorted(p for p in domain.parent.iterdir() if p.name.startswith("testing"))]:
+        for place in [domain.parent, *sorted(p for p in domain.parent.iterdir() if p.is_dir() and _measured(p.name))]:
             here = sorted(place.glob("p*.pddl"))
             chosen = {i * (len(here) - 1) // (PER_FOLDER - 1) for i in range(PER_FOLDER)} if here else set()
+            if "CONFAB_ALL" in os.environ:
+                chosen = set(range(len(here)))
             for i in sorted(chosen):
                 yield str(place.relative_to(folder)), domain, here[i]
+
+
+def _measured(place: str) -> bool:
+    """Return whether a folder's problems belong to the benchmark: those to learn from only where all are asked for."""
+    return place.startswith("testing") or ("CONFAB_ALL" in os.environ and place.startswith("training"))
 
 
 def peers() -> str:
@@ -93,6 +115,28 @@ def planners(python: str) -> dict[str, list[str]]:
         "lama-first": [*downward, "--alias", "lama-first", "--plan-file", "{plan}", "{domain}", "{problem}"],
         "translate": [*downward, "--translate", "--sas-file", "{plan}", "{domain}", "{problem}"],
     }
+
+
+def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
+    """Return what a planner does on a problem, from an earlier benchmark if neither has changed; a plan of ours is judged."""
+    ours = name.startswith("confab")
+    code = [(ROOT / f"{file}.py").read_bytes() for file in OURS if (ROOT / f"{file}.py").exists()] if ours else []
+    texts = [*code, domain.read_bytes(), problem.read_bytes(), f"{name} {SECONDS} {BYTES}".encode()]
+    place = RUNS / f"{name}-{hashlib.sha256(b'|'.join(texts)).hexdigest()[:24]}.json"
+    if place.exists():
+        found = json.loads(place.read_text())
+        del found["problem"]
+        return Run(**{**found, "plan": None if found["plan"] is None else tuple(found["plan"])})
+    done = run(command, domain, problem)
+    if done.seconds > SECONDS + 1:  # a planner of several processes has no more than one of one process
+        done = Run(None, done.seconds, done.output)
+    verdict = accepted(domain, problem, done.plan) if ours and done.plan is not None else None
+    done = Run(done.plan, done.seconds, done.output[-2000:], verdict)
+    RUNS.mkdir(parents=True, exist_ok=True)
+    part = place.with_suffix(".part")
+    part.write_text(json.dumps({**asdict(done), "problem": str(problem)}))
+    part.replace(place)
+    return done
 
 
 def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
@@ -126,13 +170,10 @@ def _limit() -> None:
 def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[str]]) -> None:
     """Print solved problems, CPU time and plan length per domain and planner; check every plan of ours."""
     runs: dict[tuple[str, Path], Run] = {}
-    rejected = []
     for _, domain, problem in found:
         for name, command in commands.items():
-            runs[name, problem] = run(command, domain, problem)
-            plan = runs[name, problem].plan
-            if plan is not None and name.startswith("confab") and not accepted(domain, problem, plan):
-                rejected.append(f"{problem}: {name}")
+            runs[name, problem] = kept(name, command, domain, problem)
+    rejected = [f"{problem}: {name}" for (name, problem), done in runs.items() if done.accepted is False]
     folders = list(dict.fromkeys(place for place, _, _ in found))
     print("Solved, and CPU seconds over the problems that the planner solved; median length beside lama-first's.\n")
     print("| problems |", " | ".join(commands), "|")
@@ -241,6 +282,7 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
     from planner.flat import search
     from planner.grounding import ground
     from planner.plan import Limits, Status
+    from planner.relaxed import heuristic
     from planner.task import Task
     from reasoner.pddl_import import imported
     from reasoner.pddl_syntax import parse_files
@@ -250,16 +292,17 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
     if not isinstance(task, Task):
         print(task.text)
         return
-    kernel = None
-    if fast:
-        from planner.kernel import heuristic
 
-        kernel = heuristic(task)
-    found = search(task, Limits(expansions=10**9), evaluate=kernel)
+    def write(plan: Sequence[int]) -> None:
+        steps = (scene.line(*task.describe(operator)[:2]) for operator in plan)
+        part = Path(f"{target}.part")
+        part.write_text("".join(f"({line})\n" for line in steps if line))
+        part.replace(target)
+
+    found = search(task, Limits(expansions=10**9), evaluate=None if fast else heuristic(task), found=write)
     print(found.status, found.counts)
     if found.status is Status.SOLVED:
-        steps = (scene.line(*task.describe(operator)[:2]) for operator in found.plan)
-        Path(target).write_text("".join(f"({line})\n" for line in steps if line))
+        write(found.plan)
 
 
 if __name__ == "__main__":

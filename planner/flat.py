@@ -9,8 +9,7 @@ open        two queues of expanded nodes, by h: with all of a node's operators, 
 
 Lazy greedy best-first search with preferred operators: Richter and Helmert, "Preferred operators and deferred
 evaluation in satisficing planning", ICAPS 2009. Lookahead: Vidal, "A lookahead strategy for heuristic search
-planning", ICAPS 2004. Action elimination: Nakhost and Müller, "Action elimination and plan neighborhood graph
-search", ICAPS 2010.
+planning", ICAPS 2004. What is found is made shorter by `planner.windows`.
 """
 
 from __future__ import annotations
@@ -21,14 +20,17 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 from planner.grounding import OutOfTimeError, TooLargeError, ground
+from planner.kernel import automatic
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
-from planner.relaxed import Evaluate, heuristic
+from planner.relaxed import Evaluate
 from planner.task import Task
+from planner.windows import shorter
 from reasoner.symbols import Problem, State
 
 BOOST = 1000  # turns that the preferred operators get on a new best h
 ALONE = 1000  # evaluations before the search without lookahead begins to get its share
 SHARE = 3  # of so many evaluations, it gets one
+SHORTEN, SHORTENING = 500_000, 20  # work on the finished plan: so much, and a twentieth of the search's
 
 Prefer = Callable[[int, list[int]], list[int]]
 """Puts a state's preferred operators in order, the best first; this is where cogency comes in."""
@@ -90,16 +92,30 @@ def search(
     deadline: float | None = None,
     evaluate: Evaluate | None = None,
     prefer: Prefer | None = None,
+    found: Callable[[Sequence[int]], None] | None = None,
 ) -> Flat:
     """Search a plan for a grounded task.
 
     Two searches take turns, one with lookahead and one without, since lookahead can lead astray. The same limit of
     expansions gives the same plan; a deadline can only cut the search short.
+
+    Parameters
+    ----------
+    task : Task
+    limits : Limits
+        Their seconds are the caller's to turn into a deadline.
+    deadline : float, optional
+        On the clock of `time.perf_counter`.
+    evaluate : function of a state, optional
+        In place of h_FF, plain at first and compiled once the search turns out to be long (`planner.kernel.automatic`).
+    prefer : function of a state and its preferred operators, optional
+    found : function of a plan, optional
+        Called with the first plan, before it is made shorter.
     """
     counts = Counts()
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
-    evaluate = evaluate or heuristic(task)
+    evaluate = evaluate or automatic(task)
     searches = [_best_first(task, evaluate, counts, prefer, lookahead) for lookahead in (True, False)]
     turns = 0
     while True:
@@ -110,7 +126,10 @@ def search(
             if done.value is None:
                 what = f"all {counts.expanded} states that can be reached were searched"
                 return Flat(Status.UNSOLVABLE, (), Reason(f"no plan exists: {what}"), counts)
-            return Flat(Status.SOLVED, tuple(shortened(task, done.value, deadline)), None, counts)
+            if found:
+                found(done.value)
+            work = SHORTEN + counts.evaluated * len(task.owners) // SHORTENING
+            return Flat(Status.SOLVED, tuple(shorter(task, done.value, work, deadline)), None, counts)
         if counts.expanded >= limits.expansions:
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
@@ -202,25 +221,3 @@ def _path(came_from: dict[int, tuple[int, tuple[int, ...]]], state: int) -> list
             return [operator for part in reversed(parts) for operator in part]
         parts.append(operators)
         state = before
-
-
-def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
-    """Return a plan without steps that the goal doesn't need, nor steps that only those need."""
-    plan = list(plan)
-    state, i = task.initial, 0
-    while i < len(plan):
-        if deadline is not None and perf_counter() > deadline:
-            break
-        trial, kept = state, []
-        for operator in plan[i + 1 :]:
-            after = task.applied(trial, operator)
-            if after is not None:
-                trial = after
-                kept.append(operator)
-        if trial & task.goal == task.goal:
-            plan[i:] = kept
-        else:
-            after = task.applied(state, plan[i])
-            assert after is not None
-            state, i = after, i + 1
-    return plan

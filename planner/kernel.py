@@ -1,18 +1,39 @@
 """`planner.relaxed.heuristic` compiled by numba: the same function of a state, several times as fast once it is compiled.
 
-Worth it from about two thousand operators on; numba comes with the extra ``fast``. Tested equal to the plain one.
+numba comes with the extra ``fast``. Compiling takes seconds, so that a search begins with the plain function and changes
+over after a stated amount of work (`automatic`). The two are tested equal: which one is used changes no plan.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from planner import relaxed
 from planner.relaxed import Evaluate, Evaluation
 from planner.task import Grouped, Task
+
+PLAIN = 4_000_000  # operators looked at by the plain heuristic, about two seconds, before it is compiled
+
+
+def automatic(task: Task) -> Evaluate:
+    """Return h_FF of a task, compiled by numba once the search turns out to be long, if numba is installed."""
+    use, work = relaxed.heuristic(task), 0
+
+    def evaluate(state: int) -> Evaluation:
+        nonlocal use, work
+        work += cost
+        if work > PLAIN >= work - cost:
+            with suppress(ImportError):
+                use = heuristic(task)
+        return use(state)
+
+    cost = len(task.owners)
+    return evaluate
 
 
 def heuristic(task: Task) -> Evaluate:
@@ -23,8 +44,8 @@ def heuristic(task: Task) -> Evaluate:
     needs, adds = task.needs, task.adds
     missing = np.diff(needs.starts)
     order = np.argsort(needs.items, kind="stable")
-    relaxed = np.repeat(np.arange(len(missing)), missing)[order]
-    needed_by = Grouped(np.searchsorted(needs.items[order], np.arange(size + 1)), relaxed)
+    rows = np.repeat(np.arange(len(missing)), missing)[order]
+    needed_by = Grouped(np.searchsorted(needs.items[order], np.arange(size + 1)), rows)
     always = np.flatnonzero(missing == 0)
     goal = np.array([bit for bit in range(size) if task.goal >> bit & 1], np.int64)
     step = np.where(owners < 0, 0, 1)

@@ -95,10 +95,7 @@ class Task:
 
     def applied(self, state: int, operator: int) -> int | None:
         """Return the state after an operator, or None where it isn't applicable."""
-        known = self._changes.get(operator)
-        if known is None:
-            known = self._changes[operator] = self.change(operator)
-        precondition, changes = known
+        precondition, changes = self._changes.get(operator) or self.known(operator)
         if state & precondition != precondition:
             return None
         after = state
@@ -106,6 +103,13 @@ class Task:
             if state & when == when:
                 after = after & ~cleared | set_
         return self.completed(after) if self.derived else after
+
+    def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
+        """Return an operator's precondition and changes, worked out once."""
+        known = self._changes.get(operator)
+        if known is None:
+            known = self._changes[operator] = self.change(operator)
+        return known
 
     def completed(self, state: int) -> int:
         """Return the state with its derived bits as they have to be."""

@@ -8,13 +8,14 @@ from time import perf_counter
 
 import pytest
 
-from planner.flat import plan_level, search, shortened
+from planner.flat import plan_level, search
 from planner.grounding import TooLargeError, ground
 from planner.kernel import heuristic as compiled_heuristic
 from planner.plan import Limits, Reason, Status
 from planner.relaxed import heuristic
 from planner.task import Task
 from planner.validation import validate
+from planner.windows import shortened
 from reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
