@@ -11,12 +11,14 @@ Rule 3: every loop ends: primitives and failures are counted, planning has limit
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from planner.caution import Caution, without_relations
+from planner.caution import Caution, Static, without_relations
 from planner.episode import (
     Change,
     End,
@@ -28,6 +30,7 @@ from planner.episode import (
     Surprise,
     Verdict,
     World,
+    WorldError,
 )
 from planner.fast import compiled
 from planner.fast import plan as fast_plan
@@ -37,13 +40,20 @@ from planner.symbolic import with_individual
 from planner.validation import successor
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
+logger = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
 class Patience:
-    """When to stop: attempts at one primitive, failures in all, primitives begun per primitive planned, and planning limits."""
+    """When to stop: attempts at one primitive, failures in all, primitives begun per primitive planned, and planning limits.
+
+    `rounds` is how often all that failed is tried anew, once there is no other way left: things stand otherwise by then, and a
+    hand takes them otherwise.
+    """
 
     attempts: int = 2
     failures: int = 12
+    rounds: int = 3
     primitives: int = 20
     planning: Limits = Limits(seconds=20.0)  # noqa: RUF009 - frozen
 
@@ -100,22 +110,78 @@ def act(
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or fast_plan)
-    run = _Run(problem, world, list(interventions), planner, patience, tell, mending)
-    run.look(dict(problem.initial))
-    run.start(plan)
-    while run.going:
-        run.intervene()
-        if run.puzzled:
-            run.reconsider()
-        elif not run.agenda:
-            run.finish()
-        elif (expected := run.expected()) is None:
-            run.doubt("the next primitive's precondition doesn't hold")
-        else:
-            before, verdict = run.perform(expected)
-            if not verdict.ok:
-                run.learn_from(before, verdict)
+    run = _Run(problem, Guarded(world), list(interventions), planner, patience, tell, mending)
+    try:
+        run.look(dict(problem.initial))
+        run.start(plan)
+        while run.going:
+            run.intervene()
+            if run.puzzled:
+                run.reconsider()
+            elif not run.agenda:
+                run.finish()
+            elif (expected := run.expected()) is None:
+                run.doubt("the next primitive's precondition doesn't hold")
+            else:
+                before, verdict = run.perform(expected)
+                if not verdict.ok:
+                    run.learn_from(before, verdict)
+    except WorldError as error:
+        run.break_off(str(error))
     return run.episode()
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """A world whose exceptions, and answers that are none, become one `WorldError` that says what was asked."""
+
+    world: World
+
+    def observe(self) -> State:
+        """Return the facts that are perceived now."""
+        with _asking("observe()"):
+            seen = self.world.observe()
+        wrong = [s for s in seen if not isinstance(s, Symbol)] if isinstance(seen, Mapping) else [seen]
+        if wrong:
+            raise WorldError(f"the world's observe() returned {wrong[0]!r:.60}; wanted a mapping of Symbol to value")
+        return seen
+
+    def execute(self, step: Step) -> Verdict:
+        """Carry out a primitive."""
+        with _asking(f"execute({step})"):
+            said = self.world.execute(step)
+        lacking = [name for name in ("ok", "code", "objects", "message") if not hasattr(said, name)]
+        if lacking:
+            raise WorldError(
+                f"the world's execute({step}) returned {said!r:.60} without {', '.join(lacking)}; wanted a verdict"
+            )
+        return said
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention happen now."""
+        with _asking(f"disturb({intervention.text or intervention.change.value})"):
+            self.world.disturb(intervention)
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of interventions that shall happen at a time of the world's clock."""
+        with _asking("announce()"):
+            self.world.announce(interventions)
+
+    @property
+    def seconds(self) -> float:
+        """What the world's clock shows."""
+        with _asking("seconds"):
+            return float(self.world.seconds)
+
+
+@contextmanager
+def _asking(what: str) -> Iterator[None]:
+    """Turn whatever a world raises into a `WorldError`; the whole story goes to the log, at level DEBUG."""
+    try:
+        yield
+    except Exception as error:
+        logger.debug("the world failed", exc_info=True)
+        raise WorldError(f"the world's {what} raised {type(error).__name__}: {error}") from error
 
 
 @dataclass
@@ -142,11 +208,16 @@ class _Run:
     done: dict[tuple[int, ...], Step] = field(default_factory=dict)
     begun: dict[tuple[int, ...], State] = field(default_factory=dict)
     attempts: Counter[tuple[str, tuple[str, ...]]] = field(default_factory=Counter)
-    withdrawn: list[str] = field(default_factory=list)
+    withdrawn: set[Static] = field(default_factory=set)
+    rounds: int = 0
     seconds: dict[str, float] = field(default_factory=lambda: {"planning": 0.0, "repairing": 0.0})
     unseen: frozenset[Symbol] | None = None
     sound: bool = True
     missed: dict[Symbol, str | None] = field(default_factory=dict)
+    first: Plan = Plan(())  # noqa: RUF009 - frozen
+
+    def __post_init__(self) -> None:
+        self.initial, self.relations = dict(self.belief.initial), self.belief.relations
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -179,8 +250,17 @@ class _Run:
             self.status = End.IMPOSSIBLE
         self.say("over", text=self.status.value)
 
+    def break_off(self, why: str) -> None:
+        """Stop at once: the world doesn't answer."""
+        self.going, self.status = False, End.GAVE_UP
+        self.reasons.append(Reason(why))
+        self.say("over", text=f"{self.status.value}: {why}")
+
     def episode(self) -> Episode:
         """Return what happened."""
+        clock = 0.0
+        with suppress(WorldError):
+            clock = self.world.seconds
         return Episode(
             self.belief.scene,
             self.status,
@@ -194,7 +274,8 @@ class _Run:
             tuple(self.happened),
             tuple(self.replans),
             tuple(self.failures),
-            {**self.seconds, "simulated": self.world.seconds},
+            {**self.seconds, "simulated": clock},
+            tuple(self.waiting),
         )
 
     def executed(self) -> Plan:
@@ -376,6 +457,8 @@ class _Run:
         if hopeless:
             self.set_aside_the_impossible(hopeless)
             self.doubt("what can't be reached is set aside")
+        elif self.withdrawn and self.try_anew("no other way is left"):
+            return
         else:
             self.give_up(End.IMPOSSIBLE if proved else End.GAVE_UP, reason)
 
@@ -410,13 +493,29 @@ class _Run:
         relied_on = relations_of(self.belief, chain)
         if not relied_on:
             text = f"{step} failed {self.patience.attempts} times and there is no other way: {verdict.message or code}"
-            self.give_up(End.GAVE_UP, Reason(text, verdict.objects))
+            if not self.try_anew(text):
+                self.give_up(End.GAVE_UP, Reason(text, verdict.objects))
             return
-        self.belief = without_relations(self.belief, relied_on)
-        self.using = compiled(self.belief)
-        self.withdrawn.extend(" ".join((name, *row)) for name, row in relied_on)
-        self.sound = False
+        self.withdrawn.update(relied_on)
+        self.rely_on_all_but(self.withdrawn)
         self.doubt(f"{step} failed {self.patience.attempts} times ({code})")
+
+    def try_anew(self, why: str) -> bool:
+        """Bring the hands to rest and rely on everything again, if that wasn't done too often; return whether it is done."""
+        if self.rounds + 1 >= self.patience.rounds:
+            return False
+        self.rounds += 1
+        self.attempts.clear()
+        self.withdrawn.clear()
+        self.rely_on_all_but(())
+        self.doubt(f"tried anew: {why}")
+        return True
+
+    def rely_on_all_but(self, gone: Iterable[Static]) -> None:
+        """Believe in all static facts of the scene except some; what is in progress isn't finished as it was planned."""
+        self.belief = without_relations(replace(self.belief, relations=self.relations), gone)
+        self.using = compiled(self.belief)
+        self.sound = False
 
 
 def relations_of(problem: Problem, chain: Sequence[Step]) -> list[tuple[str, tuple[str, ...]]]:

@@ -58,6 +58,10 @@ class Intervention:
         return self.change in (Change.WORLD, Change.REMOVE, Change.ADD)
 
 
+class WorldError(Exception):
+    """The world itself broke: it raised an exception, or answered with something that is no observation or verdict."""
+
+
 class Verdict(Protocol):
     """What a world says to a step: it did what it should, or how it failed."""
 
@@ -191,6 +195,8 @@ class Episode:
     replans : tuple of Replan
     failures : tuple of Failure
         Experience for the memory.
+    missed : tuple of Intervention
+        Those that never came: the episode was over before.
     """
 
     scene: str
@@ -206,3 +212,4 @@ class Episode:
     replans: tuple[Replan, ...] = ()
     failures: tuple[Failure, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
+    missed: tuple[Intervention, ...] = ()

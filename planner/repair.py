@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
-from functools import partial
 from time import perf_counter
 
 from planner.fast import plan as fast_plan
@@ -29,10 +28,17 @@ from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)
 CLOSE = 1.1
+"""A repair that costs more than replanning by more than this factor gives way to it."""
+
+NEAR = 1.05
 """A repair within this factor of the least that its goals can cost is taken without comparing it with replanning."""
 
-SHORT = 48.0
-"""A repair that costs no more than this is always compared: a detour would weigh much, and replanning takes little."""
+SHORT = 64.0
+"""A repair that costs no more than this is always compared: a detour weighs much, and replanning takes little.
+
+So is one after a change of what is wanted: a step that was needed before may now be left out. Where something has only been
+added, it may be in the way and opens none: there what was needed still is, and no comparison is needed.
+"""
 
 MOST = 5_000
 """So many expansions a repair may take, before the whole is planned anew."""
@@ -90,10 +96,10 @@ def mend(
     begin = perf_counter()
     using = using or compiled(problem)
     repaired = repair(problem, rest, planned, using, in_progress, limits)
-    if repaired is not None and SHORT < repaired.cost <= CLOSE * repaired.least:
+    short = 0.0 if _only_more(planned, problem) else SHORT
+    needed = planned.goal == problem.goal  # else what was needed before isn't known to be
+    if repaired is not None and needed and short < repaired.cost <= NEAR * repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
-    if repaired is not None and repaired.cost > SHORT and planner is None:
-        planner = partial(unproved, using=using, limits=limits)
     anew, outcome = replan(problem, planner, using, limits)
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
@@ -106,7 +112,7 @@ def repair(
     """Return what is to be done with as much of `rest` as is still valid, or None if that wasn't found.
 
     The least counts what was planned and isn't touched by the changes, what was in progress, and for each goal that is open the
-    step that achieves it.
+    step that achieves it; of the steps that concern the same thing that is touched, one.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
@@ -132,8 +138,11 @@ def repair(
     if not solved:
         return None
     costs = [_cost(call, done) for done in call.steps]
-    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
-    return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed | _last_steps(call)))
+    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))} | _last_steps(call)
+    for individual in touched:  # steps that concern the same thing could perhaps be done as one
+        together = [i for i in needed if individual in call.steps[i][2]]
+        needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
+    return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
 
 
 def changed_individuals(planned: Problem, now: Problem) -> set[str]:
@@ -145,6 +154,11 @@ def changed_individuals(planned: Problem, now: Problem) -> set[str]:
             if was != is_:
                 touched.update((*symbol.arguments, was, is_))
     return touched
+
+
+def _only_more(planned: Problem, now: Problem) -> bool:
+    """Whether a situation differs from the one that was planned for only by what is new in it."""
+    return all(now.initial.get(symbol) == value for symbol, value in planned.initial.items())
 
 
 def replan(
@@ -163,19 +177,6 @@ def replan(
     if outcome.plan is None:
         return None, outcome
     return renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps, outcome
-
-
-def unproved(problem: Problem, using: Compiled, limits: Limits) -> Outcome:
-    """Plan as the fast planner does before it improves a plan, and without proof where it finds none: to compare with."""
-    call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
-    call.proved = True
-    try:
-        solved = call.serialise()
-    except (LimitError, UnsolvableError):
-        solved = False
-    return (
-        Outcome(Status.SOLVED, call.tree()) if solved else Outcome(Status.GAVE_UP, None, Reason("nothing to compare"))
-    )
 
 
 def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
