@@ -16,7 +16,7 @@ in the ontology               in `reasoner.symbols`
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -127,12 +127,13 @@ class Individuals:
     """What is said of individuals, as IRIs.
 
     `members` are individual, class and index; `facts` the triples of value properties and relations; `tuples` the facts that
-    are nodes of their own.
+    are nodes of their own; `namesakes` what else ends like one of them, so that their names are those of the whole scene.
     """
 
     members: Sequence[tuple[str, str, int]]
     facts: Sequence[tuple[str, str, str]]
     tuples: Mapping[str, Node]
+    namesakes: Collection[str] = ()
 
 
 def read(graph: KnowledgeGraph) -> Reading:
@@ -180,7 +181,7 @@ class Frame:
     properties: dict[str, tuple[str, bool]]
 
 
-def frame(schema: Schema, members: Sequence[tuple[str, str, int]]) -> Frame:
+def frame(schema: Schema, members: Sequence[tuple[str, str, int]], namesakes: Collection[str] = ()) -> Frame:
     """Return the behaviours and situation types as values, and the classes of some individuals."""
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -188,6 +189,7 @@ def frame(schema: Schema, members: Sequence[tuple[str, str, int]]) -> Frame:
     named = {iri for iri, node in nodes.items() if _is(node, "SituationType", "Behavior", "Relation", "ReachRelation")}
     names = Names(
         named
+        | {iri for iri in namesakes if iri not in nodes}
         | {i for i, _, _ in instances}
         | {k for _, k, _ in instances}
         | {s for pair in supers.items() for s in (pair[0], *pair[1])}
@@ -208,7 +210,7 @@ def frame(schema: Schema, members: Sequence[tuple[str, str, int]]) -> Frame:
 
 def reading_of(scene: str, schema: Schema, individuals: Individuals, whole: bool = True) -> Reading:
     """Return the planning problem of some individuals."""
-    known = frame(schema, individuals.members)
+    known = frame(schema, individuals.members, individuals.namesakes)
     names = known.schema.names
     tuples = {**individuals.tuples, **schema.facts}
     relations, stated = _facts(individuals.facts, tuples, known.properties, known.domain, names)

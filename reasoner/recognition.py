@@ -15,12 +15,13 @@ docs/quantification.md, the test in tests/reasoner/test_recognition.py). Two ste
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import pyoxigraph as ox
 
 from reasoner.graph import CORE, PREFIXES, SCENE, KnowledgeGraph, text
+from reasoner.names import local_name
 from reasoner.reading import (
     FIRST_INDEX_OF_NONE,
     Frame,
@@ -98,7 +99,8 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     search.visit(seeds | constants, Routes())
     bounds = routes(frame(schema, search.members()), schema, [goal.split()[1] for goal in goals if " " in goal.strip()])
     search.close(seeds | constants, constants, bounds)
-    return reading_of(graph.scene, schema, search.individuals(bounds), whole=False)
+    read = search.individuals(bounds)
+    return reading_of(graph.scene, schema, replace(read, namesakes=_namesakes(graph, read.members)), whole=False)
 
 
 # ------------------------------------------------------------------------------------------------- 1. what leads to what
@@ -402,6 +404,22 @@ class _Search:
         wanted = bounds.forward | relations
         triples = [(s, p, o) for s, p, o in self.triples if p in wanted and s in self.seen and o in self.seen]
         return Individuals(self.members(), sorted(triples), facts)
+
+
+def _namesakes(graph: KnowledgeGraph, members: Sequence[tuple[str, str, int]]) -> set[str]:
+    """Return what ends like an individual or class of a part of the scene, in the namespace of any of its ontologies."""
+    terms = {iri for individual, kind, _ in members for iri in (individual, kind)}
+    endings = {local_name(iri) for iri in terms}
+    spaces = {iri.removesuffix(local_name(iri)) for iri in terms}
+    query = f"""
+      SELECT DISTINCT ?x WHERE {{
+        VALUES ?ending {{ {" ".join(str(ox.Literal(ending)) for ending in sorted(endings))} }}
+        {{ ?ontology a owl:Ontology . VALUES ?mark {{ "#" "/" }} BIND(CONCAT(STR(?ontology), ?mark) AS ?space) }}
+        UNION {{ VALUES ?space {{ {" ".join(str(ox.Literal(space)) for space in sorted(spaces))} }} }}
+        BIND(IRI(CONCAT(?space, ?ending)) AS ?x)
+        FILTER(EXISTS {{ ?x a owl:NamedIndividual }} || EXISTS {{ ?member a ?x, owl:NamedIndividual }})
+      }} ORDER BY ?x"""
+    return {text(x) for (x,) in graph.select(query, SCENE)} if endings else set()
 
 
 def _values(iris: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
+from ontology import ROOT
 from planner.behaviors import DomainError, Model, ground
 from planner.plan import Limits, Status
 from planner.refinement import plan
@@ -211,3 +212,13 @@ def test_random_tables_are_solvable_in_the_slice_if_in_the_world(seed: int, obje
     expected, found = plan(read(graph).problem, limits=limits), plan(recognise(graph).problem, limits=limits)
     assume(Status.GAVE_UP not in (expected.status, found.status))
     assert found.status is expected.status
+
+
+def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -> None:
+    """A robot's hand of the name of a role that only physics knows is no less ambiguous where the role isn't read."""
+    for name in ("scenes/one-arm-serving.ttl", "scenes/one-arm-serving.reach.ttl", "robots/one-arm.ttl"):
+        text = (ROOT / name).read_text(encoding="utf-8").replace("confab/one-arm", "confab/one-hand")
+        text = text.replace("r:gripper", "r:hand").replace("\n:gripper", "\n:hand")
+        (tmp_path / Path(name).name.replace("one-arm", "one-hand")).write_text(text, encoding="utf-8")
+    graph = load(tmp_path / "one-hand-serving.ttl")
+    assert recognise(graph).problem.classes["Hand"] == read(graph).problem.classes["Hand"] == ("one-hand:hand",)
