@@ -29,7 +29,7 @@ MEANS = {
     "spill": "spilled",
     "toppled": "tilt_rad",
     "misplaced": "off_place_m",
-    "timeout": "seconds",
+    "too slow": "seconds",
 }
 """The number that tells most about a code, where it is always the same."""
 
@@ -93,7 +93,8 @@ PLANTED = (
     Planted("bottle nearly empty", faults.drained("bottle1", 6), 16, "under-pour", ("bottle1", "cup1"), True),
     Planted("neck blocked", faults.sealed("bottle1"), 16, "under-pour", ("bottle1", "cup1"), True),
     Planted("under-tilt", faults.settings("B3_TILT", pour_angle=1.25), 16, "under-pour", ("bottle1", "cup1"), True),
-    Planted("too slow a turn", faults.settings("B3_TILT", slow=0.01), 16, "timeout", ("right_hand",), True),
+    Planted("too slow a turn", faults.settings("B3_TILT", slow=0.01), 16, "too slow", ("right_hand",), True),
+    Planted("slow arm", faults.slow_arm("left_hand", 0.1), 0, "too slow", ("left_hand",)),
     Planted("cup displaced while it is filled", faults.displaced("cup1", (0.06, 0.0), 16, 0.8), 16, "spill", ("cup1",), True),
 )  # fmt: skip
 

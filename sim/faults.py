@@ -10,7 +10,7 @@ which can be sent to another process. What may happen in the middle of a task ta
 `heavy`, `slippery`, `sealed`, `drained`             an object that isn't as it should be
 `place_displaced`, `settings`                        knowledge that is wrong
 `lets_go`, `arm_at`, `jammed`, `joint_range`         a robot that isn't as it should be
-`weak_arm`, `weak_grip`, `shut`                      the same, for want of strength
+`weak_arm`, `slow_arm`, `weak_grip`, `shut`          the same, for want of strength
 `noisy`, `misaligned`                                perception that isn't as it should be
 ==================================================== ============================================================
 """
@@ -314,6 +314,12 @@ def weak_arm(world: World, hand: str, share: float) -> None:
     """Leave the motors of an arm only a share of their torque."""
     manipulator = world.hands[hand]
     manipulator.efforts = tuple(effort * share for effort in manipulator.efforts)
+
+
+@fault
+def slow_arm(world: World, hand: str, share: float) -> None:
+    """Let an arm move at a share of its speeds only, which the robot knows."""
+    world.hands[hand].pace = share
 
 
 @fault

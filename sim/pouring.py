@@ -213,8 +213,8 @@ class _Servo:
                 return
             self._approach(goal, speed)
             if step % PATIENCE == 0:
-                self.world.check_lag(self.hand)
-        raise SkillError("timeout", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+                self.world.check_course(self.hand)
+        raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
     def meter(self, numbers: Numbers, poured: Callable[[], float]) -> None:
         """Turn on slowly while nothing flows and wait while it does, until enough is `poured` or patience ends."""
@@ -227,8 +227,8 @@ class _Servo:
                 return
             self._approach(numbers["pour_angle"], numbers["slow"] if flowing <= 0 else 0.0)
             if step % PATIENCE == 0:
-                self.world.check_lag(self.hand)
-        raise SkillError("timeout", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+                self.world.check_course(self.hand)
+        raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
     def _approach(self, goal: float, speed: float) -> None:
         """Advance for one step towards an angle, at most at `speed`."""

@@ -64,7 +64,8 @@ def fingerprint(embodiment: Embodiment) -> str:
     parts += [repr(fixture) for fixture in embodiment.fixtures]
     parts += [repr(place) for _, place in sorted(embodiment.places.items())]
     parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
-    parts += [repr(sorted(use.numbers.items())) for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
+    reaching = [use.numbers for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
+    parts += [repr(sorted((name, value) for name, value in uses.items() if name != "time_limit")) for uses in reaching]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

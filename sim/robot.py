@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -29,7 +30,8 @@ class Manipulator:
     """One hand of a robot in a physics world.
 
     `posture` is what the arm was last commanded; `grasp` is where the held object was in the hand when it was grasped
-    (position and rotation), which is what slip is measured against.
+    (position and rotation), which is what slip is measured against; `limit` how many seconds the skill that moves it
+    may take, and `deadline` the step of the simulation at which it must have ended; `pace` the share of its speeds that it uses.
     """
 
     client: int
@@ -46,13 +48,16 @@ class Manipulator:
     posture: Array
     closing: bool = False
     grasp: tuple[Array, Array] | None = None
-    weakness: float = 1.0
+    pace: float = 1.0
+    limit: float = math.inf
+    deadline: float = math.inf
     links: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def limits(self) -> Limits:
         """How fast the arm moves when it holds nothing."""
-        return Limits(self.arm.velocity * self.weakness, self.robot.acceleration * self.weakness, 1.6, 8.0)
+        pace = self.pace
+        return Limits(self.arm.velocity * pace, self.robot.acceleration * pace**2, 1.6 * pace, 8.0 * pace**2)
 
     @property
     def pose(self) -> Array:

@@ -18,7 +18,7 @@ CODES = {
     "spill": "too much went beside the target",
     "toppled": "something fell over",
     "misplaced": "the object is not where it should be",
-    "timeout": "the skill did not end in its time",
+    "too slow": "the skill did not end in its time",
     "unexpected": "what is perceived afterwards is not what the behaviour promises",
 }
 """Failure codes and what they mean. `Verdict.code` is one of them, or None for success."""

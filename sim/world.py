@@ -7,6 +7,7 @@ Rule 3: every random number comes from `World.rng`, so the same arguments give t
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -284,13 +285,18 @@ class World:
             hand.command(q, v)
             self.run(1)
             if i % 6 == 5:
-                self.check_lag(hand)
+                self.check_course(hand)
         hand.command(positions[-1])
         self.run(6)
-        self.check_lag(hand)
+        self.check_course(hand)
 
-    def check_lag(self, hand: Manipulator) -> None:
-        """Raise `SkillError` if a joint is too far from its command, naming what the arm touches, else the hand."""
+    def check_course(self, hand: Manipulator) -> None:
+        """Raise `SkillError` if the skill's time is over, or if a joint is too far from its command.
+
+        The latter names what the arm touches, else the hand.
+        """
+        if self.steps > hand.deadline:
+            raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)
         lag = float(np.abs(hand.measured() - hand.posture).max())
         if lag > LAG:
             raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
@@ -459,10 +465,17 @@ class World:
         bound = {name.lstrip("?"): value for name, value in step.bindings.items()}
         roles |= {role: bound[name] for name, role in use.variables.items() if name in bound}
         self.current += 1
+        hand = self.hands.get(roles.get("hand", ""))
+        if hand is not None:
+            hand.limit = use.numbers.get("time_limit", math.inf)
+            hand.deadline = self.steps + hand.limit * RATE
         try:
             measured = skill(use.skill)(self, roles, use.numbers)
         except SkillError as failure:
             return failure.verdict
+        finally:
+            if hand is not None:
+                hand.deadline = math.inf
         return Verdict(True, measured=measured)
 
 
