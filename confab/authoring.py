@@ -29,10 +29,11 @@ SPOKEN_OF = [CORE + name for name in ("behavior", "situationType", "value", "rel
 SPOKEN_OF += [f"{CORE}argument{place}" for place in range(2, 10)]
 
 
-def new_domain(name: str, folder: Path) -> list[Path]:
+def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
     """Write a commented skeleton that validates: a domain, a scene, a catalog. Return the files.
 
-    The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
+    With `bodies`, also a table, shapes and skills, so that physics can carry the scene's plan out. The catalog has the places of
+    the shipped ontologies, too, so that Protégé finds them.
 
     Raises
     ------
@@ -41,7 +42,7 @@ def new_domain(name: str, folder: Path) -> list[Path]:
     """
     if not re.fullmatch(r"[A-Za-z][\w-]*", name):
         raise KnowledgeError(f"'{name}' can't be a domain's name: wanted a letter, then letters, digits, _ or -")
-    templates = sorted((ontology.ROOT / "skeleton").glob("*.ttl"))
+    templates = sorted((ontology.ROOT / "skeleton" / ("bodies" if bodies else "")).glob("*.ttl"))
     texts = {
         template.name.replace(PLACEHOLDER, name): template.read_text(encoding="utf-8").replace(PLACEHOLDER, name)
         for template in templates

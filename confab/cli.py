@@ -266,13 +266,17 @@ def new(
     folder: Annotated[
         Path | None, typer.Option("--folder", metavar="DIR", help="Where to write; default: DOMAIN.")
     ] = None,
+    bodies: Annotated[
+        bool, typer.Option("--bodies", help="With shapes, a table and skills, so that 'confab run' can carry it out.")
+    ] = False,
 ) -> None:
-    """Begin a domain of your own: a commented skeleton that validates and can be planned in."""
+    """Begin a domain of your own: a commented skeleton that validates."""
     from confab.authoring import new_domain
 
-    files = new_domain(domain, folder or Path(domain))
+    files = new_domain(domain, folder or Path(domain), bodies)
     scene = next(file for file in files if file.stem.endswith("-scene"))
-    _print("\n".join([*map(str, files), f"next: confab validate {scene}; confab plan {scene}; docs/authoring.md"]))
+    then = "run" if bodies else "plan"
+    _print("\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"]))
 
 
 memory_app = typer.Typer(help="Look after a memory file.", no_args_is_help=True)
@@ -294,17 +298,21 @@ def migrate(
 def validate(
     files: Annotated[list[str], typer.Argument(metavar="FILE…", help="Ontology files, or names of shipped scenes.")],
     deep: Annotated[bool, typer.Option("--deep", help="Ask HermiT for contradictions as well; needs Java.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Count a warning as an error: exit 1.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check ontologies: each finding names file, node, what is wrong, why, and what to do."""
+    """Check ontologies: what is wrong where, why, and what to do."""
     from reasoner.validate import validate as check
 
     findings = check(files, deep=deep)
+    errors = sum(finding.serious for finding in findings)
     if as_json:
         _print([finding.as_dict() for finding in findings])
     else:
         _print("\n".join(map(str, findings)) or "nothing is wrong")
-    raise typer.Exit(NO if findings else YES)
+        if findings:
+            print(f"{errors} errors, {len(findings) - errors} warnings", file=sys.stderr)
+    raise typer.Exit(NO if errors or (strict and findings) else YES)
 
 
 @app.command()

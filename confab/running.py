@@ -37,6 +37,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     findings = validate([name])
     if findings:
         console.print("\n".join(map(str, findings)), markup=False, highlight=False)
+    if any(finding.serious for finding in findings):
         return NO
     scene = with_reach(load(name))
     remembered = Memory.load(memory, scene) if memory else Memory.of(scene)

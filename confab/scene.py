@@ -108,7 +108,7 @@ class Scene:
             raise KnowledgeError(
                 f"{self.iri} is symbolic only: it states reach without geometry, so physics can't verify it"
             )
-        return read_embodiment(self.knowledge.store, self.names.short)
+        return read_embodiment(self.knowledge.store, self.names.short, self.knowledge.folders)
 
     def verify(self, plan: Plan, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
         """Carry out the primitives of a plan in PyBullet: see `confab.physics.verify`."""

