@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -70,12 +71,12 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     when: dict[str, Any] = {"text": text.strip()}
     try:
         if match[1] == "at":
-            when["at"] = float(match[2])
+            when["at"] = _seconds(match[2])
         else:
-            when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(int, match[2].split(".")))
+            when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, match[2].split(".")))
     except ValueError as error:
         raise KnowledgeError(
-            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2, or seconds"
+            f"'{match[1]}={match[2]}' in '{text}': wanted an ID or a path like 0.1.2 for after, seconds from 0 on for at"
         ) from error
     verb, _, rest = match[3].partition(" ")
     words = rest.split()
@@ -89,6 +90,21 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     if verb == "add":
         return _add(problem, words, text, when)
     return Intervention(Change.WORLD, (Fact(*parse_fact(problem, match[3])),), **when)
+
+
+def _position(text: str) -> int:
+    """Return a position in a path; raise ValueError if it is none."""
+    if not text.isdigit():
+        raise ValueError(text)
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    """Return a time on the world's clock; raise ValueError if there is no such time."""
+    seconds = float(text)
+    if not 0 <= seconds < math.inf:
+        raise ValueError(text)
+    return seconds
 
 
 def _symbol(problem: Problem, words: list[str], text: str) -> Symbol:
@@ -153,6 +169,7 @@ def episode_json(episode: Episode) -> dict[str, Any]:
             for event in episode.events
         ],
         "interventions": [{"text": i.text, "seconds": round(at, 4)} for i, at in episode.interventions],
+        "never_came": [i.text for i in episode.missed],
         "replans": [
             {
                 "after": list(replan.after),
@@ -225,7 +242,8 @@ class Execution:
             text += (
                 f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
             )
-        return text + "".join(f"; {reason.text}" for reason in episode.reasons)
+        text += "".join(f"; {reason.text}" for reason in episode.reasons)
+        return text + (f"; never came: {', '.join(i.text for i in episode.missed)}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of what was done: an edge from each primitive to those that need it done before."""
@@ -288,6 +306,7 @@ def execute(
     prepare: Callable[[Any], None] | None = None,
     patience: Patience = Patience(),  # noqa: B008 - frozen
     caution: Caution | None = None,
+    perturb: bool = False,
 ) -> Execution:
     """Carry a task out in a closed loop.
 
@@ -312,6 +331,8 @@ def execute(
     patience : Patience
     caution : Caution, optional
         What failed in earlier episodes.
+    perturb : bool
+        Vary poses, friction, masses and fill in PyBullet, by `seed`.
 
     Raises
     ------
@@ -331,12 +352,16 @@ def execute(
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
     from confab.physics import require_skills
     from sim.live import LiveWorld
+    from sim.world import Perturbation
     from sim.world import World as Physics
 
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     require_skills(scene, [behavior.name for behavior in lowest])
-    with Physics(scene.embodiment, problem.initial, seed) as physics:
+    with Physics(scene.embodiment, problem.initial, seed, Perturbation() if perturb else None) as physics:
         if prepare is not None:
             prepare(physics)
         live = LiveWorld(physics, problem.classes)
+        for intervention in wanted:
+            if (why := live.impossible(intervention)) is not None:
+                raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
         return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell, True, caution))

@@ -15,7 +15,7 @@ import pybullet
 
 from planner.episode import Change, Intervention
 from planner.plan import Step
-from reasoner.embodiment import PerceiverUse
+from reasoner.embodiment import Body, PerceiverUse
 from reasoner.symbols import Fact, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
 from sim.perception import tilt_of
@@ -71,6 +71,27 @@ class LiveWorld:
         finally:
             self.concerned = set()
 
+    def impossible(self, intervention: Intervention) -> str | None:
+        """Return why an intervention can't happen in this world, whenever that is; None if it can."""
+        if intervention.change is Change.ADD and self._model_of(intervention.kind) is None:
+            return f"no {intervention.kind} of this scene has a shape that {intervention.individual} could take"
+        if intervention.change is Change.REMOVE and intervention.individual not in self.world.bodies:
+            return f"{intervention.individual} is no body on the table (those are {', '.join(self.world.bodies)})"
+        if not intervention.of_world:
+            return None
+        perceivers = self.world.embodiment.perceivers
+        for fact in intervention.facts:
+            use = perceivers.get(fact.symbol.situation)
+            if use is None or use.perceiver not in DISTURBERS:
+                able = [name for name, use in perceivers.items() if use.perceiver in DISTURBERS]
+                return f"nobody can make {fact} true by hand; people change {' and '.join(able)}"
+            if fact.value not in self.world.embodiment.places and DISTURBERS[use.perceiver] is move:
+                places = ", ".join(self.world.embodiment.places)
+                return (
+                    f"{fact.symbol.arguments[0]} can't be put at '{fact.value}', which is no place (those are {places})"
+                )
+        return None
+
     def disturb(self, intervention: Intervention) -> None:
         """Let an intervention happen now, and what it moved come to rest."""
         self._interfere(intervention)
@@ -110,20 +131,18 @@ class LiveWorld:
             self._add(intervention)
         else:
             for fact in intervention.facts:
-                self._make_true(fact)
+                if fact.symbol.arguments[0] in self.world.bodies:  # else somebody has taken it away
+                    self._make_true(fact)
 
     def _make_true(self, fact: Fact) -> None:
-        use = self.world.embodiment.perceivers.get(fact.symbol.situation)
-        if use is None or use.perceiver not in DISTURBERS:
-            raise ValueError(f"nobody can make {fact} true in this world by hand")
+        use = self.world.embodiment.perceivers[fact.symbol.situation]
         DISTURBERS[use.perceiver](self.world, use, fact.symbol, fact.value)
 
     def _add(self, intervention: Intervention) -> None:
         world, name = self.world, intervention.individual
-        models = [one for one in self.classes.get(intervention.kind, ()) if one in world.embodiment.bodies]
-        if not models:
-            raise ValueError(f"no {intervention.kind} of this scene has a shape that {name} could take")
-        model = world.embodiment.bodies[models[0]]
+        model = self._model_of(intervention.kind)
+        if model is None:
+            raise ValueError(f"{name} has no shape")
         bodies = {**world.embodiment.bodies, name: replace(model, name=name)}
         world.embodiment = replace(world.embodiment, bodies=bodies)
         somewhere, upright = np.array([0.0, 0.0, -5.0]), np.array([0.0, 0.0, 0.0, 1.0])
@@ -133,12 +152,15 @@ class LiveWorld:
         for fact in intervention.facts:
             self._make_true(fact)
 
+    def _model_of(self, kind: str) -> Body | None:
+        """Return what an object of a class looks like: the first of this scene that has a shape."""
+        bodies = self.world.embodiment.bodies
+        return next((bodies[one] for one in self.classes.get(kind, ()) if one in bodies), None)
+
 
 def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Put an object, and what is in it, at a place; a hand that holds it lets it go."""
     name = symbol.arguments[0]
-    if value not in world.embodiment.places:
-        raise ValueError(f"{name} can't be put at '{value}': it has no position")
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
@@ -169,7 +191,9 @@ def take_away(world: World, name: str) -> None:
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
-    thing = world.bodies.pop(name)
+    thing = world.bodies.pop(name, None)
+    if thing is None:
+        return  # somebody was faster
     del world.names[thing.body]
     pybullet.removeBody(thing.body, physicsClientId=world.client)
 
