@@ -5,19 +5,22 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
+from typing import Any
 
 import confab
 from confab.execution import execute
 from confab.gantt import save_gantt
+from confab.scene import Scene
 from planner.acting import Patience, act
 from planner.caution import Caution
 from planner.episode import Change, End, Episode, Intervention
@@ -27,6 +30,7 @@ from planner.plan import Limits, Plan, Step
 from planner.repair import cost, difference, mend, replan
 from planner.symbolic import Said, SymbolicWorld, disturbed, with_individual
 from planner.validation import successor
+from reasoner.files import write_whole
 from reasoner.generate import write_scene
 from reasoner.graph import load
 from reasoner.reading import read
@@ -35,6 +39,7 @@ from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
 OUT = Path("confab-out/execution")
 SYMBOLIC, PHYSICAL = 1000, 50
+ROBOTS, EPISODES = 3, 8
 LARGEST_WITH_PROOFS = 50
 """Beyond that, replanning for a filled object that shall stand elsewhere grounds the whole lowest level, in gigabytes."""
 
@@ -171,33 +176,50 @@ def interventions() -> None:
 
 
 def physical() -> None:
-    """Print how episodes with one random intervention end, in PyBullet."""
+    """Print how episodes with one random intervention end, in PyBullet; a line per episode goes to a file."""
     scene = confab.load("beverage-serving")
     trial, ends = Trial.of(scene.problem), Counter[tuple[str, str]]()
-    failures, wrong = Counter[str](), 0
+    failures, wrong, lines = Counter[str](), 0, list[str]()
     for seed in range(PHYSICAL):
-        random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
-        position = random.randrange(len(trial.plan.primitives))
-        intervention = random_intervention(trial.problem, trial.states[position], random, kind)
-        assert intervention is not None
-        inside, second = random.random() < 0.5, 1 + 30 * random.random()
-        happening = timed(intervention, trial, position, inside, second)
+        kind = KINDS[seed % len(KINDS)]
+        happening = physical_intervention(trial, seed)
+        begin = process_time()
         episode = execute(scene, trial.problem, trial.plan, [happening], "pybullet", seed=seed).episode
         ends[kind, episode.status.value] += 1
         failures.update(failure.code for failure in episode.failures)
         wrong += not _right(episode)
-        if episode.status is End.GAVE_UP:
-            print(
-                f"gave up, seed {seed}, {kind} {happening.facts or happening.individual}: {episode.reasons[-1].text}\n"
-            )
+        row = {
+            "seed": seed,
+            "kind": kind,
+            "what": [str(fact) for fact in happening.facts] or happening.individual or str(happening.symbol),
+            "after": happening.after,
+            "at": happening.at,
+            "status": episode.status.value,
+            "reasons": [reason.text for reason in episode.reasons],
+            "failures": [f"{failure.step}: {failure.code}" for failure in episode.failures],
+            "cpu seconds": round(process_time() - begin, 1),
+        }
+        lines.append(json.dumps(row) + "\n")
+        write_whole(OUT / "physical.jsonl", "".join(lines))
     _table(ends)
     print(f"\n{wrong} with a claim that isn't so; primitives failed: {dict(failures)}")
+
+
+def physical_intervention(trial: Trial, seed: int) -> Intervention:
+    """Return what happens in an episode in PyBullet, half of it at a second that may be inside a primitive."""
+    random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
+    position = random.randrange(len(trial.plan.primitives))
+    intervention = random_intervention(trial.problem, trial.states[position], random, kind)
+    assert intervention is not None
+    inside, second = random.random() < 0.5, 1 + 30 * random.random()
+    return timed(intervention, trial, position, inside, second)
 
 
 def repair() -> None:
     """Print cost, distance and latency of repair against replanning."""
     print(
-        "| n | interventions | cost, sum | over 1.1 × | worst | distance | ratio, median | ms, median | ms, p95 | replanned |"
+        "| n | interventions | cost, sum | over 1.1 × | worst | distance | ratio, median "
+        "| CPU ms, median | CPU ms, p95 | replanned |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
     for objects, count in ((4, 500), (20, 1000), (200, 60)):
@@ -221,11 +243,11 @@ def _repair_row(objects: int, count: int) -> None:
         before = replace(problem, initial=trial.states[position])
         now = _changed(before, intervention)
         ours, theirs = (compiled(now), compiled(now)) if kind == "add" else (own, other)
-        begin = perf_counter()
+        begin = process_time()
         mended = mend(now, rest, before, None, ours, True, limits)
-        middle = perf_counter()
+        middle = process_time()
         scratch, _ = replan(now, None, theirs, limits)
-        end = perf_counter()
+        end = process_time()
         if mended.steps is None or scratch is None:
             assert mended.steps is None and scratch is None
             continue
@@ -283,27 +305,83 @@ def learning() -> None:
     """Print success over episodes with a planted obstacle, with and without learning from failure."""
     scene = confab.load("beverage-serving")
     patience = Patience(failures=2)
-    print("| world | learning | success by episode |\n|---|---|---|")
+    curves: dict[str, list[float]] = {}
+    print("| world | learning | goal reached, by episode | failures | simulated s |\n|---|---|---|---|---|")
     for learns in (False, True):
-        ends = [_obstructed(scene.problem, learns, seed, 8, patience) for seed in range(100)]
-        rates = [sum(run[i] for run in ends) for i in range(8)]
+        ends = [_obstructed(scene.problem, learns, seed, EPISODES, patience) for seed in range(100)]
+        rates = [sum(run[i] for run in ends) / 100 for i in range(EPISODES)]
         print(
-            f"| symbolic, obstacle fails 9 of 10, 100 robots | {learns} | {' '.join(f'{r} %' for r in rates)} |",
+            f"| symbolic, obstacle fails 9 of 10, 100 robots | {learns} "
+            f"| {' '.join(f'{100 * r:.0f} %' for r in rates)} | | |",
             flush=True,
         )
-    from sim.faults import hidden_wall
-
+        curves["symbolic, 100 robots" + (", learning" if learns else "")] = rates
     for learns in (False, True):
-        caution, ends_here = Caution(), list[str]()
-        for seed in range(4):
-            run = execute(
-                scene, scene.problem, None, (), "pybullet", None, seed, None, hidden_wall("bottle2"), patience, caution
-            )
-            ends_here.append(run.episode.status.value)
-            caution = caution.learned(run.episode) if learns else caution
+        runs = [_beside_a_post(scene, learns, 100 * robot, EPISODES, patience) for robot in range(1, ROBOTS + 1)]
+        columns = list(zip(*runs, strict=True))
+        rates = [sum(e.status is End.REACHED for e in column) / ROBOTS for column in columns]
+        failed = [sum(len(e.failures) for e in column) / ROBOTS for column in columns]
+        seconds = [sum(e.seconds["simulated"] for e in column) / ROBOTS for column in columns]
         print(
-            f"| PyBullet, a wall that isn't perceived before bottle2 | {learns} | {', '.join(ends_here)} |", flush=True
+            f"| PyBullet, perturbed, {ROBOTS} robots | {learns} | {' '.join(f'{100 * r:.0f} %' for r in rates)} "
+            f"| {' '.join(f'{n:.1f}' for n in failed)} | {' '.join(f'{t:.0f}' for t in seconds)} |",
+            flush=True,
         )
+        curves[f"PyBullet, {ROBOTS} robots" + (", learning" if learns else "")] = rates
+    print(f"\nAn episode ends at failure {patience.failures} (`Patience`).")
+    print(f"The picture: {_save_curves(curves, OUT / 'learning.png')}")
+
+
+def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, patience: Patience) -> list[Episode]:
+    """Return perturbed episodes of a robot with a post that it doesn't perceive where its left arm reaches for bottle2."""
+    caution, found = Caution(), list[Episode]()
+    for number in range(episodes):
+        run = execute(
+            scene,
+            scene.problem,
+            world="pybullet",
+            seed=seed + number,
+            prepare=hidden_post,
+            patience=patience,
+            caution=caution,
+            perturb=True,
+        )
+        found.append(run.episode)
+        caution = caution.learned(run.episode) if learns else caution
+    return found
+
+
+def hidden_post(world: Any, at: tuple[float, float, float] = (0.35, -0.04, 0.7), height: float = 0.16) -> None:
+    """Put up a post 2 cm thick that the robot doesn't perceive; a hand that comes from the right gets past it."""
+    import pybullet
+
+    half = [0.01, 0.01, height / 2]
+    post = pybullet.createMultiBody(
+        0,
+        pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=world.client),
+        basePosition=[at[0], at[1], at[2] + half[2]],
+        physicsClientId=world.client,
+    )
+    world.names[post] = "hidden post"
+
+
+def _save_curves(curves: Mapping[str, Sequence[float]], path: Path) -> Path:
+    """Draw success over episodes, and return where."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7, 3.6), layout="constrained")
+    for name, rates in curves.items():
+        style, color = "-" if name.endswith("learning") else "--", "C0" if name.startswith("symbolic") else "C1"
+        axes.plot(range(1, len(rates) + 1), [100 * r for r in rates], f"{style}o", color=color, label=name)
+    axes.set(xlabel="episode", ylabel="goal reached, %", ylim=(-4, 104))
+    axes.legend(fontsize=8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+    return path
 
 
 def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, patience: Patience) -> list[bool]:

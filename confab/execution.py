@@ -14,8 +14,8 @@ from confab.interchange import step_json
 from planner.acting import Moment, Patience, act
 from planner.caution import Caution
 from planner.episode import Change, End, Episode, Intervention, World
-from planner.plan import Plan
-from planner.repair import Planner
+from planner.plan import Plan, Step
+from planner.repair import Planner, renumbered
 from planner.symbolic import SymbolicWorld
 from reasoner.graph import KnowledgeError
 from reasoner.links import Links
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rich.tree import Tree
 
     from confab.scene import Scene
+    from sim.live import LiveWorld
 
 WORLDS = ("symbolic", "pybullet")
 
@@ -307,6 +308,7 @@ def execute(
     patience: Patience = Patience(),  # noqa: B008 - frozen
     caution: Caution | None = None,
     perturb: bool = False,
+    both_hands: bool = False,
 ) -> Execution:
     """Carry a task out in a closed loop.
 
@@ -333,15 +335,19 @@ def execute(
         What failed in earlier episodes.
     perturb : bool
         Vary poses, friction, masses and fill in PyBullet, by `seed`.
+    both_hands : bool
+        In PyBullet: carry the plan out with all hands at once; what isn't done then, one hand after the other. Nobody interferes.
 
     Raises
     ------
     KnowledgeError
-        An intervention isn't of a known form; the scene has no geometry; no such world.
+        An intervention isn't of a known form, or can't happen; the scene has no geometry; no such world.
     """
     texts = list(interventions)
     wanted = [i for i in texts if isinstance(i, Intervention)]
     wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
+    if both_hands and (world != "pybullet" or wanted):
+        raise KnowledgeError("both hands at once: only in the world pybullet, and without interventions")
     if not isinstance(world, str):
         return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
     if world == "symbolic":
@@ -364,4 +370,53 @@ def execute(
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
+        if both_hands:
+            return Execution(scene, _with_both_hands(problem, live, plan, planner, patience, tell, caution))
         return Execution(scene, act(problem, live, plan, wanted, planner, patience, tell, True, caution))
+
+
+def _with_both_hands(
+    problem: Problem,
+    live: LiveWorld,
+    plan: Plan | None,
+    planner: Planner | None,
+    patience: Patience,
+    tell: Callable[[Moment], None] | None,
+    caution: Caution | None,
+) -> Episode:
+    """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
+    from planner.episode import Event, Failure
+    from planner.fast import plan as fast_plan
+    from sim.together import perform
+
+    if plan is None:
+        known = problem if caution is None else caution.applied(problem, planner or fast_plan)
+        plan = (planner or fast_plan)(known).plan or Plan(())
+    done = perform(live.world, problem, plan.primitives)
+    before = [
+        Event(slot.step, slot.begin, slot.end, verdict.ok, verdict.code)
+        for slot, verdict in zip(done.slots, done.verdicts, strict=True)
+    ]
+    now = live.observe()
+    failures = [
+        Failure(slot.step, verdict.code or "failed", verdict.objects, verdict.message, now)
+        for slot, verdict in zip(done.slots, done.verdicts, strict=True)
+        if not verdict.ok
+    ]
+    rest = act(replace(problem, initial=now), live, None, (), planner, patience, tell, True, caution)
+    carried = {event.step.path for event in before if event.ok}
+    steps = (*_only(plan.steps, carried), *renumbered(rest.done.steps, len(plan.steps)))
+    return replace(
+        rest,
+        planned=plan,
+        done=Plan(steps),
+        initial=problem.initial,
+        events=(*before, *rest.events),
+        failures=(*failures, *rest.failures),
+    )
+
+
+def _only(steps: Iterable[Step], paths: set[tuple[int, ...]]) -> tuple[Step, ...]:
+    """Return the steps with only the primitives of some paths below them."""
+    kept = [replace(step, steps=_only(step.steps, paths)) if step.steps else step for step in steps]
+    return tuple(step for step in kept if step.steps or step.path in paths)

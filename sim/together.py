@@ -23,6 +23,9 @@ from sim.world import World
 ROOM = 0.25
 """Metres between the places at which two hands may work at the same time."""
 
+FLOWING = {"tilt", "stand_upright"}
+"""Skills that watch what goes beside: two of them at once would see each other's drops, so they take turns."""
+
 LOOKING = 6
 """So many steps lie between two looks for contact between the arms."""
 
@@ -95,7 +98,12 @@ def perform(
     where = [_where(world, step) for step in primitives]
     index = {id(step): i for i, step in enumerate(primitives)}
 
+    def flowing(step: Step) -> bool:
+        return world.embodiment.skills[step.behavior].skill in FLOWING
+
     def apart(one: Step, other: Step) -> bool:
+        if flowing(one) and flowing(other):
+            return False
         here, there = where[index[id(one)]](), where[index[id(other)]]()
         return here is None or there is None or float(np.linalg.norm(here - there)) >= room
 
