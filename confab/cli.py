@@ -173,6 +173,10 @@ def execute(
     seed: Seed = 0,
     save: Annotated[Path | None, typer.Option("--save", metavar="EPISODE.ttl", help="Write the episode here.")] = None,
     iri: SceneIri = None,
+    perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
+    both_hands: Annotated[
+        bool, typer.Option("--both-hands", help="In PyBullet: all hands at once, without interventions.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
@@ -183,7 +187,9 @@ def execute(
     remembered = _memory(memory, no_memory, loaded)
     links = remembered.links if remembered else None
     with spectator() as tell:
-        execution = loaded.execute(plan, intervene or (), world, goal or (), links, mode, seed, tell)
+        execution = loaded.execute(
+            plan, intervene or (), world, goal or (), links, mode, seed, tell, perturb=perturb, both_hands=both_hands
+        )
     if save is not None:
         execution.save(save)
     _print(execution.json() if as_json else execution)
