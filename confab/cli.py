@@ -285,6 +285,22 @@ def new(
     _print("\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"]))
 
 
+@app.command()
+def picture(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="File to draw into.")],
+    behavior: Annotated[
+        str | None, typer.Option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
+    ] = None,
+    classes: Annotated[bool, typer.Option("--classes", help="Draw the classes of objects instead.")] = False,
+) -> None:
+    """Draw the table with its places, a behaviour, or the classes."""
+    from confab.picturing import draw
+    from confab.scene import load
+
+    print(draw(load(scene), out, behavior, classes))
+
+
 memory_app = typer.Typer(help="Look after a memory file.", no_args_is_help=True)
 app.add_typer(memory_app, name="memory")
 

@@ -8,6 +8,12 @@ from pathlib import Path
 
 import pytest
 
+import ontology
+from reasoner.graph import load, text
+from reasoner.names import local_name
+from sim.perception import BUILT_IN as PERCEIVERS
+from sim.skills import BUILT_IN as SKILLS
+
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "authoring.md"
 BLOCK = re.compile(r"^```(turtle|console)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -28,10 +34,28 @@ def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
             done = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path)
             said.append(f"$ confab {' '.join(arguments)}\n{done.stdout}")
             assert done.returncode == 0, done.stdout + done.stderr
-    text = "\n".join(said)
-    print(text)
-    assert text.count("nothing is wrong") == 3
-    assert "verified" in text
-    assert "T1_TIDY toy1 location6" in text
-    assert "T1_TAKE_OUT toy2 location2" in text
-    assert "the plan is the same" in text
+    story = "\n".join(said)
+    print(story)
+    assert story.count("nothing is wrong") == 4
+    assert story.count("verified: ") == 2
+    assert "B3_TIP left_hand" in story
+    assert all((tmp_path / "plants" / f"{name}.png").stat().st_size > 5000 for name in ("table", "classes", "behavior"))
+    assert "T1_TIDY toy1 location6" in story
+    assert "T1_TAKE_OUT toy2 location2" in story
+    assert "the plan is the same" in story
+
+
+def test_the_guide_names_every_skill_and_perceiver_with_what_it_asks_for() -> None:
+    graph = load(ontology.ROOT / "embodiment.ttl")
+    prefix = "PREFIX e: <https://w3id.org/confab/embodiment#> "
+    rows = graph.select(prefix + "SELECT ?who ?what WHERE { ?who e:asksFor ?what } ORDER BY ?who ?what")
+    asked: dict[str, set[str]] = {}
+    for row in rows:
+        asked.setdefault(local_name(text(row[0])), set()).add(local_name(text(row[1])))
+    table = {}
+    for line in GUIDE.read_text(encoding="utf-8").splitlines():
+        if cells := re.match(r"\| `e:(\w+)` \| (.*?) \| (.*?) \|", line):
+            said = cells[3] if cells[1].startswith("perceive") else cells[2]
+            table[cells[1]] = {word.removeprefix("e:") for word in re.findall(r"[\w:]+", said)}
+    assert {name: table.get(name) for name in asked} == asked
+    assert set(SKILLS) | set(PERCEIVERS) == set(asked)

@@ -1,0 +1,190 @@
+"""Pictures of what was authored: the table at the beginning, a behaviour with its conditions and effects, the classes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from reasoner.graph import KnowledgeError, text
+from reasoner.names import local_name
+from reasoner.quantify import behavior_named
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from confab.scene import Scene
+
+KINDS = (".png", ".svg", ".pdf")
+GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"
+PARTS = """SELECT DISTINCT ?behavior ?part ?label WHERE {{
+  ?behavior :{property} ?part . OPTIONAL {{ ?part rdfs:label ?label }}
+}} ORDER BY ?part"""
+LABEL = "SELECT ?behavior ?label WHERE { ?behavior rdfs:label ?label } ORDER BY ?label"
+CLASSES = """SELECT DISTINCT ?class ?above WHERE {
+  ?class a owl:Class ; rdfs:subClassOf+ :Object ; rdfs:subClassOf ?above .
+  ?above rdfs:subClassOf* :Object . FILTER(isIRI(?class) && isIRI(?above))
+} ORDER BY ?above ?class"""
+SITUATIONS = (
+    "SELECT DISTINCT ?class ?situation WHERE { ?class :hasSituationType ?situation } ORDER BY ?class ?situation"
+)
+
+
+def draw(scene: Scene, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
+    """Draw a picture into a file and return which: by default the table with its places, as physics sets it up.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+        ``.png``; a diagram also ``.svg`` or ``.pdf``.
+    behavior : str, optional
+        Draw this behaviour with its conditions and effects instead.
+    classes : bool
+        Draw the classes of objects with their situation types instead.
+
+    Raises
+    ------
+    KnowledgeError
+        Another kind of file; no such behaviour; a scene without geometry.
+    """
+    diagram = behavior is not None or classes
+    wanted = KINDS if diagram else KINDS[:1]
+    if path.suffix.lower() not in wanted:
+        raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {' or '.join(wanted)}")
+    if behavior is not None and classes:
+        raise KnowledgeError("--behavior and --classes exclude each other; give one")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not diagram:
+        return _table(scene, path)
+    figure = class_tree(scene) if behavior is None else card(scene, behavior)
+    figure.savefig(path, dpi=100)
+    return path
+
+
+def card(scene: Scene, name: str) -> Figure:
+    """Return a behaviour between what has to hold before it and what it changes, in the words of the labels."""
+    from matplotlib.figure import Figure
+
+    behavior = behavior_named(scene.reading, name)
+    iri = scene.names.iri(behavior.name)
+    before, after = (_parts(scene, iri, which) for which in ("precondition", "postcondition"))
+    high = max(len(before), len(after), 3)
+    figure = Figure(figsize=(10, 0.62 * high + 0.6), layout="constrained")
+    axes = _blank(figure)
+    chosen = ", ".join(f"{p.name.lstrip('?')} ({p.kind})" for p in behavior.parameters)
+    given = ", ".join(f"{v.name.lstrip('?')} ({v.kind})" for v in behavior.variables)
+    label = next((text(row[1]) for row in scene.knowledge.select(LABEL, behavior=iri)), "")
+    words = [behavior.name, fill(label, 30), "", fill(f"one chooses: {chosen}", 34)]
+    words += [fill(f"the situation gives: {given}", 34)] if given else []
+    middle = (0.5, high / 2)
+    _box(axes, *middle, "\n".join(words), ORANGE, 9)
+    for parts, x, color in ((before, 0.13, BLUE), (after, 0.87, GREEN)):
+        for number, part in enumerate(parts):
+            y = high / 2 + (number - (len(parts) - 1) / 2)
+            ends = ((x, y), middle) if x < 0.5 else (middle, (x, y))
+            axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": "0.6"}, zorder=0)
+            _box(axes, x, y, fill(part, 28), color, 9)
+    axes.text(0.13, -0.45, "what has to hold", ha="center", color="0.4", fontsize=9)
+    axes.text(0.87, -0.45, "what it changes", ha="center", color="0.4", fontsize=9)
+    axes.set_ylim(high - 0.3, -0.7)
+    return figure
+
+
+def class_tree(scene: Scene) -> Figure:
+    """Return the classes of objects from the left to the right, each with the situation types that it brings."""
+    from matplotlib.figure import Figure
+
+    below: dict[str, list[str]] = {}
+    for row in scene.knowledge.select(CLASSES):
+        below.setdefault(text(row[1]), []).append(text(row[0]))
+    situations: dict[str, list[str]] = {}
+    for row in scene.knowledge.select(SITUATIONS):
+        situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
+    root = next((iri for iri in below if local_name(iri) == "Object"), None)
+    if root is None:
+        raise KnowledgeError(f"{scene.iri} has no classes of objects to draw")
+    spots: dict[str, tuple[int, float]] = {}
+
+    def put(iri: str, depth: int, row: float) -> float:
+        start = row
+        for child in below.get(iri, ()):
+            row = put(child, depth + 1, row) if child not in spots else row
+        row = max(row, start + 1)
+        spots[iri] = (depth, (start + row - 1) / 2)
+        return row
+
+    rows = put(root, 0, 0)
+    deep = max(depth for depth, _ in spots.values())
+    figure = Figure(figsize=(2.9 * (deep + 1), 0.6 * rows + 0.3), layout="constrained")
+    axes = _blank(figure)
+    for iri, (depth, y) in spots.items():
+        x = (depth + 0.5) / (deep + 1)
+        for child in below.get(iri, ()):
+            to = ((spots[child][0] + 0.5) / (deep + 1), spots[child][1])
+            axes.plot([x, to[0]], [y, to[1]], color="0.7", linewidth=1, zorder=0)
+        own = situations.get(iri, [])
+        words = local_name(iri) + (f"\n{', '.join(own)}" if own else "")
+        _box(axes, x, y, fill_lines(words), BLUE if own else GREY, 8)
+    axes.set_ylim(rows - 0.5, -0.5)
+    return figure
+
+
+def fill_lines(words: str, width: int = 32) -> str:
+    """Return a text with each of its lines broken to a width."""
+    return "\n".join(fill(line, width) for line in words.splitlines())
+
+
+def _parts(scene: Scene, iri: str, which: str) -> list[str]:
+    rows = scene.knowledge.select(PARTS.format(property=which), behavior=iri)
+    return [text(row[2]) or local_name(text(row[1])) for row in rows]
+
+
+def _blank(figure: Figure) -> Axes:
+    axes: Axes = figure.subplots()
+    axes.set_axis_off()
+    axes.set_xlim(0, 1)
+    return axes
+
+
+def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> None:
+    axes.text(
+        x,
+        y,
+        words,
+        ha="center",
+        va="center",
+        fontsize=size,
+        bbox={"boxstyle": "round,pad=0.4", "facecolor": color, "edgecolor": "0.5", "linewidth": 0.8},
+    )
+
+
+def _table(scene: Scene, path: Path) -> Path:
+    """Take a picture of the world as it begins, with the names of the places at their spots."""
+    import numpy as np
+    from PIL import Image, ImageDraw, ImageFont
+
+    from sim.picture import hide_vessels, picture, view_of
+    from sim.world import World
+
+    if not scene.embodiment.places:
+        raise KnowledgeError(f"{scene.iri} has no places with coordinates, so there is no table to show")
+    try:
+        world = World(scene.embodiment, scene.problem.initial)
+    except (ValueError, RuntimeError) as error:
+        raise KnowledgeError(str(error)) from error
+    with world:
+        camera = view_of(scene.embodiment, 800, 448)
+        hide_vessels(world)
+        image = Image.fromarray(picture(world, camera))
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
+    for place in scene.embodiment.places.values():
+        right, up, ahead = camera.axes @ (np.array(place.position) - np.array(camera.eye))
+        x, y = 400 + camera.focal * right / ahead, 224 - camera.focal * up / ahead
+        width = pen.textlength(place.name, font=font)
+        pen.ellipse((x - 3, y - 3, x + 3, y + 3), fill=(245, 150, 40))
+        pen.rectangle((x - width / 2 - 3, y + 5, x + width / 2 + 3, y + 21), fill=(250, 251, 253))
+        pen.text((x - width / 2, y + 6), place.name, font=font, fill=(30, 36, 46))
+    image.quantize(128).save(path)
+    return path
