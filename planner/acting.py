@@ -123,9 +123,9 @@ def act(
             elif (expected := run.expected()) is None:
                 run.doubt("the next primitive's precondition doesn't hold")
             else:
-                before, verdict = run.perform(expected)
+                chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
-                    run.learn_from(before, verdict)
+                    run.learn_from(chain, before, verdict)
     except WorldError as error:
         run.break_off(str(error))
     return run.episode()
@@ -298,8 +298,11 @@ class _Run:
         behavior = self.belief.domain.behaviors[step.behavior]
         return successor(self.belief, behavior, step.arguments, self.belief.initial)
 
-    def perform(self, expected: dict[Symbol, str]) -> tuple[State, Verdict]:
-        """Carry the next primitive out and look what came of it; return the situation before, and the verdict."""
+    def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
+        """Carry the next primitive out and look what came of it; a primitive that failed, but did what it should, is done.
+
+        Returns the primitive with what is above it, the situation before, and the verdict.
+        """
         chain = _first(self.agenda)
         step, before = chain[-1], self.belief.initial
         for above in chain[:-1]:
@@ -309,10 +312,13 @@ class _Run:
         begin = self.world.seconds
         verdict = self.world.execute(step)
         self.note_what_happened_by_the_clock()
-        surprises = self.look(expected if verdict.ok else dict(before))
+        seen = self.world.observe()
+        there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+        done = verdict.ok or (there and verdict.code != "interrupted")
+        surprises = self.look(expected if done else dict(before), seen)
         relied_on = tuple(relations_of(self.belief, chain))
         self.events.append(Event(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on))
-        if verdict.ok:
+        if done:
             self.done.update((above.path, above) for above in chain)
             self.agenda = _rest(self.agenda)
         if surprises:
@@ -320,11 +326,11 @@ class _Run:
         self.say("end", step, changes)
         if len(self.events) >= self.most:
             self.give_up(End.GAVE_UP, Reason(f"stopped at the limit of {self.most} primitives"))
-        return before, verdict
+        return chain, before, verdict
 
-    def look(self, expected: dict[Symbol, str]) -> tuple[Surprise, ...]:
-        """Observe the world, believe what is seen, and return what isn't as expected."""
-        seen = self.world.observe()
+    def look(self, expected: dict[Symbol, str], seen: State | None = None) -> tuple[Surprise, ...]:
+        """Observe the world if that isn't `seen` yet, believe what is seen, and return what isn't as expected."""
+        seen = self.world.observe() if seen is None else seen
         if self.unseen is None:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         surprises = []
@@ -475,15 +481,15 @@ class _Run:
 
     # --------------------------------------------------------------------------------------------------- failing
 
-    def learn_from(self, before: State, verdict: Verdict) -> None:
+    def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
         """Try again, then otherwise: what failed again and again is taken as impossible for the rest of the episode."""
-        chain = _first(self.agenda)
         step, code = chain[-1], verdict.code or "failed"
         if code == "interrupted":
             self.doubt(verdict.message)
             return
         self.failures.append(Failure(step, code, verdict.objects, verdict.message, before))
-        self.attempts[step.behavior, step.arguments] += 1
+        if step.path not in self.done:
+            self.attempts[step.behavior, step.arguments] += 1
         if len(self.failures) >= self.patience.failures:
             text = f"stopped after {len(self.failures)} failures, the last of {step}: {verdict.message or code}"
             self.give_up(End.GAVE_UP, Reason(text, verdict.objects))

@@ -183,7 +183,7 @@ class Episode:
     planned : Plan
         As it was before anything happened.
     done : Plan
-        As it was carried out; a primitive that failed isn't part of it.
+        As it was carried out; a primitive that failed isn't part of it, unless what it should bring about was there afterwards.
     initial, observed : State
         The situation in the beginning, and as it was seen in the end.
     goal : State

@@ -67,9 +67,19 @@ class LiveWorld:
         held = [self.world.held(hand) for hand in step.arguments if hand in self.world.hands]
         self.concerned |= {body for body in held if body is not None}
         try:
-            return self.world.execute(step)
+            verdict = self.world.execute(step)
         finally:
             self.concerned = set()
+        if not verdict.ok:
+            self._regard_grips()
+        return verdict
+
+    def _regard_grips(self) -> None:
+        """Take what slipped in a hand as held the way it is now: the next primitive asks if it slips further."""
+        for name, hand in self.world.hands.items():
+            held = self.world.held(name)
+            if held is not None and hand.grasp is not None:
+                hand.grasp = self.world.in_hand(hand, held)
 
     def impossible(self, intervention: Intervention) -> str | None:
         """Return why an intervention can't happen in this world, whenever that is; None if it can."""

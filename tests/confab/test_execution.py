@@ -46,6 +46,14 @@ def test_interventions_come_from_a_file_too(tmp_path: Path) -> None:
     assert "1 change of plan" in done.stdout
 
 
+def test_interventions_that_never_came_are_said() -> None:
+    never = ["after=999 remove cup2", "at=9999 remove cup2"]
+    execution = confab.load("beverage-serving").execute(interventions=never)
+    assert execution.reached
+    assert execution.json()["never_came"] == never
+    assert execution.summary().endswith("never came: after=999 remove cup2, at=9999 remove cup2")
+
+
 def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
     done = command("--intervene", "after=28 remove cup2")
     assert done.returncode == 1
@@ -57,6 +65,13 @@ def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
     [
         (["--intervene", "28 cup2"], "wanted 'after=28"),
         (["--intervene", "after=x cup2 LOCATION location8"], "wanted an ID"),
+        (["--intervene", "after=-3 remove cup2"], "wanted an ID"),
+        (["--intervene", "at=-5 remove cup2"], "seconds from 0 on"),
+        (["--intervene", "at=nan remove cup2"], "seconds from 0 on"),
+        (["--intervene", "after=28 goal cup2 COLOUR red"], "unknown situation type 'COLOUR'"),
+        (["--intervene", "at=1 cup2 LOCATION in_hand", "--world", "pybullet"], "can't be put at 'in_hand'"),
+        (["--intervene", "after=28 left_hand HOLDS cup2", "--world", "pybullet"], "nobody can make"),
+        (["--both-hands"], "only in the world pybullet"),
         (["--intervene", "after=28 cup9 LOCATION location8"], "did you mean 'cup"),
         (["--intervene", "after=28 remove cup9"], "did you mean 'cup"),
         (["--intervene", "after=28 add Cpu cup9 LOCATION location5"], "did you mean 'Cup'"),
@@ -173,14 +188,9 @@ def test_figure_8_in_pybullet_with_the_cup_really_moved() -> None:
 
 @pytest.mark.slow
 def test_both_hands_in_pybullet_are_faster_and_never_touch() -> None:
-    from sim.together import perform
-    from sim.world import World
-
-    scene = confab.load("beverage-serving")
-    plan = scene.plan().plan
-    with World(scene.embodiment, scene.problem.initial) as world:
-        performed = perform(world, scene.problem, plan.primitives)
-        seen, seconds = world.observe(), world.seconds
-    assert performed.ok
-    assert all(seen.get(symbol) == value for symbol, value in scene.problem.goal.items())
-    assert seconds <= 0.75 * sum(slot.end - slot.begin for slot in performed.slots)
+    execution = confab.load("beverage-serving").execute(world="pybullet", both_hands=True)
+    episode = execution.episode
+    assert execution.reached
+    assert episode.failures == ()
+    assert episode.done == episode.planned
+    assert episode.seconds["simulated"] <= 0.75 * sum(event.end - event.begin for event in episode.events)

@@ -360,3 +360,78 @@ def test_twenty_objects_are_served_whatever_is_moved(tmp_path_factory: pytest.Te
     episode = act(problem, SymbolicWorld(problem), begin, [moved("cup3", "location40", after=step.path)])
     assert episode.status in (End.REACHED, End.IMPOSSIBLE)
     assert all(change.distance < 60 for change in episode.replans)
+
+
+# ------------------------------------------------------------------------------------------------------------- the world itself
+
+
+def test_what_never_came_is_kept() -> None:
+    never = [moved("cup2", "location8", after=999), moved("cup2", "location8", at=1e6)]
+    episode = acted(*never)
+    assert episode.status is End.REACHED
+    assert list(episode.missed) == never
+    assert episode.interventions == ()
+
+
+def test_a_primitive_that_failed_but_did_what_it_should_is_done() -> None:
+    class Grumbling(SymbolicWorld):
+        def execute(self, step: Step) -> Said:
+            said = super().execute(step)
+            return Said(False, "object disturbed", ("bottle1",)) if step.behavior == "B3_GRASP" else said
+
+    episode = act(serving(), Grumbling(serving()), planned())
+    assert episode.status is End.REACHED
+    assert tree(episode.done) == tree(planned())
+    assert [failure.code for failure in episode.failures] == ["object disturbed"] * 4
+
+
+def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
+    tries = iter(range(4))  # each hand fails twice, then somebody has taken the obstacle away
+    episode = failing(
+        lambda step, state: (
+            "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT" and next(tries, None) is not None
+        )
+    )
+    assert episode.status is End.REACHED
+    assert len(episode.failures) == 4
+
+
+class Broken(SymbolicWorld):
+    """A robot whose driver is broken, each time otherwise."""
+
+    def __init__(self, how: str) -> None:
+        super().__init__(serving())
+        self.how = how
+
+    def observe(self) -> State:
+        if self.how == "observe raises" and self.seconds > 3:
+            raise ConnectionError("no camera")
+        return [] if self.how == "observe returns" else super().observe()  # type: ignore[return-value]
+
+    def execute(self, step: Step) -> Said:
+        if self.how == "execute raises" and self.seconds > 3:
+            raise RuntimeError("motor 3 is hot")
+        return None if self.how == "execute returns" else super().execute(step)  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(
+    ("how", "word"),
+    [
+        ("observe raises", "observe() raised ConnectionError: no camera"),
+        ("execute raises", "raised RuntimeError: motor 3 is hot"),
+        ("observe returns", "observe() returned []; wanted a mapping"),
+        ("execute returns", "returned None without ok"),
+    ],
+)
+def test_a_world_that_breaks_ends_the_episode_with_a_clear_reason(how: str, word: str) -> None:
+    episode = act(serving(), Broken(how), planned())
+    assert episode.status is End.GAVE_UP
+    assert word in episode.reasons[-1].text
+    assert len(episode.done.primitives) <= 4
+
+
+def test_everything_is_taken_away() -> None:
+    episode = acted(*(Intervention(Change.REMOVE, individual=one, after=22) for one in OBJECTS))
+    assert episode.status is End.IMPOSSIBLE
+    assert at_rest(episode)
+    assert episode.goal == {}
