@@ -75,7 +75,7 @@ def floor_of(trial: Trial) -> tuple[Rollout, float]:
 
 def plans() -> None:
     """Print the nominal rollouts of the shipped scenes, second robot and table included, beside the stepping floor."""
-    for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving"):
+    for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving", "two-cups"):
         for beads in (True, False):
             rollout, floor = floor_of(case(name, beads=beads))
             ratio = rollout.cpu_seconds / floor

@@ -267,7 +267,7 @@ def _body(facts: _Facts, node: str, shape: str, names: Callable[[str], str]) -> 
             _color(facts, shape),
             facts.number(shape, "friction", 0.8),
         ),
-        facts.number(shape, "servings", 1.0),
+        facts.number(node, "servings", facts.number(shape, "servings", 1.0)),
     )
 
 

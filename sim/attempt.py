@@ -249,20 +249,22 @@ def _free(
     chosen: list[int] = []
     blocked: Counter[str] = Counter()
     best: dict[str, float] = {}
+    widest = -np.inf
     for start in range(0, len(order), BATCH):
         batch = order[start : start + BATCH]
-        free = np.ones(len(batch), dtype=bool)
+        clear = np.full(len(batch), np.inf)
         for name, gap in _gaps(reacher, stages, [q[batch] for q in postures]).items():
-            free &= gap > reacher.margin
+            clear = np.minimum(clear, gap)
             blocked[name] += int(np.sum(gap <= reacher.margin))
             best[name] = max(best.get(name, -np.inf), float(gap.max()))
-        chosen += [int(i) for i in batch[free]]
+        widest = max(widest, float(clear.max()))
+        chosen += [int(i) for i in batch[clear > reacher.margin]]
         if len(chosen) >= ENOUGH:
             break
     if not chosen:
         most = blocked.most_common(1)[0][1]
         blocking = sorted((name for name, count in blocked.items() if count == most), key=best.__getitem__)
-        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=best[blocking[0]])
+        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=widest)
     return chosen
 
 

@@ -59,9 +59,10 @@ def tilt(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[st
     serving = world.embodiment.fillings[filling].serving if filling is not None else 1
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
     had, got = world.inside(source), world.inside(target)
+    enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
     servo.turn(numbers["hold_back"], numbers["fast"])
     if world.beads:
-        servo.meter(numbers, lambda: (had - world.inside(source)) / serving)
+        servo.meter(numbers, enough, lambda: (had - world.inside(source)) / serving)
     else:
         servo.turn(numbers["pour_angle"], numbers["fast"])
     steepest = servo.angle
@@ -216,14 +217,14 @@ class _Servo:
                 self.world.check_course(self.hand)
         raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
-    def meter(self, numbers: Numbers, poured: Callable[[], float]) -> None:
-        """Turn on slowly while nothing flows and wait while it does, until enough is `poured` or patience ends."""
+    def meter(self, numbers: Numbers, enough: float, poured: Callable[[], float]) -> None:
+        """Turn on slowly while nothing flows and wait while it does, until `enough` is `poured` or patience ends."""
         before, flowing, still = 0.0, 0, 0
         for step in range(LONGEST):
             now = poured() if step % 4 == 3 else before
             flowing = round(numbers["flow"] / self.tick) if now > before else flowing - 1
             before, still = now, still + 1 if flowing <= 0 and self.angle == numbers["pour_angle"] else 0
-            if now >= numbers["cut_off"] or still > numbers["wait"] / self.tick:
+            if now >= enough or still > numbers["wait"] / self.tick:
                 return
             self._approach(numbers["pour_angle"], numbers["slow"] if flowing <= 0 else 0.0)
             if step % PATIENCE == 0:

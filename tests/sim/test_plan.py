@@ -38,6 +38,15 @@ def test_another_robot_at_another_table_serves_without_a_change_of_python() -> N
     assert rollout.poured == (1.0,)
 
 
+def test_a_bottle_of_three_servings_fills_two_cups() -> None:
+    one = case("two-cups")
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
+    assert rollout.failure is None
+    assert rollout.poured == (1.0, 1.0)
+    assert max(report.verdict.measured.get("poured", 0.0) for report in rollout.steps) < 1.5
+    assert dict(rollout.state) == dict(one.expected[-1])
+
+
 @pytest.mark.slow
 def test_the_plan_after_the_user_moved_a_cup_verifies_with_the_same_result_in_another_process(moved: Case) -> None:
     rollout = verify(moved.embodiment, moved.initial, moved.steps, moved.expected, seed=5)
