@@ -69,7 +69,7 @@ class LiveWorld:
         try:
             verdict = self.world.execute(step)
         finally:
-            self.concerned = set()
+            self.concerned, self.world.elsewhere = set(), set()
         if not verdict.ok:
             self._regard_grips()
         return verdict
@@ -125,14 +125,10 @@ class LiveWorld:
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
             self._interfere(intervention)
-            happened = happened or self._concerns(intervention)
+            self.world.elsewhere = self.world.elsewhere | _named(intervention)  # the hand isn't to blame for that
+            happened = happened or not _named(intervention).isdisjoint(self.concerned)
         if happened:
             raise SkillError("interrupted", tuple(sorted(self.concerned)), "somebody interfered with what it concerns")
-
-    def _concerns(self, intervention: Intervention) -> bool:
-        named = {intervention.individual, *(f.symbol.arguments[0] for f in intervention.facts)}
-        named |= {fact.value for fact in intervention.facts}
-        return not named.isdisjoint(self.concerned)
 
     def _interfere(self, intervention: Intervention) -> None:
         if intervention.change is Change.REMOVE:
@@ -166,6 +162,12 @@ class LiveWorld:
         """Return what an object of a class looks like: the first of this scene that has a shape."""
         bodies = self.world.embodiment.bodies
         return next((bodies[one] for one in self.classes.get(kind, ()) if one in bodies), None)
+
+
+def _named(intervention: Intervention) -> set[str]:
+    """Return what an intervention names: what is moved or changed, and what it becomes."""
+    named = {intervention.individual, *(fact.symbol.arguments[0] for fact in intervention.facts)}
+    return named | {fact.value for fact in intervention.facts}
 
 
 def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
