@@ -4,7 +4,7 @@
     CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
     CONFAB_ALL=1 …                                   every problem, not only four per folder
-    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``)
+    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``)
 
 Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and ``…/pNN.pddl``, the problems
 beside the domain or one folder below it. What a run gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem
@@ -62,15 +62,19 @@ def main() -> None:
         print(f"no problems in {folder}; name a folder with CONFAB_PDDL")
         return
     python = peers()
-    coverage(found, {name: command for name, command in planners(python).items() if name in wanted()})
+    commands = {name: command for name, command in planners(python).items() if name in wanted()}
+    if commands:
+        coverage(found, commands)
     if "grounding" in wanted():
         grounding(found, python)
+    if "read-back" in wanted():
+        read_back(python)
 
 
 def wanted() -> list[str]:
     """Return the planners to run: all, or those that CONFAB_PLANNERS names."""
     named = os.environ.get("CONFAB_PLANNERS")
-    return named.split(",") if named else ["confab", "confab-fast", "pyperplan", "lama-first", "grounding"]
+    return named.split(",") if named else ["confab", "confab-fast", "pyperplan", "lama-first", "grounding", "read-back"]
 
 
 def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
@@ -274,6 +278,33 @@ def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
             name = problem.relative_to(problem.parents[2])
             said = f"{theirs:.2f} | {theirs / seconds:.1f}" if match else f"more than {SECONDS} | –"
             print(f"| {name} | {operators} | {seconds:.3f} | {said} |", flush=True)
+
+
+def read_back(python: str) -> None:
+    """Print what becomes of Fast Downward's plan for a scene's primitive level: checked symbolically, then in physics."""
+    import confab
+    from confab.pddl_commands import read_pddl_plan
+    from planner.validation import validate
+
+    command, program = planners(python)["lama-first"], [str(Path(sys.executable).parent / "confab")]
+    print("\nPrimitive level exported, planned by Fast Downward (lama-first), read back\n")
+    print("| scene | steps | validated | in physics |\n|---|---|---|---|")
+    for scene in ("beverage-serving", "beverage-serving-moved", "one-arm-serving"):
+        with tempfile.TemporaryDirectory() as folder:
+            place, file = Path(folder), Path(folder) / "downward.plan"
+            subprocess.run([*program, "export", scene, "-o", folder], cwd=ROOT, check=True, capture_output=True)
+            steps = run(command, place / "domain.pddl", place / "problem.pddl").plan
+            if steps is None:
+                print(f"| {scene} | no plan | | |")
+                continue
+            file.write_text("".join(f"({step})\n" for step in steps))
+            problem = confab.load(scene).problem
+            faults = validate(problem, read_pddl_plan(problem, None, file.read_text(), regroup=True))
+            done = subprocess.run(
+                [*program, "verify", scene, str(file)], cwd=ROOT, check=False, capture_output=True, text=True
+            )
+            said = done.stdout.partition("\n")[0] or done.stderr.strip()
+            print(f"| {scene} | {len(steps)} | {'no: ' + str(faults[0]) if faults else 'yes'} | {said} |", flush=True)
 
 
 def _solve(domain: str, problem: str, target: str, fast: bool) -> None:

@@ -72,6 +72,7 @@ TimeLimit = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Gui = Annotated[bool, typer.Option("--gui", help="Show the first rollout in a window; needs a screen.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where files are written.")]
 
 
@@ -120,11 +121,12 @@ def run(
     seed: Seed = 0,
     out: Out = Path("confab-out"),
     no_video: Annotated[bool, typer.Option("--no-video", help="Don't film: faster.")] = False,
+    gui: Gui = False,
 ) -> None:
     """Do the main job: validate, plan, verify in physics, learn, report."""
     from confab.running import run as run_all
 
-    raise typer.Exit(run_all(scene, memory, mode, seed, out, film=not no_video))
+    raise typer.Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
 
 
 @app.command()
@@ -142,6 +144,7 @@ def verify(
     ] = "1",
     perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
     video: Annotated[Path | None, typer.Option("--video", metavar="OUT.mp4", help="Film the first rollout.")] = None,
+    gui: Gui = False,
     as_json: AsJson = False,
 ) -> None:
     """Let a robot carry out a plan in physics, and check every primitive there."""
@@ -151,7 +154,7 @@ def verify(
     loaded = load(scene)
     with counted(rollouts) as done:
         report = loaded.verify(
-            _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done
+            _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
         )
     _print(report.json() if as_json else report)
     raise typer.Exit(YES if report.verified else NO)
@@ -493,7 +496,7 @@ def _plan(path: Path, scene: Scene) -> Plan:
     from confab.pddl_commands import read_pddl_plan
 
     try:
-        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"))
+        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"), regroup=True)
     except (KnowledgeError, UnicodeDecodeError) as error:
         raise KnowledgeError(f"{path}: {error}") from error
 

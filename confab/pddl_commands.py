@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
+from typing import TypeAlias
 
+from planner.behaviors import Model, Values
+from planner.grounding import ground
 from planner.plan import Plan, Step
+from planner.task import Task
+from planner.windows import regrouped
 from reasoner.graph import KnowledgeError
 from reasoner.pddl_export import plan_of, to_pddl
 from reasoner.pddl_import import imported
 from reasoner.pddl_syntax import PddlError, parse_files
-from reasoner.symbols import Problem
+from reasoner.symbols import GroundBehavior, Problem
 from reasoner.turtle import turtle
+
+Ground: TypeAlias = tuple[str, tuple[str, ...]]
+"""A behaviour with its arguments."""
 
 
 def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Problem:
@@ -55,8 +64,14 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     return paths
 
 
-def read_pddl_plan(problem: Problem, level: int | None, text: str) -> Plan:
+def read_pddl_plan(problem: Problem, level: int | None, text: str, regroup: bool = False) -> Plan:
     """Read a plan that another planner found for the export of a level, as a plan of ours.
+
+    A planner without hierarchy interleaves steps that don't depend on one another as it happens: one hand waits at a place
+    where the other has to go. With `regroup` each step stands behind the latest that it depends on.
+
+    What a behaviour's variables stand for (the object that is grasped) follows from the state before it, and is what a robot
+    has to be told; behind a step that isn't applicable it is left open, and validation says so.
 
     Raises
     ------
@@ -68,11 +83,37 @@ def read_pddl_plan(problem: Problem, level: int | None, text: str) -> Plan:
         found = plan_of(to_pddl(problem, level), text)
     except ValueError as error:
         raise KnowledgeError(str(error)) from error
-    steps = (
-        Step((i,), problem.id_of(behavior, arguments), level, behavior, arguments)
-        for i, (behavior, arguments) in enumerate(found)
-    )
+    if regroup:
+        found = _regrouped(problem, level, found)
+    model = Model(problem)
+    values: Values | None = model.values(problem.initial)
+    steps = []
+    for i, (behavior, arguments) in enumerate(found):
+        number = problem.id_of(behavior, arguments)
+        applied = model.apply(GroundBehavior(number, behavior, arguments), values) if values is not None else None
+        steps.append(Step((i,), number, level, behavior, arguments, applied.bindings if applied else {}))
+        values = applied.after if applied else None
     return Plan(tuple(steps))
+
+
+def _regrouped(problem: Problem, level: int, plan: list[Ground]) -> list[Ground]:
+    """Return the steps regrouped; as they are, if they don't lead to the goal."""
+    task = ground(problem, level)
+    if not isinstance(task, Task):
+        return plan
+    wanted, operators = set(plan), defaultdict(list)
+    for operator in range(len(task)):
+        step = task.describe(operator)[:2]
+        if step in wanted:
+            operators[step].append(operator)
+    state, chosen = task.initial, []
+    for step in plan:
+        after = next(((o, s) for o in operators[step] if (s := task.applied(state, o)) is not None), None)
+        if after is None:
+            return plan
+        chosen.append(after[0])
+        state = after[1]
+    return [task.describe(operator)[:2] for operator in regrouped(task, chosen)]
 
 
 def _write(path: Path, text: str) -> None:

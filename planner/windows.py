@@ -50,8 +50,8 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     while True:
         before = len(best)
         for size in SIZES:
-            for order in (list, windows.regrouped):
-                best = windows.pass_over(order(best), size)
+            best = windows.pass_over(best, size)
+            best = windows.pass_over(regrouped(task, best), size)
         best = shortened(task, best, deadline)
         if len(best) == before or windows.over:
             return best
@@ -79,6 +79,82 @@ def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) ->
     return plan
 
 
+def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
+    """Return a plan's steps in an order in which a step stands behind the latest that it depends on, as far as that leads on.
+
+    Steps that depend on one another, or of which one would undo what the other needs, keep their order.
+    """
+    n = len(plan)
+    states = _states(task, plan)
+    after: list[set[int]] = [set() for _ in range(n)]
+    setter: dict[int, int] = {}
+    readers: dict[int, list[int]] = {}
+    clearer: dict[int, int] = {}
+    causes: list[set[int]] = [set() for _ in range(n)]
+    for i, operator in enumerate(plan):
+        precondition, changes = task.known(operator)
+        need, clear, set_ = precondition, 0, 0
+        for when, c, s in changes:
+            if states[i] & when == when:
+                need |= when
+                clear |= c
+                set_ |= s
+        for bit in _bits(need):
+            if bit in setter:
+                after[setter[bit]].add(i)
+                causes[i].add(setter[bit])
+            readers.setdefault(bit, []).append(i)
+        for bit in _bits(clear):
+            for r in readers.pop(bit, ()):
+                if r != i:
+                    after[r].add(i)
+            if bit in setter and setter[bit] != i:
+                after[setter[bit]].add(i)
+            clearer[bit] = i
+        for bit in _bits(set_):
+            if bit in clearer and clearer[bit] != i:
+                after[clearer[bit]].add(i)
+            setter[bit] = i
+    open_ = [0] * n
+    for followers in after:
+        for f in followers:
+            open_[f] += 1
+    ready = [i for i in range(n) if not open_[i]]
+    placed: dict[int, int] = {}
+    order: list[int] = []
+    while ready:
+        i = max(ready, key=lambda i: (max((placed[c] for c in causes[i]), default=-1), -i))
+        ready.remove(i)
+        placed[i] = len(order)
+        order.append(i)
+        for f in after[i]:
+            open_[f] -= 1
+            if not open_[f]:
+                ready.append(f)
+    found = [plan[i] for i in order]
+    return found if _leads(task, task.initial, found) else list(plan)
+
+
+def _states(task: Task, plan: Sequence[int]) -> list[int]:
+    """Return the states that a plan goes through."""
+    found = [task.initial]
+    for operator in plan:
+        after = task.applied(found[-1], operator)
+        assert after is not None
+        found.append(after)
+    return found
+
+
+def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
+    """Return whether a plan leads from a state to the goal."""
+    for operator in plan:
+        after = task.applied(state, operator)
+        if after is None:
+            return False
+        state = after
+    return state & task.goal == task.goal
+
+
 @dataclass
 class _Windows:
     """What the windows of one task share; `work` counts down."""
@@ -96,14 +172,14 @@ class _Windows:
 
     def pass_over(self, plan: list[int], size: int) -> list[int]:
         """Return the plan after one pass of windows, half overlapping."""
-        states, needed = self.states(plan), self.needed(plan)
+        states, needed = _states(self.task, plan), self.needed(plan)
         start = 0
         while start < len(plan) - 1 and not self.over:
             end = min(start + size, len(plan))
             found = self.replacement(plan[start:end], states[start], needed[end] & states[end])
-            if found is not None and self.leads(states[start], [*found, *plan[end:]]):
+            if found is not None and _leads(self.task, states[start], [*found, *plan[end:]]):
                 plan[start:end] = found
-                states, needed = self.states(plan), self.needed(plan)
+                states, needed = _states(self.task, plan), self.needed(plan)
                 start = max(0, start - size // 2)
                 continue
             if end == len(plan):
@@ -111,27 +187,9 @@ class _Windows:
             start += size // 2
         return plan
 
-    def states(self, plan: Sequence[int]) -> list[int]:
-        """Return the states that a plan goes through."""
-        found = [self.task.initial]
-        for operator in plan:
-            after = self.task.applied(found[-1], operator)
-            assert after is not None
-            found.append(after)
-        return found
-
-    def leads(self, state: int, plan: Sequence[int]) -> bool:
-        """Return whether a plan leads from a state to the goal."""
-        for operator in plan:
-            after = self.task.applied(state, operator)
-            if after is None:
-                return False
-            state = after
-        return state & self.task.goal == self.task.goal
-
     def needed(self, plan: Sequence[int]) -> list[int]:
         """Return for each position the bits that the steps from there on need, the goal included."""
-        states = self.states(plan)
+        states = _states(self.task, plan)
         wanted = self.task.goal
         found = [wanted]
         for state, operator in zip(reversed(states[:-1]), reversed(plan), strict=True):
@@ -289,59 +347,6 @@ class _Windows:
     def beside(self) -> list[int]:
         """The relaxed operators that are conditional effects or derived bits."""
         return list(range(len(self.task), len(self.task.owners)))
-
-    def regrouped(self, plan: list[int]) -> list[int]:
-        """Return the plan's steps in an order in which a step follows one that it depends on, if that leads to the goal."""
-        n = len(plan)
-        states = self.states(plan)
-        after: list[set[int]] = [set() for _ in range(n)]
-        setter: dict[int, int] = {}
-        readers: dict[int, list[int]] = {}
-        clearer: dict[int, int] = {}
-        causes: list[set[int]] = [set() for _ in range(n)]
-        for i, operator in enumerate(plan):
-            precondition, changes = self.task.known(operator)
-            need, clear, set_ = precondition, 0, 0
-            for when, c, s in changes:
-                if states[i] & when == when:
-                    need |= when
-                    clear |= c
-                    set_ |= s
-            for bit in _bits(need):
-                if bit in setter:
-                    after[setter[bit]].add(i)
-                    causes[i].add(setter[bit])
-                readers.setdefault(bit, []).append(i)
-            for bit in _bits(clear):
-                for r in readers.pop(bit, ()):
-                    if r != i:
-                        after[r].add(i)
-                if bit in setter and setter[bit] != i:
-                    after[setter[bit]].add(i)
-                clearer[bit] = i
-            for bit in _bits(set_):
-                if bit in clearer and clearer[bit] != i:
-                    after[clearer[bit]].add(i)
-                setter[bit] = i
-        self.work -= sum(map(len, after))
-        open_ = [0] * n
-        for followers in after:
-            for f in followers:
-                open_[f] += 1
-        ready = [i for i in range(n) if not open_[i]]
-        placed: dict[int, int] = {}
-        order: list[int] = []
-        while ready:
-            i = max(ready, key=lambda i: (max((placed[c] for c in causes[i]), default=-1), -i))
-            ready.remove(i)
-            placed[i] = len(order)
-            order.append(i)
-            for f in after[i]:
-                open_[f] -= 1
-                if not open_[f]:
-                    ready.append(f)
-        found = [plan[i] for i in order]
-        return found if self.leads(self.task.initial, found) else list(plan)
 
 
 def _bits(mask: int) -> list[int]:
