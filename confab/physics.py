@@ -125,6 +125,7 @@ def verify(
     workers: int | str = 1,
     done: Done | None = None,
     goal: State | None = None,
+    gui: bool = False,
 ) -> Report:
     """Carry out the primitives of a plan in PyBullet, once or with several seeds.
 
@@ -147,11 +148,13 @@ def verify(
         Called with each rollout that is done.
     goal
         What shall be seen in the end; the scene's goal if left out.
+    gui
+        Show the first rollout on the screen, no faster than the simulated time.
 
     Raises
     ------
     KnowledgeError
-        The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers.
+        The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers or no screen.
     """
     steps = plan.primitives
     require_skills(scene, [step.behavior for step in steps])
@@ -167,8 +170,8 @@ def verify(
         )
         seeds = list(range(seed, seed + rollouts))
         finished: list[Rollout] = []
-        if video is not None:
-            finished.append(_filmed(trial, seeds.pop(0), video, plan, progress))
+        if video is not None or gui:
+            finished.append(_shown(trial, seeds.pop(0), video, plan, progress, gui))
         elif rollouts == 1 and str(workers) == "1":
             finished.append(trial.run(seeds.pop(0), progress=progress))
         if finished and done is not None:
@@ -194,15 +197,36 @@ def require_skills(scene: Scene, behaviors: Iterable[str]) -> None:
         )
 
 
-def _filmed(
-    trial: Trial, seed: int, video: Path, plan: Plan, progress: Callable[[int, PrimitiveStep], None] | None
+def _shown(
+    trial: Trial,
+    seed: int,
+    video: Path | None,
+    plan: Plan,
+    progress: Callable[[int, PrimitiveStep], None] | None,
+    gui: bool,
 ) -> Rollout:
+    """Return the rollout of a seed that is filmed, or shown on the screen, or both."""
+    watching: list[Callable[[World], None]] = []
+
+    def watch(world: World) -> None:
+        for one in watching:
+            one(world)
+
+    if gui:
+        from sim.screen import Screen, require_screen
+
+        require_screen()
+        watching.append(Screen(tuple(str(step) for step in plan.primitives)))
+    if video is None:
+        return trial.run(seed, watch, progress, gui)
+
     from sim.film import Film
 
     titles = {step.path: str(step) for step in plan.walk() if step.steps}
     video.parent.mkdir(parents=True, exist_ok=True)
     with Film(video, plan.primitives, titles, stills=video.with_suffix("")) as film:
-        return trial.run(seed, film, progress)
+        watching.append(film)
+        return trial.run(seed, watch, progress, gui)
 
 
 def progress_bar() -> Progress:

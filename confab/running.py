@@ -18,7 +18,7 @@ from reasoner.validate import validate
 YES, NO, GAVE_UP = 0, 1, 3
 
 
-def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool) -> int:
+def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool, gui: bool = False) -> int:
     """Do the main job on a scene and say on stdout what came of it; files go to `out`.
 
     Returns
@@ -45,7 +45,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     if result.outcome.plan is None:
         console.print(result)
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
-    report = verified(scene, result, seed, out / "run.mp4" if film else None)
+    report = verified(scene, result, seed, out / "run.mp4" if film else None, gui)
     console.print(report)
     assert_observed(scene.knowledge, report.rollouts[0].state, scene.names)
     if report.verified:
@@ -55,7 +55,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     return YES if report.verified else NO
 
 
-def verified(scene: Scene, result: Result, seed: int, video: Path | None) -> Report:
+def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: bool = False) -> Report:
     """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
     steps = result.plan.primitives
     with progress_bar() as bar:
@@ -64,6 +64,7 @@ def verified(scene: Scene, result: Result, seed: int, video: Path | None) -> Rep
             result.plan,
             seed=seed,
             video=video,
+            gui=gui,
             progress=lambda done, step: bar.update(task, completed=done, description=str(step)),
         )
 

@@ -48,6 +48,7 @@ class Trial:
         seed: int,
         watch: Callable[[World], None] | None = None,
         progress: Callable[[int, Step], None] | None = None,
+        gui: bool = False,
     ) -> Rollout:
         """Return the rollout of a seed, carried out here and now."""
         return verify(
@@ -62,6 +63,7 @@ class Trial:
             prepare=self.prepare,
             watch=watch,
             progress=progress,
+            gui=gui,
         )
 
 

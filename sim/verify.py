@@ -96,6 +96,7 @@ def verify(
     prepare: Callable[[World], None] | None = None,
     watch: Callable[[World], None] | None = None,
     progress: Callable[[int, Step], None] | None = None,
+    gui: bool = False,
 ) -> Rollout:
     """Carry out the primitives of a plan in a new world until one fails.
 
@@ -115,6 +116,8 @@ def verify(
         Called with the world after every simulation step: a `sim.film.Film`, say.
     progress : callable, optional
         Called with the number of steps done and the step that is done next.
+    gui : bool
+        Show the world in PyBullet's window.
 
     Returns
     -------
@@ -123,7 +126,7 @@ def verify(
     """
     begin = time.process_time()
     reports: list[StepReport] = []
-    with World(embodiment, initial, seed, perturb, beads, noise, watch) as world:
+    with World(embodiment, initial, seed, perturb, beads, noise, watch, gui) as world:
         if prepare is not None:
             prepare(world)
         for number, (step, state) in enumerate(zip(steps, expected, strict=True)):

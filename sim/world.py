@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pybullet
@@ -119,6 +119,8 @@ class World:
         Standard deviation in metres of perceived positions.
     watch : callable, optional
         Called with the world after every step of the simulation, for filming.
+    gui : bool
+        Open PyBullet's window (`sim.screen.require_screen` first: where there is no screen PyBullet ends the process).
     """
 
     def __init__(
@@ -130,10 +132,11 @@ class World:
         beads: bool = True,
         noise: float = 0.0,
         watch: Callable[[World], None] | None = None,
+        gui: bool = False,
     ) -> None:
         self.embodiment, self.symbols = embodiment, [s for s in initial if s.situation in embodiment.perceivers]
         self.rng = np.random.default_rng(seed)
-        self.perturb, self.noise = perturb, noise
+        self.perturb, self.noise, self.gui = perturb, noise, gui
         self.watch: Callable[[World], None] | None = None
         self.steps, self.current, self.clock = 0, -1, Clock()
         self.bodies: dict[str, Thing] = {}
@@ -141,7 +144,7 @@ class World:
         self.spilled: set[int] = set()
         self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
         self.disturb: Callable[[World], None] | None = None
-        self.client = pybullet.connect(pybullet.DIRECT)
+        self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
             raise RuntimeError("PyBullet could not start a physics server")
         pybullet.setGravity(0, 0, -9.81, physicsClientId=self.client)
@@ -227,15 +230,16 @@ class World:
         return shape, position, yaw
 
     def _pour_in(self, name: str, filling: str) -> None:
-        """Let a vessel's beads go just above its bottom."""
+        """Let a vessel's beads go just above its bottom; PyBullet shows them only in a window."""
         kind = self.embodiment.fillings[filling]
         share = 1.0 if self.perturb is None else float(self.rng.uniform(*self.perturb.fill))
         count = round(kind.serving * self.embodiment.bodies[name].servings * share)
         rotation, base = self.truth(name)
         collision = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=kind.radius, physicsClientId=self.client)
-        speck = pybullet.createVisualShape(
-            pybullet.GEOM_MESH, vertices=SPECK, indices=[0, 1, 2], physicsClientId=self.client
-        )
+        look: dict[str, Any] = {"shapeType": pybullet.GEOM_MESH, "vertices": SPECK, "indices": [0, 1, 2]}
+        if self.gui:
+            look = {"shapeType": pybullet.GEOM_SPHERE, "radius": kind.radius, "rgbaColor": kind.color}
+        speck = pybullet.createVisualShape(**look, physicsClientId=self.client)
         for spot in packed(self.bodies[name].shape, count, kind.radius):
             bead = pybullet.createMultiBody(
                 kind.mass,

@@ -1,8 +1,11 @@
 """The main job in physics: verified where it should be, and told where and why it isn't."""
 
 import json
+import sys
+import time
 from pathlib import Path
 
+import pybullet
 import pytest
 
 import confab
@@ -89,3 +92,44 @@ def test_a_scene_that_is_symbolic_only_is_refused_by_name(tmp_path: Path) -> Non
 
 def _without_clock(rollout: Rollout) -> dict[str, object]:
     return {key: value for key, value in rollout.as_json().items() if key != "cpu_seconds"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a screen")
+@pytest.mark.parametrize(
+    ("display", "said"), [(None, "DISPLAY isn't set"), (":987", "':987' doesn't answer|libX11 is missing")]
+)
+def test_where_there_is_no_screen_a_window_is_refused_in_one_line(
+    display: str | None, said: str, scene: confab.Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    if display is not None:
+        monkeypatch.setenv("DISPLAY", display)
+    with pytest.raises(confab.KnowledgeError, match=said) as error:
+        scene.plan().verify(gui=True, video=tmp_path / "films" / "run.mp4")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "films").exists()
+
+
+def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
+    scene: confab.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a window, PyBullet's server refuses to draw; what is asked of it can be seen all the same."""
+    from sim.screen import Screen
+    from sim.world import World
+
+    written: list[str] = []
+
+    def write(text: str, position: list[float], **options: object) -> int:
+        written.append(text)
+        return 7
+
+    monkeypatch.setattr("sim.screen.pybullet.addUserDebugText", write)
+    monkeypatch.setattr("sim.world.pybullet.GUI", pybullet.DIRECT)
+    begin = time.monotonic()
+    with World(scene.embodiment, scene.problem.initial, watch=Screen(("REACH", "GRASP"), 4.0), gui=True) as world:
+        for world.current in (0, 1):
+            world.run(120)
+        looks = [pybullet.getVisualShapeData(bead.body, physicsClientId=world.client)[0] for bead in world.beads]
+    assert {look[2] for look in looks} == {pybullet.GEOM_SPHERE}
+    assert written == ["REACH", "GRASP"]
+    assert time.monotonic() - begin >= 0.24
