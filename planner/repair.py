@@ -30,16 +30,6 @@ RESTING = Effort(depth=6, expansions=400)
 CLOSE = 1.1
 """A repair that costs more than replanning by more than this factor gives way to it."""
 
-NEAR = 1.05
-"""A repair within this factor of the least that its goals can cost is taken without comparing it with replanning."""
-
-SHORT = 64.0
-"""A repair that costs no more than this is always compared: a detour weighs much, and replanning takes little.
-
-So is one after a change of what is wanted: a step that was needed before may now be left out. Where something has only been
-added, it may be in the way and opens none: there what was needed still is, and no comparison is needed.
-"""
-
 MOST = 5_000
 """So many expansions a repair may take, before the whole is planned anew."""
 
@@ -96,9 +86,8 @@ def mend(
     begin = perf_counter()
     using = using or compiled(problem)
     repaired = repair(problem, rest, planned, using, in_progress, limits)
-    short = 0.0 if _only_more(planned, problem) else SHORT
-    needed = planned.goal == problem.goal  # else what was needed before isn't known to be
-    if repaired is not None and needed and short < repaired.cost <= NEAR * repaired.least:
+    fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
+    if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
     anew, outcome = replan(problem, planner, using, limits)
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
@@ -154,11 +143,6 @@ def changed_individuals(planned: Problem, now: Problem) -> set[str]:
             if was != is_:
                 touched.update((*symbol.arguments, was, is_))
     return touched
-
-
-def _only_more(planned: Problem, now: Problem) -> bool:
-    """Whether a situation differs from the one that was planned for only by what is new in it."""
-    return all(now.initial.get(symbol) == value for symbol, value in planned.initial.items())
 
 
 def replan(
