@@ -496,7 +496,7 @@ def _plan(path: Path, scene: Scene) -> Plan:
     from confab.pddl_commands import read_pddl_plan
 
     try:
-        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"))
+        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"), regroup=True)
     except (KnowledgeError, UnicodeDecodeError) as error:
         raise KnowledgeError(f"{path}: {error}") from error
 
