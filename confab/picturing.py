@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from reasoner.graph import KnowledgeError, text
 from reasoner.names import local_name
 from reasoner.quantify import behavior_named
+from reasoner.reach import reach_relation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from confab.scene import Scene
 
 KINDS = (".png", ".svg", ".pdf")
+REACHED, UNREACHED = (30, 140, 60), (200, 40, 40)
 GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"
 PARTS = """SELECT DISTINCT ?behavior ?part ?label WHERE {{
   ?behavior :{property} ?part . OPTIONAL {{ ?part rdfs:label ?label }}
@@ -32,7 +34,7 @@ SITUATIONS = (
 
 
 def draw(scene: Scene, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
-    """Draw a picture into a file and return which: by default the table with its places, as physics sets it up.
+    """Draw a picture into a file and return which: by default the table with its places and who reaches them.
 
     Parameters
     ----------
@@ -161,15 +163,18 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
 
 
 def _table(scene: Scene, path: Path) -> Path:
-    """Take a picture of the world as it begins, with the names of the places at their spots."""
+    """Take a picture of the world as it begins, with the places, and who reaches those that not every hand does."""
     import numpy as np
     from PIL import Image, ImageDraw, ImageFont
 
+    from confab.reaching import with_reach
     from sim.picture import hide_vessels, picture, view_of
     from sim.world import World
 
     if not scene.embodiment.places:
         raise KnowledgeError(f"{scene.iri} has no places with coordinates, so there is no table to show")
+    scene = with_reach(scene)
+    reached = scene.problem.relations.get(local_name(reach_relation(scene.knowledge)), frozenset())
     try:
         world = World(scene.embodiment, scene.problem.initial)
     except (ValueError, RuntimeError) as error:
@@ -178,13 +183,17 @@ def _table(scene: Scene, path: Path) -> Path:
         camera = view_of(scene.embodiment, 800, 448)
         hide_vessels(world)
         image = Image.fromarray(picture(world, camera))
+    every = [hand for robot in scene.embodiment.robots for hand in robot.hands]
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     for place in scene.embodiment.places.values():
         right, up, ahead = camera.axes @ (np.array(place.position) - np.array(camera.eye))
-        x, y = 400 + camera.focal * right / ahead, 224 - camera.focal * up / ahead
-        width = pen.textlength(place.name, font=font)
-        pen.ellipse((x - 3, y - 3, x + 3, y + 3), fill=(245, 150, 40))
-        pen.rectangle((x - width / 2 - 3, y + 5, x + width / 2 + 3, y + 21), fill=(250, 251, 253))
-        pen.text((x - width / 2, y + 6), place.name, font=font, fill=(30, 36, 46))
-    image.quantize(128).save(path)
+        x, y = camera.width / 2 + camera.focal * right / ahead, camera.height / 2 - camera.focal * up / ahead
+        hands = sorted(hand for hand, *rest in reached if rest == [place.name])
+        who = ", ".join(hands) if len(hands) < len(every) else ""
+        words = f"{place.name}: {who or 'no hand'}" if who or not hands else place.name
+        pen.ellipse((x - 4, y - 4, x + 4, y + 4), fill=REACHED if hands else UNREACHED)
+        width = pen.textlength(words, font=font)
+        pen.rectangle((x - width / 2 - 3, y + 6, x + width / 2 + 3, y + 22), fill=(250, 251, 253))
+        pen.text((x - width / 2, y + 7), words, font=font, fill=(30, 36, 46))
+    image.quantize(255, dither=Image.Dither.NONE).save(path, optimize=True)
     return path
