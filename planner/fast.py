@@ -17,7 +17,7 @@ flat search             the rest, until a limit comes                   `planner
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from time import perf_counter
 
@@ -49,6 +49,7 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
+    watch: Callable[[], None] | None = None,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
 
@@ -62,13 +63,15 @@ def plan(
         How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
     using : Compiled, optional
         From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
+    watch : callable, optional
+        Told when the first level has been tried in vain, before proofs and lower levels begin.
 
     Returns
     -------
     Outcome
     """
     with paused_collection():
-        return _plan(problem, advice, limits, improve, using)
+        return _plan(problem, advice, limits, improve, using, watch)
 
 
 @contextmanager
@@ -83,10 +86,18 @@ def paused_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _plan(problem: Problem, advice: Advice | None, limits: Limits, improve: int, using: Compiled | None) -> Outcome:
+def _plan(
+    problem: Problem,
+    advice: Advice | None,
+    limits: Limits,
+    improve: int,
+    using: Compiled | None,
+    watch: Callable[[], None] | None,
+) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
+    call.watch = watch
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         seconds, cache = perf_counter() - begin, call.refiner
@@ -107,6 +118,9 @@ def _plan(problem: Problem, advice: Advice | None, limits: Limits, improve: int,
     except LimitError as limit:
         return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
     call.fallbacks += 1
+    if call.too_large is not None:
+        text = f"goals in series found no plan, and {call.too_large.text}"
+        return outcome(Status.GAVE_UP, reason=Reason(text))
     return outcome(*last_resort(problem, limits, deadline))
 
 

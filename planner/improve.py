@@ -10,22 +10,21 @@ cluster  steps close together that change the same symbols, or one of which take
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, product
+from itertools import groupby
 
 from planner.exhaust import Space, TooLargeError
 from planner.lifted import Done, Refiner, Template
+from planner.nearby import world
 from planner.segments import Ground, LimitError
-from planner.table import Cell, Key, arguments_of, key_of
+from planner.table import Cell, arguments_of, key_of
 from reasoner.symbols import Problem, Symbol
 
 REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
 LARGEST = 7
 """So many steps a cluster has at most."""
-ALWAYS = 4
-"""Classes of so few individuals (the hands) are part of every cluster's world."""
 OPERATORS, STATES = 400, 5_000
 """The largest world in which a cluster is planned anew, the states for each cluster allowed."""
 WORK, WHOLE_WORK, PER_OPERATOR = 1_200_000, 1_700_000, 4_000
@@ -339,32 +338,7 @@ class Improver:
     ) -> Template | None:
         """Return a shortest way to make these changes in a world of these individuals and the few that are always there."""
         self.clusters_left -= 1
-        problem = self.segments.program.problem
-        inside = {*roles, *self.segments.program.named}
-        classes = {
-            kind: members if len(members) <= ALWAYS else tuple(m for m in members if m in inside)
-            for kind, members in problem.classes.items()
-        }
-        inside.update(*classes.values())
-        initial = {
-            symbol: value
-            for symbol, value in self._around(problem, inside)
-            if problem.domain.situations[symbol.situation].level <= level
-        }
-        goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in initial.items()}
-        small = replace(problem, classes=classes, initial=initial, goal=goal)
-        steps = self._shortest(small, level, self.states, old)
+        small = world(self.segments.program, self.table, level, set(roles))
+        goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in small.initial.items()}
+        steps = self._shortest(replace(small, goal=goal), level, self.states, old)
         return self.refiner.template(steps, roles) if steps else None
-
-    def _around(self, problem: Problem, inside: set[str]) -> Iterator[tuple[Symbol, str]]:
-        """Yield the facts that hold now between individuals of a small world."""
-        for situation, cells in self.table.now.items():
-            for key in self._keys(problem, situation, inside):
-                if key in cells:
-                    yield Symbol(situation, arguments_of(key)), cells[key]
-
-    def _keys(self, problem: Problem, situation: str, inside: set[str]) -> Iterator[Key]:
-        kinds = problem.domain.situations[situation].arguments
-        choices = [sorted(inside & self.segments.program.members.get(kind, frozenset())) for kind in kinds]
-        for arguments in product(*choices):
-            yield key_of(arguments)

@@ -24,6 +24,7 @@ from planner.fast import plan as fast_plan
 from planner.grounding import OutOfTimeError, ground
 from planner.grounding import TooLargeError as GroundingTooLargeError
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from planner.serialise import closed, refusal
 from planner.task import Task
 from reasoner.symbols import Problem
 
@@ -99,6 +100,8 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     level = problem.domain.levels[-1]
     upper = cost(problem, best.plan) if best.plan is not None else math.inf
     try:
+        if refusal(closed(problem, level, deadline)) is not None:
+            return 0.0, None
         task = ground(problem, level, deadline=deadline)
     except (GroundingTooLargeError, OutOfTimeError):
         return 0.0, None

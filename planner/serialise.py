@@ -13,29 +13,38 @@ forbidden there, and the segment searched again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
 
 from planner.compiling import Achiever, Program
 from planner.exhaust import Space, TooLargeError
-from planner.grounding import OutOfTimeError, ground
+from planner.flat import search as flat_search
+from planner.grounding import OutOfTimeError, Reached, ground
 from planner.grounding import TooLargeError as GroundingTooLargeError
 from planner.lifted import Done, Refiner, Template
-from planner.plan import Plan, Reason, Step
-from planner.segments import Advice, Effort, Forbidden, LimitError, Segments
+from planner.nearby import detour
+from planner.plan import Limits, Plan, Reason, Status, Step
+from planner.reasons import unreachable
+from planner.segments import Advice, Effort, Forbidden, Ground, LimitError, Segments
 from planner.table import Cell, Table, arguments_of, key_of
-from reasoner.symbols import FALSE, Condition, Problem
+from reasoner.symbols import FALSE, Condition, Fact, Problem, State
 
 EASY = Effort(depth=1, expansions=10)
 SHORT = Effort(depth=3, expansions=150)
 LONG = Effort(depth=16, expansions=200, questions=150)
 WIDE = Effort(depth=16, expansions=1000, slack=1, breadth=3, questions=500)
-
+NEARBY, WIDER = Effort(depth=0, expansions=0), Effort(depth=0, expansions=0, breadth=2)
+"""All states of what a goal concerns and one or two values of each sort, see `planner.nearby`."""
+TOGETHER = Effort(depth=0, expansions=2_000)
+"""All goals that are left at once, by flat search on the level, where it is small enough."""
 
 FEW_OPERATORS, FEW_STATES = 300, 30_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
+MOST_ROWS, MOST_CHANGES, MOST_TOGETHER = 2_000_000, 10_000_000, 3_000_000
+"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded: the lowest (600 MB),
+and another for all goals at once."""
 
 
 class UnsolvableError(Exception):
@@ -57,6 +66,28 @@ def exhaust(problem: Problem, deadline: float | None, most: int, operators: int 
         return Plan(found.steps)
     states = f"all {found.states} states of level {level} that can be reached were looked at"
     return Reason(f"no state with the goal's facts can be reached; {states}")
+
+
+def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
+    """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
+    reached = Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
+    reached.close()
+    return reached
+
+
+def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
+    """Return why a level isn't to be grounded, if it would take too much memory: an effect on a symbol touches all its values."""
+    values = {}
+    for name, situation in reached.situations.items():
+        rows = len(reached.tables["situation", name])
+        values[name] = 1 if situation.boolean else 1 + rows // max(len(reached.symbols[name]), 1)
+    changes = sum(
+        len(rows) * sum(values[effect.situation] for _, effect in schema.effects)
+        for schema, rows in zip(reached.schemas, reached.rows, strict=True)
+    )
+    if changes <= most:
+        return None
+    return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
 
 
 @dataclass
@@ -97,9 +128,13 @@ class Call:
         self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
         self.moved = False
         self.proved = False
+        self.too_large: Reason | None = None
+        self.together_at: dict[int, int] = {}
+        self.watch: Callable[[], None] | None = None  # told before what costs most begins
         *upper, lowest = self.program.levels
         self.efforts = (
-            *product(upper, (SHORT, LONG)),
+            *product(upper[:1], (SHORT, LONG)),
+            *product(upper[1:], (SHORT, NEARBY, WIDER, TOGETHER, LONG)),
             *product(upper, (WIDE,)),
             *product((lowest,), (SHORT, LONG, WIDE) if upper else (SHORT, LONG)),
         )
@@ -174,6 +209,11 @@ class Call:
         for level, effort in self.efforts:
             if (level, effort) == self.efforts[min(2, len(self.efforts) - 1)]:
                 self.prove()
+            if effort is TOGETHER:
+                if self.together(level):
+                    self.fallbacks += 1
+                    return True
+                continue
             for cell in candidates():
                 if (level, effort) in self.failed.get(cell, ()):
                     continue
@@ -194,9 +234,20 @@ class Call:
         """
         if not self.proved:
             self.proved = True
+            if self.watch is not None:
+                self.watch()
+            level, deadline = self.program.levels[-1], self.segments.deadline
             try:
-                task = ground(self.problem, self.program.levels[-1], deadline=self.segments.deadline)
-            except GroundingTooLargeError:
+                reached = closed(self.problem, level, deadline)
+                for symbol, value in sorted(self.problem.goal.items()):
+                    if not reached.possible(symbol, value):
+                        raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
+                self.too_large = refusal(reached)
+                if self.too_large is not None:
+                    return
+                task = ground(self.problem, level, deadline=deadline)
+            except GroundingTooLargeError as error:
+                self.too_large = Reason(f"level {level} is too large to be grounded: {error}")
                 return
             except OutOfTimeError as error:
                 raise LimitError("the time limit") from error
@@ -213,8 +264,7 @@ class Call:
         forbidden: set[Forbidden] = set()
         mark = len(self.table.trail)
         while True:
-            search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
-            found = search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
+            found = self.segment(level, cell, effort, forbidden)
             if found is None:
                 return False
             done: list[Done] = []
@@ -230,6 +280,46 @@ class Call:
                 self.kept[cell] = self.goal[cell]
                 return True
             self.table.undo(mark)
+
+    def segment(self, level: int, cell: Cell, effort: Effort, forbidden: set[Forbidden]) -> list[Ground] | None:
+        """Return steps to one goal after which those kept hold again, looked for with some effort."""
+        if effort in (NEARBY, WIDER):
+            goal, deadline = (cell, self.goal[cell]), self.segments.deadline
+            return (
+                detour(self.program, self.table, level, goal, self.kept, effort.breadth, deadline)
+                if not forbidden
+                else None
+            )
+        search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
+        return search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
+
+    def together(self, level: int) -> bool:
+        """Achieve all goals at once by flat search on a level; whether that succeeded, and not tried twice from one state."""
+        if len(self.steps) == self.together_at.get(level):
+            return False
+        self.together_at[level] = len(self.steps)
+        deadline, state = self.segments.deadline, self.table.state()
+        try:
+            if refusal(closed(self.problem, level, deadline, state), MOST_TOGETHER) is not None:
+                return False
+            task = ground(self.problem, level, state, deadline=deadline)
+        except (GroundingTooLargeError, OutOfTimeError):
+            return False
+        if isinstance(task, Reason):
+            return False
+        found = flat_search(task, Limits(TOGETHER.expansions), deadline)
+        self.segments.counts[level].add(found.counts)
+        mark, before = len(self.table.trail), len(self.steps)
+        for operator in found.plan if found.status is Status.SOLVED else ():
+            name, arguments, _ = task.describe(operator)
+            step = self.refiner.do(level, name, arguments)
+            if step is None:
+                self.table.undo(mark)
+                del self.steps[before:]
+                return False
+            self.steps.append(step)
+        self.moved |= len(self.steps) > before
+        return len(self.steps) > before
 
     def met(self, cell: Cell) -> bool:
         """Whether a goal holds now."""
