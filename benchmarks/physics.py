@@ -5,6 +5,7 @@
     python -m benchmarks.physics film         what filming costs
     python -m benchmarks.physics same         the same seed in several processes and with several workers
     python -m benchmarks.physics speed        rollouts per minute by workers, and on a Ray cluster
+    python -m benchmarks.physics perception   perception held against the truth over thirty random scenes
     python -m benchmarks.physics 5000 5020    perturbed rollouts of the beverage-serving plan, one per seed
 
 Seeds from 5000 are for development: what fails there may be mended. Seeds from 9000 are for reporting only.
@@ -17,7 +18,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,7 @@ import numpy as np
 import pybullet
 
 import confab
+from benchmarks.perception import perception
 from sim.rollouts import Trial, rollouts, wilson
 from sim.verify import Rollout, expectations
 from sim.world import Perturbation, World
@@ -158,7 +160,7 @@ def perturbed(seeds: Sequence[int], workers: int | str = WORKERS) -> None:
 
 def main() -> None:
     """Print everything but the faults, which `benchmarks.faults` prints; the reporting seeds last."""
-    for part in (plans, film, same_seed, speed):
+    for part in (plans, film, same_seed, speed, perception):
         part()
     for title, seeds in (("development", range(5000, 5022)), ("reporting", range(9000, 9100))):
         print(f"perturbed rollouts, {title} seeds")
@@ -169,6 +171,7 @@ if __name__ == "__main__":
     if len(sys.argv) == 3:
         perturbed(range(int(sys.argv[1]), int(sys.argv[2])))
     elif len(sys.argv) == 2:
-        {"plans": plans, "film": film, "same": same_seed, "speed": speed}[sys.argv[1]]()
+        parts: dict[str, Callable[[], object]] = {"plans": plans, "film": film, "same": same_seed, "speed": speed}
+        (parts | {"perception": perception})[sys.argv[1]]()
     else:
         main()

@@ -51,7 +51,7 @@ class Camera:
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(right, forward), forward])
 
-    @property
+    @cached_property
     def focal(self) -> float:
         """Pixels per unit of tangent."""
         return self.height / 2 / float(np.tan(np.radians(self.field) / 2))
@@ -69,7 +69,8 @@ class Camera:
     def backdrop(self) -> Array:
         """A gradient from sky to ground."""
         part = np.linspace(0, 1, self.height)[:, None, None] ** 1.3
-        return np.broadcast_to(SKY * (1 - part) + GROUND * part, (self.height, self.width, 3))
+        whole = np.broadcast_to(SKY * (1 - part) + GROUND * part, (self.height, self.width, 3))
+        return np.ascontiguousarray(whole, dtype=np.float32)
 
     def window(self, center: Array, radius: float) -> tuple[slice, slice] | None:
         """Return the rows and columns that a sphere can cover, or None if it's out of the picture."""
@@ -128,6 +129,7 @@ def _cast_shadows(world: World, image: Array, depth: Array, camera: Camera) -> N
     for fixture in world.embodiment.fixtures:
         top = fixture.position[2] + fixture.size[2] / 2
         distance, x, y = _plane(camera, top)
+        on = np.flatnonzero(np.abs(depth - distance) <= 0.01)
         dark = np.ones(depth.shape, dtype=np.float32)
         for center, radius in casters:
             height = center[2] - top
@@ -141,8 +143,8 @@ def _cast_shadows(world: World, image: Array, depth: Array, camera: Camera) -> N
                 lit = np.clip((away - np.float32(radius - soft)) / np.float32(2 * soft), 0.0, 1.0)
                 lit = 1 - np.float32(0.34 * min(1.0, radius / soft)) * (1 - lit * lit * (3 - 2 * lit))
                 np.minimum(dark[window], lit, out=dark[window])
-        dark[np.abs(depth - distance) > 0.01] = 1.0
-        image *= dark[..., None]
+        on = on[dark.reshape(-1)[on] < 1.0]
+        image.reshape(-1, 3)[on] *= dark.reshape(-1)[on, None]
 
 
 @lru_cache(maxsize=8)
@@ -185,11 +187,11 @@ def _opaque(world: World, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
         renderer=pybullet.ER_TINY_RENDERER,
         physicsClientId=world.client,
     )
-    image = np.asarray(colors, dtype=np.uint8).reshape(camera.height, camera.width, 4)[..., :3].astype(np.float32)
+    colors = np.asarray(colors, dtype=np.uint8).reshape(camera.height, camera.width, 4)
     buffer = np.asarray(buffer, dtype=np.float32).reshape(camera.height, camera.width)
     depth = np.float32(FAR * NEAR) / (np.float32(FAR) - np.float32(FAR - NEAR) * buffer)
-    nothing = buffer > 0.9999
-    image[nothing] = camera.backdrop[nothing]
+    image, something = camera.backdrop.copy(), np.flatnonzero(buffer <= 0.9999)
+    image.reshape(-1, 3)[something] = colors.reshape(-1, 4)[something, :3]
     return image, depth
 
 

@@ -378,13 +378,13 @@ class World:
                 return name
         return None
 
-    def inside(self, vessel: str, filling: str | None = None) -> int:
-        """Return how many beads, of one filling or of all, are inside a vessel."""
+    def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> int:
+        """Return how many beads, of one filling or of all, are inside a vessel, where that is or is `sensed`."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
             return 0
-        rotation, base = self.truth(vessel)
+        rotation, base = self.sense(vessel) if sensed else self.truth(vessel)
         local = (self._places_of(beads) - base) @ rotation
         within = np.hypot(local[:, 0], local[:, 1]) < inner_radius(shape, local[:, 2]) + 0.001
         return int(np.sum(within & (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)))
@@ -394,10 +394,10 @@ class World:
         return np.array([get(bead.body, physicsClientId=self.client)[0] for bead in beads])
 
     def amount(self, vessel: str, filling: str) -> float:
-        """Return how many servings of a filling a vessel contains."""
+        """Return how many servings of a filling a vessel contains, as the robot perceives it."""
         if not self.beads:
             return float(filling in self.contents.get(vessel, ()))
-        return self.inside(vessel, filling) / self.embodiment.fillings[filling].serving
+        return self.inside(vessel, filling, sensed=True) / self.embodiment.fillings[filling].serving
 
     def stray(self) -> int:
         """Return how many beads are in no vessel."""

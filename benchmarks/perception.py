@@ -1,0 +1,185 @@
+"""Perception held against the truth, over random scenes and levels of noise: what is seen that isn't so, and what is missed.
+
+    python -m benchmarks.perception [SCENES]
+
+In each scene objects stand at random places, perturbed, some of them aside or lying, and vessels are filled or not; then a hand
+takes an object and lifts it. At each of these moments everything is looked at several times, at every level of noise. What is
+true is known from how the scene was set up and what was done, not from perceiving it without noise.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import confab
+from reasoner.embodiment import Embodiment
+from reasoner.symbols import Symbol
+from sim.bodies import outer_radius
+from sim.faults import displaced, lying
+from sim.skills import skill
+from sim.verdict import SkillError
+from sim.world import Perturbation, World
+
+NOISE = (0.0, 0.002, 0.005, 0.01, 0.02)
+"""Standard deviations of perceived positions in metres."""
+
+LOOKS = 4
+"""How often everything is looked at, per moment and level of noise."""
+
+AT_REST = {"perceive_held": "nothing", "perceive_hand_position": "raised", "perceive_hand_tilt": "upright"}
+"""What is true of a hand at rest, by perceiver: the special value."""
+
+Truth = dict[Symbol, str | None]
+
+
+@dataclass
+class Tally:
+    """Counts per situation type and level of noise.
+
+    `looks` at something, `wrong` values that were seen and aren't true, and true values that were `missed`; a value that is taken
+    for another one counts as both.
+    """
+
+    looks: Counter[tuple[str, float]] = field(default_factory=Counter)
+    wrong: Counter[tuple[str, float]] = field(default_factory=Counter)
+    missed: Counter[tuple[str, float]] = field(default_factory=Counter)
+
+    def add(self, world: World, truth: Truth) -> None:
+        """Look at everything, at every level of noise."""
+        for noise in NOISE:
+            world.noise = noise
+            for _ in range(LOOKS):
+                seen = world.observe()
+                for symbol, value in truth.items():
+                    key = symbol.situation, noise
+                    self.looks[key] += 1
+                    self.wrong[key] += seen.get(symbol) not in (None, value)
+                    self.missed[key] += value is not None and seen.get(symbol) != value
+        world.noise = 0.0
+
+    def lines(self) -> Iterator[str]:
+        """Yield the table, in Markdown."""
+        yield "| situation type | looks | " + " | ".join(f"{1000 * noise:g} mm" for noise in NOISE) + " |"
+        yield "|---" * (2 + len(NOISE)) + "|"
+        for situation in dict.fromkeys(situation for situation, _ in self.looks):
+            counts = [f"{self.wrong[situation, noise]} / {self.missed[situation, noise]}" for noise in NOISE]
+            yield f"| {situation} | {self.looks[situation, NOISE[0]]} | " + " | ".join(counts) + " |"
+
+
+def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally: Tally) -> bool:
+    """Set up the scene of a seed, look, let a hand take something, and look again; return whether it took something."""
+    rng = np.random.default_rng(seed)
+    truth = _drawn(embodiment, symbols, rng)
+    initial = {symbol: value for symbol, value in truth.items() if value is not None}
+    with World(embodiment, initial, seed, Perturbation()) as world:
+        _disturb(world, truth, rng)
+        tally.add(world, truth)
+        uses = {use.skill: use for use in embodiment.skills.values()}
+        hand, name = _taken(world, truth, rng, uses["reach"].numbers)
+        if not name:
+            return False
+        _set(embodiment, truth, "perceive_hand_position", hand, name)
+        tally.add(world, truth)
+        for step, roles in (("grasp", {"hand": hand, "object": name}), ("lift", {"hand": hand, "object": name})):
+            skill(step)(world, roles, uses[step].numbers)
+            if step == "grasp":
+                _set(embodiment, truth, "perceive_held", hand, name)
+            else:
+                _set(embodiment, truth, "perceive_place", name, "in_hand")
+                _set(embodiment, truth, "perceive_hand_position", hand, "raised")
+            tally.add(world, truth)
+    return True
+
+
+def _drawn(embodiment: Embodiment, symbols: Sequence[Symbol], rng: np.random.Generator) -> Truth:
+    """Return facts with objects at random places, vessels filled or not, and hands at rest."""
+    places = iter(rng.permutation(list(embodiment.places)).tolist())
+    truth: Truth = {}
+    for symbol in symbols:
+        use = embodiment.perceivers[symbol.situation]
+        if use.perceiver == "perceive_place":
+            truth[symbol] = next(places)
+        elif use.perceiver == "perceive_content":
+            contents = [*embodiment.fillings, use.values["empty"]]
+            truth[symbol] = contents[rng.integers(len(contents))]
+        else:
+            truth[symbol] = use.values[AT_REST[use.perceiver]]
+    return truth
+
+
+def _disturb(world: World, truth: Truth, rng: np.random.Generator) -> None:
+    """Shift one empty object of five off every place, and lay another of five on its side: both are at no place."""
+    uses = world.embodiment.perceivers
+    for symbol in [s for s in truth if uses[s.situation].perceiver == "perceive_place"]:
+        name, draw = symbol.arguments[0], rng.random()
+        contents = [s for s in truth if uses[s.situation].perceiver == "perceive_content" and s.arguments == (name,)]
+        if draw >= 0.4 or any(truth[s] != uses[s.situation].values["empty"] for s in contents):
+            continue
+        if draw < 0.2:
+            turn = rng.uniform(0, 2 * np.pi)
+            by = (0.08 * float(np.cos(turn)), 0.08 * float(np.sin(turn)))
+            if not _free(world, name, world.truth(name)[1][:2] + by):
+                continue
+            displaced(name, by)(world)
+        else:
+            lying(name)(world)
+        truth[symbol] = None
+    world.run(60)
+
+
+def _free(world: World, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+    """Tell whether an object has room at a spot (2,), off every place and not off the table."""
+    gaps = [np.hypot(*(world.truth(other)[1][:2] - spot)) for other in world.bodies if other != name]
+    away = world.nearest_place(np.array([*spot, 0.0]))[1]
+    places = np.array([place.position[:2] for place in world.embodiment.places.values()])
+    inside = bool(np.all(spot > places.min(0) - 0.085) and np.all(spot < places.max(0) + 0.085))
+    return inside and away > 0.065 and min(gaps) > 2.2 * outer_radius(world.bodies[name].shape)
+
+
+def _taken(world: World, truth: Truth, rng: np.random.Generator, numbers: Mapping[str, float]) -> tuple[str, str]:
+    """Let some hand reach for some object that stands at a place; return both, or empty names if none can."""
+    uses = world.embodiment.perceivers
+    standing = [
+        s.arguments[0] for s, v in truth.items() if uses[s.situation].perceiver == "perceive_place" and v is not None
+    ]
+    pairs = [(hand, name) for hand in world.hands for name in standing]
+    for i in rng.permutation(len(pairs)):
+        hand, name = pairs[i]
+        try:
+            skill("reach")(world, {"hand": hand, "target": name}, numbers)
+        except SkillError:
+            if not np.allclose(world.hands[hand].posture, world.hands[hand].hand.home):
+                return "", ""  # it has set out, and isn't where anybody could say
+            continue
+        return hand, name
+    return "", ""
+
+
+def _set(embodiment: Embodiment, truth: Truth, kind: str, subject: str, value: str) -> None:
+    """Set what is true of a subject, for the situation types that a perceiver reads."""
+    for symbol in truth:
+        use = embodiment.perceivers[symbol.situation]
+        if use.perceiver == kind and symbol.arguments == (subject,):
+            truth[symbol] = use.values.get(value, value)
+
+
+def perception(scenes: int = 30, tell: Callable[[str], None] = print) -> Tally:
+    """Print the table over some random scenes, with the development seeds from 5100."""
+    scene = confab.load("beverage-serving")
+    symbols = [s for s in scene.problem.initial if s.situation in scene.embodiment.perceivers]
+    tally, took = Tally(), 0
+    for seed in range(5100, 5100 + scenes):
+        took += look_at(scene.embodiment, symbols, seed, tally)
+    tell(f"{scenes} random scenes, in {took} a hand took something; wrong / missed by noise:")
+    for line in tally.lines():
+        tell(line)
+    return tally
+
+
+if __name__ == "__main__":
+    perception(int(sys.argv[1]) if len(sys.argv) > 1 else 30)
