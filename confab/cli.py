@@ -289,6 +289,20 @@ def new(
 
 
 @app.command()
+def fetch(
+    url: Annotated[str, typer.Argument(metavar="URL", help="IRI of an ontology that lies on the web.")],
+    folder: Annotated[Path, typer.Option("--into", metavar="DIR", help="Beside the file that imports it.")] = Path(),
+) -> None:
+    """Fetch an ontology that is imported by URL, and name it in the catalog."""
+    from reasoner.fetching import fetch as fetch_ontology
+
+    fetched = fetch_ontology(url, folder)
+    _print(
+        "\n".join([f"{fetched.file}, named in {fetched.catalog}", *(f"it imports {iri}" for iri in fetched.imports)])
+    )
+
+
+@app.command()
 def picture(
     scene: SceneName,
     out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="File to draw into.")],

@@ -1,7 +1,8 @@
 """The knowledge graph: ontology files with all that they import, in one SPARQL store.
 
 Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read, never written here. Nothing is
-fetched from the network: an import is looked up in the catalog beside the file, then in the shipped one.
+fetched from the network (`reasoner.fetching` does, if asked): an import is looked up in the catalog beside the file, then in the
+shipped one.
 """
 
 from __future__ import annotations
@@ -212,7 +213,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
     try:
         if form == ox.RdfFormat.RDF_XML:
-            _refuse_entity_tricks(file)
+            refuse_entity_tricks(file, file.read_text(encoding="utf-8", errors="replace"))
         base = file.resolve().as_uri()
         graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
         read_prefixes(graph, file)
@@ -222,9 +223,9 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
 
 
-def _refuse_entity_tricks(file: Path) -> None:
+def refuse_entity_tricks(file: Path | str, content: str) -> None:
     """Let through RDF/XML whose entities abbreviate namespaces, as Protégé 4 wrote them, and nothing else of a DTD."""
-    head = file.read_text(encoding="utf-8", errors="replace").partition("<rdf:RDF")[0]
+    head = content.partition("<rdf:RDF")[0]
     doctype = re.search(r"<!DOCTYPE\s+[^\[>]*", head)
     for entity in re.findall(r"<!ENTITY\s[^>]*>", head) + ([doctype[0] + ">"] if doctype else []):
         plain = re.fullmatch(r"""<!ENTITY\s+[\w.-]+\s+(?:"[^"&%]*"|'[^'&%]*')\s*>|<!DOCTYPE\s+[\w:.-]+\s*>""", entity)
@@ -274,9 +275,11 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
         path = importer.with_name(iri.rstrip("#/").rsplit("/", 1)[-1] + suffix)
         if path.is_file():
             return path
+    web = iri.startswith(("http://", "https://"))
+    fetch = f", or fetch it: confab fetch {iri} --into {importer.parent}" if web else ""
     raise KnowledgeError(
-        f"{importer}: imports <{iri}>, which neither {beside} nor the shipped catalog knows; "
-        "put its file beside this one or name it in the catalog (nothing is fetched from the network)"
+        f"{importer}: imports <{iri}>, which neither {beside.name} beside it nor the shipped catalog knows; "
+        f"put its file beside this one, name it in the catalog{fetch} (nothing is fetched unasked)"
     )
 
 
