@@ -133,7 +133,7 @@ class Call:
         self.watch: Callable[[], None] | None = None  # told before what costs most begins
         *upper, lowest = self.program.levels
         self.efforts = (
-            *product(upper[:1], (SHORT, LONG)),
+            *product(upper[:1], (SHORT, NEARBY, WIDER, LONG)),
             *product(upper[1:], (SHORT, NEARBY, WIDER, TOGETHER, LONG)),
             *product(upper, (WIDE,)),
             *product((lowest,), (SHORT, LONG, WIDE) if upper else (SHORT, LONG)),
@@ -207,7 +207,7 @@ class Call:
                 yield from asleep
 
         for level, effort in self.efforts:
-            if (level, effort) == self.efforts[min(2, len(self.efforts) - 1)]:
+            if level != self.program.levels[0] or effort is LONG:
                 self.prove()
             if effort is TOGETHER:
                 if self.together(level):
