@@ -19,7 +19,7 @@ LOG = 6
 """So many of the last happenings are shown."""
 
 
-@dataclass
+@dataclass(repr=False)
 class View:
     """What is shown of the last moment, and of what happened before."""
 
@@ -46,6 +46,10 @@ class View:
         if self.moment.what == "begin" and self.moment.step is not None:
             notes[self.moment.step.path] = "◀ " + "; ".join(map(str, self.moment.expected))
         return notes
+
+    def __repr__(self) -> str:
+        """Return where things stand, in one line."""
+        return "; ".join((self.headline(), *self.log[-1:]))
 
     def headline(self) -> str:
         """Return what is being done, in one line."""
@@ -76,7 +80,9 @@ class View:
 
         happened = "".join(f"<li>{html.escape(line)}</li>" for line in self.log[-LOG:])
         plan = plan_html(self.moment.plan, self.notes()) if self.moment is not None else ""
-        return f"<p>{html.escape(self.headline())}</p><ul>{happened}</ul>{plan}"
+        expected = self.moment.expected if self.moment is not None else ()
+        shall = f" → <i>{html.escape('; '.join(map(str, expected)))}</i>" if expected else ""
+        return f"<p>{html.escape(self.headline())}{shall}</p><ul>{happened}</ul>{plan}"
 
 
 @contextmanager

@@ -393,7 +393,8 @@ class _Run:
 
     def doubt(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
         """Want the agenda looked at again. What is in progress is sound if it could have begun with the surprises known."""
-        self.puzzled = self.puzzled or why
+        if why not in self.puzzled:
+            self.puzzled = f"{self.puzzled}; {why}" if self.puzzled else why
         for surprise in surprises:
             self.missed.setdefault(surprise.symbol, surprise.expected)
         changes = {s.symbol: s.observed for s in surprises}
