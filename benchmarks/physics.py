@@ -111,29 +111,40 @@ def same_seed() -> None:
 
 def speed() -> None:
     """Print rollouts per minute by number of workers, and on a Ray cluster of two nodes if Ray is installed."""
-    one, seeds = case("beverage-serving-moved", Perturbation()), range(5000, 5004)
-    alone: list[Rollout] = []
-    for workers in (1, WORKERS):
-        begin = time.perf_counter()
-        alone = rollouts(one, seeds, workers)
-        print(
-            f"{workers} workers: {len(seeds) / (time.perf_counter() - begin) * 60:.1f} rollouts per minute (10 primitives)"
-        )
+    one, seeds = case("beverage-serving-moved", Perturbation()), range(5000, 5006)
+    begin = time.perf_counter()
+    alone = rollouts(one, seeds)
+    print(f"{len(seeds)} rollouts of 10 primitives, 1 worker: {_per_minute(seeds, begin):.1f} per minute", flush=True)
+    for kill in (False, True):
+        _timed(f"{WORKERS} workers", one, seeds, alone, WORKERS, kill)
     try:
         from ray.cluster_utils import Cluster
     except ImportError:
         print("Ray isn't installed: no figures on a cluster")
         return
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-    cluster.add_node(num_cpus=1)
-    os.environ["RAY_ADDRESS"] = cluster.address
+    try:
+        cluster.add_node(num_cpus=1)
+        os.environ["RAY_ADDRESS"] = cluster.address
+        for kill in (False, True):
+            _timed("Ray, two nodes", one, seeds, alone, "ray", kill)
+    finally:
+        os.environ.pop("RAY_ADDRESS", None)
+        cluster.shutdown()
+
+
+def _per_minute(seeds: Sequence[int], begin: float) -> float:
+    return len(seeds) / (time.perf_counter() - begin) * 60
+
+
+def _timed(name: str, one: Trial, seeds: Sequence[int], alone: list[Rollout], workers: int | str, kill: bool) -> None:
+    """Print how fast some workers are, one of them killed perhaps, and whether they give what one process gives."""
     with TemporaryDirectory() as folder:
-        killed = replace(one, prepare=partial(die_once, Path(folder) / "died"))
+        mark = Path(folder) / "died"
         begin = time.perf_counter()
-        same = rollouts(killed, seeds, "ray") == alone
-    rate = len(seeds) / (time.perf_counter() - begin) * 60
-    print(f"Ray, two nodes, one worker killed: {rate:.1f} rollouts per minute, same results: {same}")
-    cluster.shutdown()
+        done = rollouts(replace(one, prepare=partial(die_once, mark)) if kill else one, seeds, workers)
+        rate, killed = _per_minute(seeds, begin), ", one killed" if mark.exists() else ""
+    print(f"{name}{killed}: {rate:.1f} per minute, the same seed by seed: {done == alone}", flush=True)
 
 
 def die_once(mark: Path, world: World) -> None:

@@ -28,6 +28,9 @@ NEAR, FAR = 0.1, 8.0
 SUN = np.array([0.45, 0.35, 0.82])
 """Direction to the light."""
 
+EDGE = 14.0
+"""Difference in brightness, of 255, from which on neighbouring pixels lie on an edge."""
+
 SKY, GROUND = np.array([236.0, 241.0, 247.0]), np.array([196.0, 205.0, 216.0])
 """Colours of the backdrop at the top and at the bottom."""
 
@@ -192,7 +195,25 @@ def _opaque(world: World, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
     depth = np.float32(FAR * NEAR) / (np.float32(FAR) - np.float32(FAR - NEAR) * buffer)
     image, something = camera.backdrop.copy(), np.flatnonzero(buffer <= 0.9999)
     image.reshape(-1, 3)[something] = colors.reshape(-1, 4)[something, :3]
+    _soften(image)
     return image, depth
+
+
+def _soften(image: NDArray[Any]) -> None:
+    """Blend pixels on edges with their neighbours: PyBullet's renderer draws edges as stairs."""
+    height, width = image.shape[:2]
+    green = image[..., 1]
+    across, down = np.abs(np.diff(green, axis=1)) > EDGE, np.abs(np.diff(green, axis=0)) > EDGE
+    edge = np.zeros(green.shape, dtype=bool)
+    edge[:, 1:] |= across
+    edge[:, :-1] |= across
+    edge[1:] |= down
+    edge[:-1] |= down
+    edge[[0, -1]] = edge[:, [0, -1]] = False
+    at, pixels = np.flatnonzero(edge), image.reshape(height * width, 3)
+    around = pixels[at - 1] + pixels[at + 1] + pixels[at - width] + pixels[at + width]
+    corners = pixels[at - width - 1] + pixels[at - width + 1] + pixels[at + width - 1] + pixels[at + width + 1]
+    pixels[at] = pixels[at] / 4 + around / 8 + corners / 16
 
 
 def _drops(world: World) -> Iterator[tuple[Array, float, Array]]:

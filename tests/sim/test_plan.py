@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 
 from sim.faults import hidden_wall
-from sim.film import Film
+from sim.film import BAR, DOING, DONE, Film
 from sim.picture import hide_vessels, picture, view_of
 from sim.verify import verify
 from sim.world import World
@@ -103,3 +104,18 @@ def test_a_film_has_a_frame_for_every_moment_and_a_still_per_primitive(serving: 
         verify(serving.embodiment, serving.initial, serving.steps[:1], serving.expected[:1], beads=False, watch=film)
     assert path.stat().st_size > 5000
     assert [still.name for still in (tmp_path / "stills").iterdir()] == ["01-B3_REACH_HAND_OBJECT-left_hand-cup1.png"]
+
+
+def test_a_film_may_be_a_gif_with_caption_and_plan_strip_in_every_frame(serving: Case, tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    with Film(path, serving.steps, width=320, height=192, frames=10) as film:
+        verify(serving.embodiment, serving.initial, serving.steps[:2], serving.expected[:2], beads=False, watch=film)
+    with Image.open(path) as gif:
+        frames = [np.asarray(frame.convert("RGB")).astype(int) for frame in ImageSequence.Iterator(gif)]
+    assert len(frames) > 5
+    for frame in frames:
+        strip, caption = frame[-13:-6], frame[-BAR : -BAR + 30]
+        assert np.any(np.abs(strip - DOING).max(-1) < 40)
+        assert np.sum(caption.max(-1) < 120) > 40
+    done = [int(np.sum(np.abs(frame[-10] - DONE).max(-1) < 40)) for frame in frames]
+    assert done[0] == 0 < done[-1]
