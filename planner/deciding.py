@@ -6,6 +6,7 @@ could as well do now isn't passed over.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias
@@ -20,6 +21,8 @@ from reasoner.symbols import FALSE, Problem
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 REACH = 3  # how many steps ahead alternatives may begin to work towards a goal
+MOST = 1000  # expansions in search of a shortest plan to learn from
+BROAD = 12  # so many taken values of a sort are thought of where none is free
 
 
 class Field:
@@ -48,8 +51,12 @@ class Field:
         now = self.table.now
         return [cell for cell, value in self.goal.items() if now[cell[0]].get(cell[1], FALSE) != value]
 
-    def proposals(self, cells: Sequence[Cell], reach: int = REACH) -> list[Ground]:
-        """Return what is applicable now and begins to work towards one of these goals."""
+    def proposals(self, cells: Sequence[Cell], reach: int = REACH, breadth: int = 1) -> list[Ground]:
+        """Return what is applicable now and begins to work towards one of these goals.
+
+        Where no value of a sort is free, `breadth` of the taken ones are thought of.
+        """
+        self.segments.wants.breadth = breadth
         return list(self.segments.relevant(self.level, {cell: self.goal[cell] for cell in cells}, reach))
 
     def roles(self, ground: Ground) -> tuple[str, ...] | None:
@@ -122,7 +129,7 @@ def decisions(
             break
         rest = steps[position + 1 :]
         others = []
-        for other in field.proposals(field.unmet()):
+        for other in field.proposals(field.unmet(), breadth=BROAD):
             if other == step:
                 continue
             if other in rest:
@@ -156,6 +163,41 @@ def shortened(program: Program, problem: Problem, level: int, steps: Sequence[Gr
             field.do(kept[i])
             i += 1
     return kept
+
+
+def shortest(program: Program, problem: Problem, level: int, most: int = MOST) -> list[Ground] | None:
+    """Return a shortest plan of one level, of what works towards its goals; None if `most` expansions don't find one.
+
+    A* with the number of goals that are open, over the most that one step changes: a teacher for small problems.
+    """
+    field = Field(program, problem, level)
+    table, widest = field.table, field.segments.widest[level]
+    start = len(table.trail)
+    queue: list[tuple[int, int, int, frozenset[tuple[Cell, str]], tuple[Ground, ...]]] = [(0, 0, 0, frozenset(), ())]
+    reached = {queue[0][3]: 0}
+    expanded = number = 0
+    while queue and expanded < most:
+        _, _, _, here, steps = heapq.heappop(queue)
+        if reached[here] < len(steps):
+            continue
+        table.undo(start)
+        for (situation, key), value in here:
+            table.put(situation, key, value)
+        unmet = field.unmet()
+        if not unmet:
+            return list(steps)
+        expanded += 1
+        mark = len(table.trail)
+        for ground in field.proposals(unmet, breadth=BROAD):
+            field.do(ground)
+            there = frozenset(table.since(start).items())
+            left = -(-len(field.unmet()) // widest)
+            table.undo(mark)
+            if reached.get(there, len(steps) + 2) > len(steps) + 1:
+                reached[there] = len(steps) + 1
+                number += 1
+                heapq.heappush(queue, (len(steps) + 1 + left, left, number, there, (*steps, ground)))
+    return None
 
 
 def single_level(problem: Problem, level: int) -> Problem:

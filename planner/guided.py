@@ -3,8 +3,10 @@
 base       the fast planner, exactly as it is without memory
 stream     the search that experience leads (`planner.stream`), one expansion at a time, between two expansions of the base
 strict     the stream gets one expansion for every `DEBT` of the base on its level: never more than 1.05 times the base alone
-guarded    once the base has spent `patience` expansions, the stream leads as long as it gets on; after `STRETCH` expansions
-           without a new least number of open goals it owes the base `DEBT` expansions for each of them
+leading    the stream leads as long as it gets on; after `STRETCH` expansions without a new least number of open goals it owes the
+           base `DEBT` expansions for each of them
+guarded    the same, but only once the base has searched longer than such a task usually takes it (`patience_for`), or has tried
+           its first level in vain: in what it solves before, memory has no part. A clear preference is obeyed from the first on
 
 Whichever arrives first has solved the problem; that there is no plan is for the base to prove. Memory that isn't trusted runs in
 strict mode whatever was asked for, and one that knows none of the level's behaviours isn't asked at all.
@@ -12,15 +14,15 @@ strict mode whatever was asked for, and one that knows none of the level's behav
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from planner import fast
 from planner.deciding import Field, Ground
-from planner.describing import Schema
-from planner.judging import Judge
+from planner.describing import CROWD, Schema
+from planner.judging import Judge, preferred
 from planner.plan import Counts, Limits, Outcome, Status
 from planner.stream import Stream
 from planner.table import Table
@@ -28,8 +30,9 @@ from reasoner.experience import Experience
 from reasoner.symbols import Problem
 
 DEBT = 20
-STRETCH = 8
-PATIENCE = 0
+STRETCH = 12
+PATIENCE = 100  # expansions of the base before experience leads, and besides
+PER_GOAL = 5  # for each goal that is open
 
 
 @dataclass
@@ -46,6 +49,8 @@ class Memory:
     experience: Experience
     trusted: bool = True
     _judge: Judge | None = None
+    _known: set[str] | None = None
+    _liked: set[tuple[str, str, str]] | None = None
 
     def judge(self, schema: Schema) -> Judge:
         """Return what was learned, read once."""
@@ -54,6 +59,33 @@ class Memory:
             roles = {behavior.name: schema.roles(behavior) for behavior in behaviors}
             self._judge = Judge(self.experience, schema.problem.parents, roles)
         return self._judge
+
+    def knows(self, behaviors: Iterable[str]) -> bool:
+        """Whether anything was counted of any of these behaviours."""
+        if self._known is None:
+            self._known = {
+                c.behavior for (_, epoch), tallies in self.experience.counts.items() if not epoch for c in tallies
+            }
+        return not self._known.isdisjoint(behaviors)
+
+    def prefers(self, problem: Problem, level: int) -> bool:
+        """Whether somebody was clearly preferred to others, among those whom the behaviours of a level have to do with here."""
+        if self._liked is None:
+            self._liked = preferred(self.experience)
+        here = {b.name: b for b in problem.domain.at_level(level)}
+        for behavior, role, who in self._liked:
+            if behavior in here:
+                kinds = {term.name[1:]: term.kind for term in (*here[behavior].parameters, *here[behavior].variables)}
+                among = problem.classes.get(kinds.get(role, ""), ())
+                if who in among and len(among) <= CROWD:
+                    return True
+        return False
+
+
+def patience_for(problem: Problem) -> int:
+    """Return how many expansions the base gets before experience leads: a search that takes no more is cheaper without it."""
+    unmet = sum(problem.initial.get(symbol) != value for symbol, value in problem.goal.items())
+    return PATIENCE + PER_GOAL * unmet
 
 
 class ArrivedError(Exception):
@@ -64,24 +96,38 @@ class ArrivedError(Exception):
 class Race:
     """One race: the stream, and what both have spent."""
 
-    stream: Stream
+    begin: Callable[[], Stream]
+    level: int
     strict: bool
     patience: int
     deadline: float | None = None
     spent: dict[int, int] = field(default_factory=dict)
     base: int = 0
     owed: int = 0
+    begun: Stream | None = None
+
+    @property
+    def stream(self) -> Stream:
+        """The stream, which costs nothing before it is asked for."""
+        if self.begun is None:
+            self.begun = self.begin()
+        return self.begun
 
     def hook(self, level: int, table: Table, choices: Sequence[Ground]) -> Sequence[Ground]:
         """Count an expansion of the base, let the stream have its share, and leave the base's choices as they are."""
         if self.strict:
-            if self.stream.expanded < self.base // DEBT and self.stream.expand():
+            if self.base >= DEBT and self.stream.expanded < self.base // DEBT and self.stream.expand():
                 raise ArrivedError
         elif self.base >= max(self.owed, self.patience) and self.lead():
             raise ArrivedError
-        self.base += level == self.stream.field.level
+        self.base += level == self.level
         self.spent[level] = self.spent.get(level, 0) + 1
         return choices
+
+    def watch(self) -> None:
+        """Lead, whatever the patience: the base has tried its first level in vain, and what it does now costs most."""
+        if not self.strict and self.base >= self.owed and self.lead():
+            raise ArrivedError
 
     def lead(self) -> bool:
         """Let the stream go on as long as it gets nearer; whether it reached the goal."""
@@ -103,7 +149,7 @@ def plan(
     mode: str = "guarded",
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: fast.Compiled | None = None,
-    patience: int = PATIENCE,
+    patience: int | None = None,
 ) -> Outcome:
     """Plan with experience.
 
@@ -112,12 +158,12 @@ def plan(
     problem : Problem
     memory : Memory, optional
     mode : str
-        ``strict`` or ``guarded``: how far experience may lead.
+        ``strict``, ``guarded`` or ``leading``: how far experience may lead.
     limits : Limits
     using : Compiled, optional
         As for `planner.fast.plan`.
     patience : int
-        Expansions that the base gets before experience leads; what it solves within them costs nothing more.
+        Expansions that the base gets before experience leads; if left out, as `mode` says.
 
     Returns
     -------
@@ -127,26 +173,36 @@ def plan(
     began = perf_counter()
     using = using or fast.compiled(problem)
     first = problem.domain.levels[0]
-    schema = Schema(using.program)
-    judge = None if memory is None else memory.judge(schema)
-    if memory is None or judge is None or not judge.knows(b.name for b in problem.domain.at_level(first)):
+    if memory is None or not memory.knows(b.name for b in problem.domain.at_level(first)):
         return fast.plan(problem, limits=limits, using=using)
     deadline = None if limits.seconds is None else began + limits.seconds
-    stream = Stream(Field(using.program, problem, first, schema), judge)
-    race = Race(stream, mode == "strict" or not memory.trusted, patience, deadline)
+
+    def begin() -> Stream:
+        schema = Schema(using.program)
+        return Stream(Field(using.program, problem, first, schema), memory.judge(schema))
+
+    strict = mode == "strict" or not memory.trusted
+    if patience is None:
+        eager = mode == "leading" or memory.prefers(problem, first)
+        patience = 0 if eager or strict else patience_for(problem)
+    race = Race(begin, first, strict, patience, deadline)
     outcome: Outcome | None = None
     while outcome is None:
-        if stream.solution is None:
+        if race.begun is None or race.begun.solution is None:
             with suppress(ArrivedError):
-                outcome = fast.plan(problem, advice=race.hook, limits=limits, using=using)
-        if stream.solution is not None:
-            outcome = refined(problem, using, stream, deadline)
+                outcome = fast.plan(problem, advice=race.hook, limits=limits, using=using, watch=race.watch)
+        if race.begun is not None and race.begun.solution is not None:
+            outcome = refined(problem, using, race.begun, deadline)
     if outcome.status is Status.GAVE_UP and not race.strict:
+        stream = race.stream
         while outcome.plan is None and stream.expanded < limits.expansions and not stream.exhausted:
             if deadline is not None and perf_counter() > deadline:
                 break
             if stream.expand():
                 outcome = refined(problem, using, stream, deadline) or outcome
+    if race.begun is None:
+        return replace(outcome, seconds=perf_counter() - began)
+    stream = race.begun
     search = {level: Counts(c.generated, c.evaluated, c.expanded) for level, c in outcome.search.items()}
     for level, expanded in race.spent.items() if stream.solution is not None else ():
         search.setdefault(level, Counts()).expanded += expanded

@@ -26,7 +26,11 @@ from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tall
 ALPHA = 1.0  # how much the class above weighs in a probability
 KAPPA = 2.0  # how much L weighs against counts of the same pattern
 DECAY = 0.9  # per episode, of what was preferred among equals
+CLEAR = 3.0  # so many times as often taken as passed over is a clear preference
+IS_WHO = " is who"
 TOGETHER = "all of this together"
+ENOUGH = 4  # of both choices and passes, for a fact to be looked at within the counts of another
+TELLING = 0.02  # relevance of a fact from which it is worth that
 LEAST = 1e-3  # a fact of less relevance isn't looked at
 
 
@@ -48,6 +52,8 @@ class Sums:
     facts: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     patterns: dict[Pattern, list[float]] = field(default_factory=dict)
     weights: dict[str, float] = field(default_factory=dict)
+    apart: str | None = None
+    parts: dict[str, Sums] | None = None
 
     def add(self, pattern: Pattern, chosen: float, passed: float) -> None:
         """Count a pattern and each of its facts."""
@@ -63,6 +69,24 @@ class Sums:
         if fact not in self.weights:
             self.weights[fact] = relevance([(c, p) for c, p in self.facts.get(fact, {}).values()])
         return self.weights[fact]
+
+    def part(self, pattern: Mapping[str, str]) -> tuple[str, Sums] | None:
+        """Return the fact that discriminates most here and the counts of its value alone; None where counts are thin."""
+        if self.parts is None:
+            self.parts = {}
+            if min(self.chosen, self.passed) >= ENOUGH:
+                self.apart = max(self.facts, key=lambda fact: (self.relevance(fact), fact), default=None)
+                if self.apart is not None and self.relevance(self.apart) < TELLING:
+                    self.apart = None
+            if self.apart is not None:
+                for known, (c, p) in self.patterns.items():
+                    value = dict(known).get(self.apart)
+                    if value is not None:
+                        part = self.parts.setdefault(value, Sums())
+                        part.add(known, c, p)
+                        part.patterns[known] = [c, p]
+        within = self.parts.get(pattern.get(self.apart, "")) if self.apart is not None else None
+        return None if within is None or self.apart is None else (self.apart, within)
 
 
 def relevance(pairs: Sequence[tuple[float, float]]) -> float:
@@ -81,6 +105,18 @@ def relevance(pairs: Sequence[tuple[float, float]]) -> float:
         divergence += (a * math.log(a / middle) if a else 0.0) + (b * math.log(b / middle) if b else 0.0)
     bias = (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
     return min(max((divergence / 2 - bias) / math.log(2), 0.0), 1.0)
+
+
+def preferred(experience: Experience) -> set[tuple[str, str, str]]:
+    """Return behaviour, role and individual where one was taken `CLEAR` times as often as it was passed over, of late."""
+    sums: dict[tuple[str, str, str], list[float]] = {}
+    for conclusion, table in experience.preferences(DECAY).items():
+        for pattern, (c, p) in table.items():
+            fact, who = pattern[-1]
+            pair = sums.setdefault((conclusion.behavior, fact.removesuffix(IS_WHO), who), [0.0, 0.0])
+            pair[0] += c
+            pair[1] += p
+    return {key for key, (c, p) in sums.items() if c >= CLEAR * (p + 1)}
 
 
 class Judge:
@@ -154,10 +190,18 @@ class Judge:
         prior = 0.0
         weights = dict.fromkeys((fact for fact, _ in pattern), 0.0)
         ratios: dict[str, tuple[float, float]] = {}
-        for sums in levels:
+        strata = [("", sums) for sums in levels]
+        given = dict(pattern)
+        while (part := strata[-1][1].part(given)) is not None:
+            strata.append(part)
+        moved = dict.fromkeys(given, 0.0)
+        for apart, sums in strata:
             total = sums.chosen + sums.passed
+            before = prior
             here = math.log((sums.chosen + 0.5) / (sums.passed + 0.5))
             prior = (total * here + ALPHA * prior) / (total + ALPHA)
+            if apart:
+                moved[apart] += prior - before
             m = min(sums.chosen, sums.passed)
             if not m:
                 continue
@@ -170,9 +214,9 @@ class Judge:
                     (m * p / sums.passed + ALPHA * above[1]) / (m + ALPHA),
                 )
                 weights[fact] = (m * sums.relevance(fact) + ALPHA * weights[fact]) / (m + ALPHA)
-        found = [Factor(f"{candidate.conclusion}", "prior", prior)]
+        found = [Factor(f"{candidate.conclusion}", "prior", prior - sum(moved.values()))]
         found += [
-            Factor(fact, value, weights[fact] * math.log(ratios[fact][0] / ratios[fact][1]))
+            Factor(fact, value, moved[fact] + weights[fact] * math.log(ratios[fact][0] / ratios[fact][1]))
             for fact, value in pattern
             if fact in ratios
         ]
@@ -193,11 +237,11 @@ class Judge:
         found = []
         liked = self.liked.get((candidate.conclusion.behavior, candidate.conclusion.classes), {})
         for role, individual in candidate.roles if liked else ():
-            c, p = liked.get((*pattern, (f"{role} is who", individual)), (0.0, 0.0))
+            c, p = liked.get((*pattern, (f"{role}{IS_WHO}", individual)), (0.0, 0.0))
             if c + p:
                 before = 1 / (1 + math.exp(-max(min(odds, 50.0), -50.0)))
                 after = (c + KAPPA * before) / (c + p + KAPPA)
-                found.append(Factor(f"{role} is who", individual, math.log(after) - math.log(1 - after) - odds))
+                found.append(Factor(f"{role}{IS_WHO}", individual, math.log(after) - math.log(1 - after) - odds))
                 odds += found[-1].weight
         return found
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from planner.deciding import Field, Ground
+from planner.deciding import BROAD, Field, Ground
 from planner.describing import Values
 from planner.judging import Judge
 from planner.table import Cell, Key, arguments_of
@@ -23,6 +23,7 @@ from reasoner.symbols import FALSE
 
 WEIGHT = 1  # open goals that one discrepancy weighs
 SURE = 0.0  # ln odds: rather chosen than passed over
+LOST = 3  # expansions without getting nearer, after which more than the first of its sort is thought of
 NEAR, FAR = 3, 6  # steps ahead from which a candidate may work towards a goal; the second if the first gives none
 
 Here: TypeAlias = "frozenset[tuple[Cell, str]]"
@@ -132,7 +133,7 @@ class Stream:
         scored: dict[Ground, float] = {}
         for reach in (NEAR, FAR):
             for cell in self.field.unmet():
-                for ground in self.field.proposals([cell], reach):
+                for ground in self.field.proposals([cell], reach, BROAD):
                     if ground not in scored and ground not in node.tried:
                         scored[ground] = self._odds(ground)
             if scored:
@@ -152,11 +153,13 @@ class Stream:
                 self._look(cell, node)
         self.stale.clear()
         fresh: set[Cell] = set()
-        while looked := [(*focus[cell], cell) for cell in open_goals if cell in focus]:
-            odds, ground, cell = max(looked, key=lambda entry: entry[0])
-            if odds <= SURE and self.fruitless and len(fresh) < len(open_goals):
+        while len(fresh) < len(open_goals) or any(cell in focus for cell in open_goals):
+            looked = [(*focus[cell], cell) for cell in open_goals if cell in focus]
+            odds, ground, cell = max(looked, key=lambda entry: entry[0], default=(SURE, None, open_goals[0]))
+            if ground is None or (odds <= SURE and self.fruitless and len(fresh) < len(open_goals)):
+                breadth = BROAD if ground is None or self.fruitless >= LOST else 1
                 for other in open_goals:
-                    self._look(other, node)
+                    self._look(other, node, breadth)
                 fresh.update(open_goals)
             elif cell in fresh or (self.field.roles(ground) is not None and abs(self._odds(ground) - odds) < 1e-9):
                 return ground
@@ -165,12 +168,12 @@ class Stream:
                 fresh.add(cell)
         return None
 
-    def _look(self, cell: Cell, node: Node) -> None:
+    def _look(self, cell: Cell, node: Node, breadth: int = 1) -> None:
         """Find the most cogent candidate for one goal."""
         self.focus.pop(cell, None)
         found: tuple[float, Ground] | None = None
         for reach in (NEAR, FAR):
-            for ground in self.field.proposals([cell], reach):
+            for ground in self.field.proposals([cell], reach, breadth):
                 if ground in node.tried:
                     continue
                 self.generated += 1

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from planner.compiling import Program
-from planner.deciding import decisions, shortened, single_level
+from planner.deciding import decisions, shortened, shortest, single_level
 from planner.fast import plan
 from planner.guided import Memory
 from reasoner.experience import Experience
@@ -31,21 +31,24 @@ def reading_of(text: str) -> Reading:
 
 @lru_cache(maxsize=64)
 def problem(
-    family: str, objects: int, seed: int = 0, clutter: int = 0, edit: Callable[[str], str] = as_it_is
+    family: str, objects: int, seed: int = 0, clutter: int = 0, edit: Callable[[str], str] = as_it_is, hands: int = 2
 ) -> Problem:
     """Return a generated scene; `edit` changes its Turtle."""
-    return reading_of(edit(generate(family, objects, clutter=clutter, seed=seed))).problem
+    return reading_of(edit(generate(family, objects, hands, clutter, seed))).problem
 
 
 def teach(experience: Experience, lesson: Problem, level: int = 1) -> None:
-    """Let an experience live one episode: a plan of the fast planner, shortened."""
+    """Let an experience live one episode: a shortest plan, or where none is found soon one of the fast planner, shortened."""
     within = single_level(lesson, level)
     program = Program(within)
-    found = plan(within).plan
-    assert found is not None
-    steps = [(step.behavior, step.arguments) for step in found.at_level(level)]
-    if all(step.level == level for step in found.steps):
-        experience.learn(decisions(program, within, level, shortened(program, within, level, steps)))
+    steps = shortest(program, within, level) if level == 1 else None
+    if steps is None:
+        found = plan(within).plan
+        if found is None or any(step.level != level for step in found.steps):
+            return
+        made = [(step.behavior, step.arguments) for step in found.at_level(level)]
+        steps = shortened(program, within, level, made)
+    experience.learn(decisions(program, within, level, steps))
 
 
 @lru_cache(maxsize=8)

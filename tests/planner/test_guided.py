@@ -6,7 +6,7 @@ import pytest
 
 from planner import fast, guided
 from planner.compiling import Program
-from planner.deciding import Field, Ground, single_level
+from planner.deciding import Field, Ground, shortest, single_level
 from planner.describing import Schema
 from planner.guided import Memory
 from planner.judging import Judge
@@ -14,7 +14,7 @@ from planner.plan import Outcome, Status
 from planner.validation import validate
 from reasoner.experience import Candidate, Decision, Experience, Tally
 from reasoner.symbols import Problem, Symbol
-from tests.planner.lessons import problem, taught
+from tests.planner.lessons import problem, taught, teach
 
 
 def expanded(outcome: Outcome, level: int = 1) -> int:
@@ -51,7 +51,7 @@ def judge_of(memory: Memory, schema: Schema) -> Judge:
 @pytest.mark.parametrize(("family", "objects"), [("served", 30), ("swap", 30)])
 def test_on_scenes_five_times_as_large_every_expansion_is_a_step(family: str, objects: int) -> None:
     within = problem(family, objects, 1)
-    outcome = guided.plan(within, taught())
+    outcome = guided.plan(within, taught(), "leading")
     assert outcome.plan is not None
     assert validate(within, outcome.plan) == []
     assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
@@ -85,16 +85,61 @@ def test_a_memory_that_knows_none_of_the_behaviours_is_not_asked() -> None:
     assert {k: c.expanded for k, c in with_memory.search.items()} == {k: c.expanded for k, c in alone.search.items()}
 
 
+def test_what_the_fast_planner_solves_soon_memory_has_no_part_in() -> None:
+    within = problem("swap", 8)
+    alone, with_memory = fast.plan(within), guided.plan(within, taught())
+    assert with_memory.plan == alone.plan
+    assert {k: c.expanded for k, c in with_memory.search.items()} == {k: c.expanded for k, c in alone.search.items()}
+
+
+def test_a_clear_preference_is_obeyed_from_the_first_expansion_on() -> None:
+    within = single_level(problem("served", 4), 2)
+    field = Field(Program(within), within, 2)
+    picks = [ground for ground in field.proposals(field.unmet()) if ground[0] == "B2_PICK"]
+    by_object = {ground[1][1]: [g for g in picks if g[1][1] == ground[1][1]] for ground in picks}
+    left, right = (field.candidate(ground) for ground in next(two for two in by_object.values() if len(two) == 2))
+    assert left is not None
+    assert right is not None
+    experience = Experience("robot")
+    assert not Memory(experience).prefers(within, 2)
+    for _ in range(10):
+        experience.learn([Decision(right, (left,))])
+    assert Memory(experience).prefers(within, 2)
+    assert not Memory(experience).prefers(problem("served", 4), 1)
+
+
+def test_a_shortest_plan_is_no_longer_than_the_fast_planners() -> None:
+    within = single_level(problem("full", 6, 101), 1)
+    program, found = Program(within), fast.plan(single_level(problem("full", 6, 101), 1)).plan
+    steps = shortest(program, within, 1)
+    assert steps is not None
+    assert found is not None
+    assert Field(program, within, 1).works(steps)
+    assert len(steps) <= len(found.steps)
+    assert shortest(program, within, 1, most=2) is None
+
+
+def test_one_free_place_and_zones_that_hands_share_are_learned() -> None:
+    experience = Experience("full")
+    for seed in range(200, 208):
+        teach(experience, problem("full", 8, seed))
+    within = problem("full", 20, 1003)
+    outcome = guided.plan(within, Memory(experience), "leading")
+    assert outcome.plan is not None
+    assert validate(within, outcome.plan) == []
+    assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
+
+
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
     within = problem("swap", 8)
     untrusted = replace(taught(), trusted=False)
-    assert expanded(guided.plan(within, untrusted)) == expanded(guided.plan(within, taught(), "strict"))
+    assert expanded(guided.plan(within, untrusted, "leading")) == expanded(guided.plan(within, taught(), "strict"))
 
 
 def test_an_inverted_memory_costs_no_more_than_the_guard_and_spoils_no_plan() -> None:
     for family in ("served", "swap", "full"):
         within = problem(family, 8, 1)
-        alone, misled = fast.plan(within), guided.plan(within, inverted(taught()))
+        alone, misled = fast.plan(within), guided.plan(within, inverted(taught()), "leading")
         assert misled.plan is not None
         assert validate(within, misled.plan) == []
         assert expanded(misled) <= 1.05 * expanded(alone) + guided.STRETCH * (1 + len(within.goal))
@@ -106,7 +151,7 @@ def test_what_is_unsolvable_stays_so() -> None:
 
 def test_the_same_call_gives_the_same_plan() -> None:
     within = problem("swap", 8, 1)
-    assert guided.plan(within, taught()).plan == guided.plan(within, taught()).plan
+    assert guided.plan(within, taught(), "leading").plan == guided.plan(within, taught(), "leading").plan
 
 
 def test_the_same_state_with_swapped_goals_leads_to_another_choice() -> None:
@@ -128,7 +173,7 @@ def test_a_class_never_seen_does_exactly_as_well() -> None:
     for seed in range(2):
         seen, unseen = problem("served", 12, seed), problem("served", 12, seed, edit=bowls)
         assert unseen.classes["Bowl"] == seen.classes["Cup"]
-        one, other = guided.plan(seen, taught()), guided.plan(unseen, fresh(taught()))
+        one, other = guided.plan(seen, taught(), "leading"), guided.plan(unseen, fresh(taught()), "leading")
         assert one.plan is not None
         assert other.plan is not None
         assert [str(s) for s in one.plan.steps] == [str(s) for s in other.plan.steps]
@@ -153,7 +198,7 @@ def fresh(memory: Memory) -> Memory:
 
 def test_a_hundred_irrelevant_objects_change_no_choice() -> None:
     plain, cluttered = problem("served", 8), problem("served", 8, clutter=100)
-    one, other = guided.plan(plain, taught()), guided.plan(cluttered, fresh(taught()))
+    one, other = guided.plan(plain, taught(), "leading"), guided.plan(cluttered, fresh(taught()), "leading")
     assert one.plan is not None
     assert other.plan is not None
     assert [(s.behavior, s.arguments) for s in one.plan.steps] == [(s.behavior, s.arguments) for s in other.plan.steps]
