@@ -8,6 +8,7 @@ people edit is ever rewritten.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 
 import pyoxigraph as ox
@@ -164,7 +165,11 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
         yield ox.Triple(axiom, node(owl + "annotatedSource"), source)
         yield ox.Triple(axiom, node(owl + "annotatedProperty"), node(CORE + "associatedWith"))
         yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
-        yield ox.Triple(axiom, node(CORE + "probability"), ox.Literal(probability))
+        # a decimal, since some programs cut doubles to seven digits when they write Turtle
+        decimal = f"{Decimal(repr(probability)):f}"
+        yield ox.Triple(
+            axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(PREFIXES["xsd"] + "decimal"))
+        )
 
 
 def _readable(*words: str) -> str:

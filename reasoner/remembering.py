@@ -183,7 +183,8 @@ def _experience(
         )
     if head["memoryFormat"] != str(FORMAT):
         raise KnowledgeError(
-            f"{source}: memory of format {head['memoryFormat']}, wanted {FORMAT}; 'confab memory migrate' reads older ones"
+            f"{source}: memory of format {head['memoryFormat']}, wanted {FORMAT}: this version doesn't read it; "
+            "learn anew, or use the version of Confab that wrote it"
         )
     experience = Experience(head["learnsAs"])
     try:
@@ -196,7 +197,7 @@ def _experience(
                 )
                 links.append((counter, pattern, Tally(*(int(node.get(key, "0")) for key in TALLY))))
         counters = {key: _meaning(node, names) for key, node in nodes.items() if "epoch" in node}
-        patterns = {key: _facts(node["facts"]) for key, node in nodes.items() if "facts" in node}
+        patterns = {key: _facts(node["facts"], _local(key), source) for key, node in nodes.items() if "facts" in node}
         for counter, pattern, tally in links:
             who, conclusion = counters[SPACE + counter]
             table = experience.counts.setdefault(who, {}).setdefault(conclusion, {})
@@ -215,8 +216,16 @@ def _meaning(node: Mapping[str, str], names: Names | None) -> tuple[tuple[str, i
     return (node["replica"], int(node["epoch"])), Conclusion(short(node["behavior"]), classes)
 
 
-def _facts(text: str) -> Pattern:
-    return tuple((fact, value) for fact, _, value in (said.rpartition(": ") for said in text.split(BETWEEN) if said))
+def _facts(text: str, name: str, source: str) -> Pattern:
+    """Return the facts of a pattern; in the first files of this format they stood on lines of their own."""
+    parts = [part for part in text.split("\n" if "\n" in text else BETWEEN) if part]
+    found = tuple((fact, value) for fact, _, value in (part.rpartition(": ") for part in parts))
+    if any(part.count(": ") != 1 for part in parts) and _pattern(found) != name:
+        raise KnowledgeError(
+            f"{source}: broken memory: the facts of {name} can't be told apart: '{text[:60]}…'; wanted 'fact: value' joined "
+            f"by '{BETWEEN}'; restore the file as Confab wrote it, or plan with --no-memory"
+        )
+    return found
 
 
 def _id(term: object) -> str:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import rdflib
 
 from planner.learning import learn
 from planner.refinement import plan
@@ -28,6 +29,12 @@ def test_links_survive_the_file(tmp_path: Path, serving: Reading, links: Links) 
     path = tmp_path / "memory.ttl"
     save_links(path, links, serving.names, serving.problem.scene)
     assert load_links(path, serving.names) == links
+
+
+def test_links_survive_a_program_that_writes_the_file_anew(tmp_path: Path, serving: Reading, links: Links) -> None:
+    save_links(tmp_path / "ours.ttl", links, serving.names, serving.problem.scene)
+    rdflib.Graph().parse(tmp_path / "ours.ttl").serialize(tmp_path / "theirs.ttl")
+    assert load_links(tmp_path / "theirs.ttl", serving.names) == links
 
 
 def test_the_same_links_give_the_same_file(tmp_path: Path, serving: Reading, links: Links) -> None:

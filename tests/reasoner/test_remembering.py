@@ -44,6 +44,19 @@ def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: P
     assert load(tmp_path / "theirs.ttl", NAMES) == experience
 
 
+def test_the_first_files_of_this_format_are_read_and_spoilt_ones_say_so(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    pattern = (("object · goal LOCATION", "unmet"), ("object is", "Cup"))
+    experience.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup",)), pattern))])
+    save(tmp_path / "now.ttl", experience, NAMES, DOMAIN)
+    text = (tmp_path / "now.ttl").read_text()
+    for between, name in ((r"\n", "first.ttl"), ("n", "spoilt.ttl")):  # the OWL API made a plain n of the line breaks
+        (tmp_path / name).write_text(text.replace("unmet | object", f"unmet{between}object"))
+    assert load(tmp_path / "first.ttl", NAMES) == experience
+    with pytest.raises(KnowledgeError, match="can't be told apart"):
+        load(tmp_path / "spoilt.ttl", NAMES)
+
+
 def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> None:
     one, two = lived("one", 3), lived("two", 2)
     save(tmp_path / "one.ttl", one, NAMES, DOMAIN)
