@@ -218,8 +218,7 @@ class Reached:
         self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
     ) -> Iterator[Ints]:
         """Yield the rows of a schema's terms, at most once, that match every atom inside its range of rows."""
-        if self.deadline is not None and perf_counter() > self.deadline:
-            raise OutOfTimeError("the time limit came first")
+        self.check_time()
         columns: dict[str, Ints] = {}
         count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
         while waiting:
@@ -239,6 +238,11 @@ class Reached:
             columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
         if count:
             yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
+
+    def check_time(self) -> None:
+        """Raise `OutOfTimeError` when the deadline has passed."""
+        if self.deadline is not None and perf_counter() > self.deadline:
+            raise OutOfTimeError("the time limit came first")
 
     def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
         """Estimate how many rows of the atom's table match one row of `columns`."""
@@ -568,6 +572,7 @@ class _Assembly:
         """Give a bit to every reachable fact whose symbol can change."""
         reached, names = self.reached, self.reached.individuals
         for name, situation in reached.situations.items():
+            reached.check_time()
             table = reached.tables["situation", name]
             if situation.boolean:
                 symbols = np.arange(len(table))
@@ -615,6 +620,7 @@ class _Assembly:
         keep = np.ones(len(rows), bool)
         pairs: list[tuple[Ints, Ints]] = []
         for condition in schema.residue:
+            self.reached.check_time()
             used = sorted(variables(condition) & columns.keys())
             combinations, inverse = self.reached.combinations(columns, used, len(rows))
             found = [
@@ -671,6 +677,7 @@ class _Assembly:
             np.concatenate([own_row, np.repeat(extra, lengths)]), np.concatenate([own_bit, inherited]), count
         )
         # Effects: relaxed operator, position, symbol, bit (-1: false).
+        reached.check_time()
         effects = self._effects(rows, first)
         symbol_bits: dict[int, list[int]] = defaultdict(list)
         for name, bits in self.fact_bit.items():
@@ -678,6 +685,7 @@ class _Assembly:
                 if bit >= 0:
                     symbol_bits[symbol].append(bit)
         add = self._adds(effects, need, symbol_bits, count)
+        reached.check_time()
         by_owner = np.lexsort((effects[:, 1], owner[effects[:, 0]])) if len(effects) else np.empty(0, np.int64)
         ordered = effects[by_owner]
         starts = np.searchsorted(owner[ordered[:, 0]], np.arange(operators + 1))
@@ -799,7 +807,9 @@ class _Assembly:
             stride = self.symbols + 1
             known = dict(zip((owner * stride + before).tolist(), need.items.tolist(), strict=True))
             extra_row, extra_bit = [], []
-            for relaxed, _, symbol, bit in effects.tolist():
+            for number, (relaxed, _, symbol, bit) in enumerate(effects.tolist()):
+                if not number % 1000:
+                    self.reached.check_time()
                 had = known.get(relaxed * stride + symbol)
                 for value in symbol_bits[symbol] if had is None else (had,):
                     if value != bit and value in complements:

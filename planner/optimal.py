@@ -28,6 +28,8 @@ from planner.serialise import closed, refusal
 from planner.task import Task
 from reasoner.symbols import Problem
 
+SEARCHING = 0.9
+"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 Heuristic = Callable[[int], float]
 """A lower bound on the cost from a state to the goal; infinite where there is no way."""
 
@@ -53,7 +55,7 @@ def plan(
         Optimal if `bound` is the cost of the plan's primitives.
     """
     begin = perf_counter()
-    deadline = None if limits.seconds is None else begin + limits.seconds
+    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     using = using or compiled(problem)
     best = fast_plan(problem, limits=_left(limits, deadline), using=using)
     best = _shortened(problem, best, limits, using, deadline)
@@ -86,7 +88,7 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
     begin = perf_counter()
     shapes = 8
     while best.plan is not None and shapes <= 512:
-        if deadline is not None and perf_counter() - begin > (deadline - begin) / 4:
+        if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
             break
         again = fast_plan(problem, limits=_left(limits, deadline), using=using, improve=shapes)
         shapes *= 4
@@ -107,7 +109,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
         return 0.0, None
     if isinstance(task, Reason):
         return math.inf, None
-    heuristic = lm_cut(task)
+    heuristic = lm_cut(task, deadline)
     lower = heuristic(task.initial)
     costs = set(task.costs)
     if lower < upper and len(costs) == 1:
@@ -174,8 +176,8 @@ def a_star(
     return upper, None
 
 
-def lm_cut(task: Task) -> Heuristic:
-    """Return the LM-cut heuristic of a task.
+def lm_cut(task: Task, deadline: float | None = None) -> Heuristic:
+    """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is a bound, too.
 
     Bits are numbered as in the task, with two more: one that always holds, for operators that need nothing, and one that the
     goal's bits give at no cost.
@@ -190,6 +192,8 @@ def lm_cut(task: Task) -> Heuristic:
     needed_by: list[list[int]] = [[] for _ in range(task.size + 2)]
     added_by: list[list[int]] = [[] for _ in range(task.size + 2)]
     for o, (needed, added) in enumerate(zip(needs, adds, strict=True)):
+        if not o % 1000 and deadline is not None and perf_counter() > deadline:
+            return lambda state: 0.0
         for bit in needed:
             needed_by[bit].append(o)
         for bit in added:
@@ -204,6 +208,8 @@ def lm_cut(task: Task) -> Heuristic:
         for bit in facts:
             value[bit] = 0.0
         while queue:
+            if deadline is not None and perf_counter() > deadline:
+                raise TimeoutError
             reached, bit = heapq.heappop(queue)
             if reached > value[bit]:
                 continue
@@ -224,7 +230,10 @@ def lm_cut(task: Task) -> Heuristic:
         price = list(task.costs)
         total = 0.0
         while True:
-            value, support = h_max(facts, price)
+            try:
+                value, support = h_max(facts, price)
+            except TimeoutError:
+                return total
             if math.isinf(value[end]):
                 return math.inf
             if value[end] == 0.0:

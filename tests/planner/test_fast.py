@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
 import pytest
 
+from planner import optimal
 from planner.behaviors import Model, ground
 from planner.exhaust import Space, TooLargeError
 from planner.fast import compiled, plan
@@ -251,3 +253,44 @@ def test_looking_for_short_plans_only_finds_the_same_shortest_ones() -> None:
         assert (bounded.steps and len(bounded.steps)) == (truth.steps and len(truth.steps)), seed
         if truth.steps:
             assert Space(problem, 2).search(50_000, longest=len(truth.steps) - 1).steps is None, seed
+
+
+def test_the_time_limit_holds_where_the_lowest_level_alone_is_planned() -> None:
+    problem = family("swap", 50)
+    level = problem.domain.levels[-1]
+    only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
+    flat = replace(problem, domain=replace(problem.domain, behaviors=only))
+    over = []
+    for search in (plan, optimal.plan):
+        begin = perf_counter()
+        outcome = search(flat, limits=Limits(expansions=10**9, seconds=1.0))
+        over.append(perf_counter() - begin - 1.0)
+        assert outcome.status is Status.GAVE_UP
+    assert max(over) < 0.5  # a tenth on a machine with nothing else to do
+
+
+@pytest.mark.parametrize("n", [10, 20])
+def test_a_table_without_a_free_place_is_solved_by_two_hands(n: int) -> None:
+    for seed in range(2):
+        problem = family("packed", n, seed)
+        outcome = plan(problem)
+        assert outcome.plan is not None
+        assert validate(problem, outcome.plan) == []
+
+
+def test_a_goal_out_of_reach_is_proved_without_grounding_a_large_table() -> None:
+    problem = family("served", 200)
+    place = "location401"
+    classes = {
+        kind: (*members, place) if "location1" in members else members for kind, members in problem.classes.items()
+    }
+    cup = next(symbol.arguments[0] for symbol in problem.goal if symbol.situation == "BEVERAGE")
+    fallen = replace(problem, classes=classes, initial={**problem.initial, Symbol("LOCATION", (cup,)): place})
+    tracemalloc.start()
+    outcome = plan(fallen)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None
+    assert cup in outcome.reason.text
+    assert most < 300e6
