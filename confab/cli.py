@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 YES, NO, MISUSE, GAVE_UP = 0, 1, 2, 3
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
+CLICK_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+"""What a wrong call raises; typer has it from click, or from a copy of its own."""
+
 app = typer.Typer(
     name="confab",
     help="A robot planner whose knowledge lives in an ontology.",
@@ -65,12 +68,12 @@ MemoryFile = Annotated[
     Path | None, typer.Option("--memory", metavar="FILE", help="The only place where memory is read or written.")
 ]
 NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory, in so many words.")]
-Mode = Annotated[str, typer.Option("--mode", metavar="MODE", help="guarded, strict or paper (A* with eq. 5).")]
+Mode = Annotated[str, typer.Option("--mode", metavar="MODE", help="guarded, leading, strict, or paper (A*, eq. 5).")]
 TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3)."),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is random.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Gui = Annotated[bool, typer.Option("--gui", help="Show the first rollout in a window; needs a screen.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where files are written.")]
@@ -123,7 +126,7 @@ def run(
     no_video: Annotated[bool, typer.Option("--no-video", help="Don't film: faster.")] = False,
     gui: Gui = False,
 ) -> None:
-    """Do the main job: validate, plan, verify in physics, learn, report."""
+    """Validate, plan, verify in physics, learn and report."""
     from confab.running import run as run_all
 
     raise typer.Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
@@ -147,7 +150,7 @@ def verify(
     gui: Gui = False,
     as_json: AsJson = False,
 ) -> None:
-    """Let a robot carry out a plan in physics, and check every primitive there."""
+    """Carry a plan out in physics and check every primitive."""
     from confab.physics import counted
     from confab.scene import load
 
@@ -180,6 +183,7 @@ def execute(
     both_hands: Annotated[
         bool, typer.Option("--both-hands", help="In PyBullet: all hands at once, without interventions.")
     ] = False,
+    learn: Annotated[bool, typer.Option("--learn", help="Learn the episode, failures too, into --memory.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
@@ -188,13 +192,26 @@ def execute(
 
     loaded = load(scene, iri)
     remembered = _memory(memory, no_memory, loaded)
-    links = remembered.links if remembered else None
+    if learn and (memory is None or remembered is None):
+        raise KnowledgeError("--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)")
     with spectator() as tell:
         execution = loaded.execute(
-            plan, intervene or (), world, goal or (), links, mode, seed, tell, perturb=perturb, both_hands=both_hands
+            plan,
+            intervene or (),
+            world,
+            goal or (),
+            remembered,
+            mode,
+            seed,
+            tell,
+            perturb=perturb,
+            both_hands=both_hands,
         )
     if save is not None:
         execution.save(save)
+    if learn and memory is not None and remembered is not None:
+        remembered.live(loaded.problem, execution.episode)
+        remembered.save(memory)
     _print(execution.json() if as_json else execution)
     raise typer.Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
@@ -214,9 +231,15 @@ def query(
     iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
-    """Ask a scene in SPARQL, or show the query that quantifies a behaviour."""
+    """Ask a scene in SPARQL, or what its objects afford."""
     from confab.scene import load
 
+    asked = {"QUERY": sparql, "--show": show, "--affords": affords}
+    given = [name for name, value in asked.items() if value is not None]
+    if len(given) > 1:
+        raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
+    if applicable and show is None:
+        raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
     loaded = load(scene, iri)
     if show is not None:
         from reasoner.quantify import behavior_named, query_for
@@ -226,11 +249,7 @@ def query(
         return
     if sparql is None and affords is None:
         raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
-    if sparql is None:
-        table = loaded.affordances(affords)
-    else:
-        is_file = sparql.endswith(".rq") and Path(sparql).is_file()
-        table = loaded.query(Path(sparql).read_text(encoding="utf-8") if is_file else sparql)
+    table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql))
     form = "json" if as_json else form
     if form == "csv":
         print(table.csv(), end="")
@@ -251,7 +270,7 @@ def learn(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn from a demonstration, or from own plans, over one or more scenes."""
+    """Learn from own plans or from a demonstration."""
     from confab.interchange import read_plan
     from confab.memory import Memory
     from confab.scene import load
@@ -279,7 +298,7 @@ def new(
         bool, typer.Option("--bodies", help="With shapes, a table and skills, so that 'confab run' can carry it out.")
     ] = False,
 ) -> None:
-    """Begin a domain of your own: a commented skeleton that validates."""
+    """Begin a domain of your own with a commented skeleton."""
     from confab.authoring import new_domain
 
     files = new_domain(domain, folder or Path(domain), bodies)
@@ -293,7 +312,7 @@ def fetch(
     url: Annotated[str, typer.Argument(metavar="URL", help="IRI of an ontology that lies on the web.")],
     folder: Annotated[Path, typer.Option("--into", metavar="DIR", help="Beside the file that imports it.")] = Path(),
 ) -> None:
-    """Fetch an ontology that is imported by URL, and name it in the catalog."""
+    """Fetch an ontology that is imported by URL."""
     from reasoner.fetching import fetch as fetch_ontology
 
     fetched = fetch_ontology(url, folder)
@@ -350,7 +369,10 @@ def validate(
     else:
         _print("\n".join(map(str, findings)) or "nothing is wrong")
         if findings:
-            print(f"{errors} errors, {len(findings) - errors} warnings", file=sys.stderr)
+            from confab.memory import counted
+
+            said = (counted(errors, "error"), counted(len(findings) - errors, "warning"))
+            print(", ".join(said), file=sys.stderr)
     raise typer.Exit(NO if errors or (strict and findings) else YES)
 
 
@@ -359,7 +381,7 @@ def explain(
     scene: SceneName,
     goal: Goals = None,
     memory: MemoryFile = None,
-    step: Annotated[int, typer.Option(metavar="N", help="Which step of the level, counted from 0.")] = 0,
+    step: Annotated[int, typer.Option(metavar="N", min=0, help="Which step of the level, counted from 0.")] = 0,
     level: Annotated[int, typer.Option(metavar="L", help="On which level of the plan.")] = 1,
     against: Annotated[
         str | None, typer.Option(metavar="BEHAVIOR", help="The alternative, e.g. 'B2_PICK right_hand cup1'.")
@@ -367,7 +389,7 @@ def explain(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the reasons: PNG, SVG or PDF.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say why this behaviour was chosen and not that one; or why there is no plan."""
+    """Say why this behaviour and not that, or why no plan."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
     from confab.scene import load
@@ -395,7 +417,7 @@ def explain(
 @memory_app.command()
 def show(
     memory: Annotated[str, typer.Argument(metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")],
-    most: Annotated[int, typer.Option(metavar="N", help="So many rows.")] = 30,
+    most: Annotated[int, typer.Option(metavar="N", min=1, help="So many rows.")] = 30,
     as_json: AsJson = False,
 ) -> None:
     """Show what a memory has counted, what discriminates first."""
@@ -413,15 +435,32 @@ def show(
 def merge(
     memories: Annotated[list[str], typer.Argument(metavar="FILE_OR_URL…", help="Memories to merge.")],
     out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The merged memory; may be one of them.")],
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Let what they have counted lead; else it runs in strict mode.")
+    ] = False,
 ) -> None:
     """Merge memories: the counts of each replica, in any order, once or many times."""
     from confab.memory import Memory
 
     merged = Memory.load(memories[0])
     for source in memories[1:]:
-        merged.merge(Memory.load(source))
+        merged.merge(Memory.load(source), trust)
     merged.save(out)
     _print(f"{out}: {merged!r}")
+
+
+@memory_app.command("trust")
+def trust_(
+    memory: Annotated[Path, typer.Argument(metavar="MEMORY", help="Memory file; it is replaced as a whole.")],
+    replicas: Annotated[list[str], typer.Argument(metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")],
+) -> None:
+    """Let what other replicas have counted lead the search, too."""
+    from confab.memory import Memory
+
+    loaded = Memory.load(memory)
+    loaded.trust(sorted(loaded.experience.episodes) if replicas == ["all"] else replicas)
+    loaded.save(memory)
+    _print(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
 
 
 @app.command()
@@ -450,7 +489,7 @@ def import_(
     out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
     level: Annotated[int, typer.Option(min=1, help="Level of its behaviours; abstract ones can be added above.")] = 1,
 ) -> None:
-    """Turn a PDDL problem into a scene, to be edited in Protégé and planned in."""
+    """Turn a PDDL problem into a scene."""
     from confab.pddl_commands import import_pddl
 
     imported = import_pddl(domain, problem, _turtle(out), level)
@@ -494,6 +533,20 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
         return None
 
 
+def _sparql(given: str) -> str:
+    """Return a query, or what the file of that name holds."""
+    if any(sign in given for sign in "{}?\n"):
+        return given
+    path = Path(given)
+    if path.is_dir():
+        raise KnowledgeError(f"{given}: is a folder; wanted SPARQL text or a .rq file")
+    if path.is_file():
+        return path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix or "/" in given:
+        raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
+    return given
+
+
 def _turtle(path: Path) -> Path:
     """Return the path of a scene to write, if a scene can be read from there again."""
     if path.suffix.lower() != ".ttl":
@@ -534,12 +587,24 @@ def main() -> NoReturn:
     from reasoner.embody import EmbodimentError
 
     try:
-        app()
+        code = app(prog_name="confab", standalone_mode=False)
+    except CLICK_ERROR as error:
+        _complain(_usage(error))
     except (KnowledgeError, DomainError, EmbodimentError) as error:
         _complain(str(error))
     except OSError as error:
         _complain(f"{error.filename or 'file'}: {error.strerror or error}")
-    sys.exit(YES)  # what no command decides otherwise
+    sys.exit(code or YES)  # None where a command decides nothing
+
+
+def _usage(error: Any) -> str:
+    """Return in one line what is wrong with a call; where nothing at all was asked for, print the help instead."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        sys.exit(MISUSE)
+    command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
+    said = " ".join(error.format_message().split()).rstrip(".")
+    return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 
 
 def _complain(text: str) -> NoReturn:

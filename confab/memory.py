@@ -7,8 +7,9 @@ paper's links between facts and quantified behaviours, which the paper's mode re
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ from reasoner.remembering import FORMAT, new_replica, parse, probability, pull, 
 
 if TYPE_CHECKING:
     from confab.scene import Scene
+    from planner.episode import Episode
     from planner.guided import Memory as Advisor
     from reasoner.symbols import Problem
 
@@ -89,8 +91,9 @@ class Memory:
             text = path.read_text(encoding="utf-8")
             if ":memoryFormat" in text or "core#memoryFormat" in text:
                 found.experience = parse(text, str(path), names)
-        if trust:
-            found.trusted.update(found.experience.episodes)
+            elif not len(found.links):
+                raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")
+        found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
 
     def learn(self, scene: Scene, plan: Plan, failed: tuple[int, ...] | None = None) -> None:
@@ -122,9 +125,42 @@ class Memory:
         if trust:
             self.trusted.update(other.experience.episodes)
 
+    def trust(self, replicas: Iterable[str]) -> None:
+        """Let other replicas' experience lead like its own.
+
+        Raises
+        ------
+        KnowledgeError
+            The memory has no such replica.
+        """
+        for replica in replicas:
+            if replica not in self.experience.episodes:
+                known = ", ".join(sorted(self.experience.episodes)) or "none"
+                raise KnowledgeError(f"no replica '{replica}' in this memory (there: {known})")
+            self.trusted.add(replica)
+
+    def live(self, problem: Problem, episode: Episode) -> None:
+        """Learn from what was carried out: what was done, if nobody interfered, and which behaviours were chosen in vain.
+
+        Parameters
+        ----------
+        problem : Problem
+            In which the episode's task was planned.
+        episode : Episode
+        """
+        begun = replace(problem, initial=episode.initial, goal=episode.goal)
+        lived: list[Decision] = []
+        if not episode.interventions and not episode.failures:
+            with suppress(LearningError):  # what was done doesn't follow from what was seen in the beginning
+                lived += decisions_of(begun, episode.done)
+        lived += vain(begun, episode)
+        if lived:
+            self.experience.learn(lived)
+
     def save(self, target: str | Path) -> Path:
         """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters."""
         url = endpoint(target)
+        self.experience.trusts = self.trusted - {self.experience.replica}
         if url is not None:
             push(url, self.experience, self.names, self.scene)
             return Path(target)
@@ -175,14 +211,22 @@ class Memory:
 
     def __repr__(self) -> str:
         """Return how much was learned."""
-        episodes = sum(self.experience.episodes.values())
-        return (
-            f"Memory({len(self.links)} links of {len(self.links.tables)} behaviours, {len(self.experience)} counters of "
-            f"{episodes} episodes by {len(self.experience.episodes)} replicas, in {self.scene})"
-        )
+        learned = counted(len(self.links), "link") + " of " + counted(len(self.links.tables), "behaviour")
+        lived = counted(sum(self.experience.episodes.values()), "episode")
+        by = counted(len(self.experience.episodes), "replica")
+        return f"Memory({learned}, {counted(len(self.experience), 'counter')} of {lived} by {by}, in {self.scene})"
 
     def _repr_html_(self) -> str:
         return f"<p>{self!r}</p>" + self.counts(20)._repr_html_() + self.table(20)._repr_html_()
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "episode"), counted(2, "replica")
+    ('1 episode', '2 replicas')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def endpoint(source: str | Path) -> str | None:
@@ -219,6 +263,38 @@ def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = 
         within = single_level(problem, level)
         if grounds:
             found += decisions(Program(within), within, level, grounds, at)
+    return found
+
+
+def vain(problem: Problem, episode: Episode) -> list[Decision]:
+    """Return the behaviours of the upper levels that were begun in an episode and failed, where they can still be described."""
+    from planner.compiling import Program
+    from planner.deciding import Field, single_level
+
+    plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
+    found: list[Decision] = []
+    for failure in episode.failures:
+        wanted = failure.step.behavior, failure.step.arguments
+        for level in problem.domain.levels[:2]:
+            above = next(
+                (
+                    step
+                    for step in Plan(tuple(plans)).walk()
+                    if step.level == level
+                    and step.path == failure.step.path[: len(step.path)]
+                    and any((under.behavior, under.arguments) == wanted for under in Plan((step,)).primitives)
+                ),
+                None,
+            )
+            if above is None:
+                continue
+            within = single_level(problem, level)
+            for state in (failure.state, episode.initial):
+                field = Field(Program(within), replace(within, initial=state), level)
+                candidate = field.candidate((above.behavior, above.arguments))
+                if candidate is not None:
+                    found.append(Decision(candidate, succeeded=False))
+                    break
     return found
 
 

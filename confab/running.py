@@ -16,6 +16,8 @@ from reasoner.observed import assert_observed, save_observed
 from reasoner.validate import validate
 
 YES, NO, GAVE_UP = 0, 1, 3
+TOLD = 8
+"""After so many primitives it is said how far the plan is, where there is no progress bar."""
 
 
 def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool, gui: bool = False) -> int:
@@ -34,12 +36,15 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     from rich.console import Console
 
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=True)
+    tell("validating")
     findings = validate([name])
     if findings:
         console.print("\n".join(map(str, findings)), markup=False, highlight=False)
     if any(finding.serious for finding in findings):
         return NO
+    tell("loading the scene, and computing what the hands reach if that isn't known")
     scene = with_reach(load(name))
+    tell("planning")
     remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
     result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
@@ -58,15 +63,22 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
 def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: bool = False) -> Report:
     """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
     steps = result.plan.primitives
+    tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
     with progress_bar() as bar:
         task = bar.add_task("", total=len(steps))
-        return scene.verify(
-            result.plan,
-            seed=seed,
-            video=video,
-            gui=gui,
-            progress=lambda done, step: bar.update(task, completed=done, description=str(step)),
-        )
+
+        def progress(done: int, step: object) -> None:
+            bar.update(task, completed=done, description=str(step))
+            if done and done % TOLD == 0:
+                tell(f"{done} of {len(steps)} primitives done")
+
+        return scene.verify(result.plan, seed=seed, video=video, gui=gui, progress=progress)
+
+
+def tell(what: str) -> None:
+    """Say on stderr what goes on, where no progress bar can be shown."""
+    if not sys.stderr.isatty():
+        print(f"confab: {what}", file=sys.stderr, flush=True)
 
 
 def written(scene: Scene, result: Result, report: Report, memory: Memory, out: Path) -> dict[str, Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterable
@@ -19,8 +20,13 @@ def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
         The folder can't be written to.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "is a folder; wanted the name of a file", str(path))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise OSError(error.errno, f"can't be written: {error.strerror}", str(path)) from error
     try:
         with os.fdopen(handle, "wb") as file:
             for piece in pieces:

@@ -218,7 +218,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
         read_prefixes(graph, file)
     except SyntaxError as error:
-        raise KnowledgeError(f"{file}: {error}") from error
+        raise KnowledgeError(f"{file}: {error.msg}") from error
     except OSError as error:
         raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
 

@@ -64,6 +64,8 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     nodes: dict[str, dict[str, str]] = {}
     for fact, predicate, value in graph.select(FACTS):
         nodes.setdefault(text(fact), {})[text(predicate).removeprefix(CORE)] = reading.names.short(text(value))
+    if not nodes:
+        raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
     seen = {_symbol(iri, node, reading.problem.initial, path): node["value"] for iri, node in nodes.items()}
     return Reading(replace(reading.problem, initial={**reading.problem.initial, **seen}), reading.names)
 

@@ -226,14 +226,15 @@ def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
     Raises
     ------
     KnowledgeError
-        A word names nothing of its kind, or the object doesn't have the situation type.
+        A word names nothing of its kind, the object doesn't have the situation type, or two goals exclude each other.
     """
     problem = reading.problem
-    changed = dict(problem.goal)
+    given: dict[Symbol, str] = {}
     for fact in goals:
         symbol, value = parse_fact(problem, fact)
-        changed[symbol] = value
-    return replace(problem, goal=dict(sorted(changed.items())))
+        if given.setdefault(symbol, value) != value:
+            raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
+    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())))
 
 
 def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:

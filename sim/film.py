@@ -64,6 +64,7 @@ class Film:
         self.camera, self.frames, self.speed = camera, frames, speed
         self.width, self.height = width, height
         self.stills = None if stills is None else Path(stills)
+        self._part = self.path.with_name(f".{self.path.stem}.part{self.path.suffix}")
         self._writer: Any = None
         self._number = -1
         self._latest: Array | None = None
@@ -74,7 +75,10 @@ class Film:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None:
+            self.close()
+        else:
+            self._end(keep=False)
 
     def __call__(self, world: World) -> None:
         """Take a frame if it is time for one; what that costs is rendering, by the world's clock."""
@@ -98,11 +102,20 @@ class Film:
         return self._caption(picture(world, self.camera), world.current)
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the file, which has its name only from now on."""
         self._keep()
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
+        self._end(keep=True)
+
+    def _end(self, keep: bool) -> None:
+        """Keep what was filmed, or throw it away: half a film must not look like a whole one."""
+        if self._writer is None:
+            return
+        self._writer.close()
+        self._writer = None
+        if keep:
+            self._part.replace(self.path)
+        else:
+            self._part.unlink(missing_ok=True)
 
     def _keep(self) -> None:
         """Keep the latest frame as the still of the primitive that has ended."""
@@ -118,7 +131,7 @@ class Film:
             options: dict[str, Any] = {"duration": 1000 / self.frames, "loop": 0}
             if self.path.suffix != ".gif":
                 options = {"fps": self.frames, "codec": "libx264", "quality": 8, "macro_block_size": 16}
-            self._writer = imageio.get_writer(self.path, **options)
+            self._writer = imageio.get_writer(self._part, **options)
         self._writer.append_data(image)
 
     def _caption(self, image: Array, number: int) -> Array:

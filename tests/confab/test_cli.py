@@ -67,6 +67,26 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
         (["explain", "beverage-serving", "--memory", "none.ttl"], 2, "no such memory file"),
         (["learn", "beverage-serving", "--plan", "none.json", "--memory", "m.ttl"], 2, "none.json"),
         (["learn", "beverage-serving", "--plan", "broken.ttl", "--memory", "m.ttl"], 2, "not JSON"),
+        (["query", "beverage-serving", "none.rq"], 2, "none.rq: no such file"),
+        (["query", "beverage-serving", "."], 2, "is a folder"),
+        (["query", "beverage-serving", "ASK {}", "--show", "B2_PICK"], 2, "QUERY and --show exclude each other"),
+        (["query", "beverage-serving", "--applicable"], 2, "give --show BEHAVIOR"),
+        (
+            ["plan", "beverage-serving", "--goal", "cup1 LOCATION location7", "--goal", "cup1 LOCATION location8"],
+            2,
+            "two goals for <cup1, LOCATION>",
+        ),
+        (["memory", "show", "m.ttl", "--most", "-1"], 2, "--most"),
+        (["generate", "served", "-o", "s.ttl", "--seed", "-1"], 2, "--seed"),
+        (["generate", "served", "-o", "/"], 2, "ends in .ttl"),
+        (["learn", "beverage-serving", "--memory", "."], 2, ".: is a folder"),
+        (["plan", "beverage-serving", "--from-observed", os.devnull], 2, "no such file of observed facts"),
+        (["plan", "beverage-serving", "--wrong"], 2, "see confab plan --help"),
+        (["plan"], 2, "missing argument 'SCENE'"),
+        (["nonsense"], 2, "no such command 'nonsense'"),
+        (["picture", "beverage-serving", "-o", "x.jpg"], 2, "wanted .png"),
+        (["picture", "beverage-serving", "-o", "x.png", "--behavior", "B2_PIK"], 2, "did you mean 'B2_PICK'"),
+        (["fetch", "file:///etc/hostname"], 2, "wanted the http or https address"),
     ],
 )
 def test_bad_input_is_one_clear_line_and_nothing_is_written(
@@ -99,3 +119,24 @@ def test_plan_needs_neither_rdflib_nor_physics_nor_reasoners() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_what_a_command_does_fits_into_its_line_of_the_help() -> None:
+    done = confab("--help", COLUMNS="80")
+    assert done.returncode == 0
+    assert not [line for line in done.stdout.splitlines()[1:] if line.endswith("...")]
+
+
+def test_where_there_is_no_terminal_a_long_run_says_what_it_does(tmp_path: Path) -> None:
+    done = confab("run", "two-places", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[0] == "confab: validating"
+
+
+def test_empty_files_of_facts_and_memories_are_told(tmp_path: Path) -> None:
+    (tmp_path / "empty.ttl").touch()
+    done = confab("plan", "beverage-serving", "--memory", "empty.ttl", cwd=tmp_path)
+    assert "holds no memory" in done.stderr
+    done = confab("plan", "beverage-serving", "--from-observed", "empty.ttl", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "holds no observed facts" in done.stderr
