@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from reasoner.embodiment import Embodiment
     from reasoner.mirror import Mirror
 
-MODES = ("guarded", "strict", "paper")
+MODES = ("guarded", "leading", "strict", "paper")
 DEFAULT_MODE = MODES[0]
 OPTIMAL_SECONDS = 10.0
 """Where the search for the best plan stops if no time limit is given."""
@@ -204,9 +204,9 @@ class Scene:
         memory : Memory, or Links alone in paper mode; optional
             What was learned before; none if left out.
         mode : str
-            ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded`` and
-            ``strict``: the fast planner over what the task can need, and how far experience may lead it; behaviours are then
-            numbered among the individuals that were recognised.
+            ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
+            ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
+            it; behaviours are then numbered among the individuals that were recognised.
         time_limit : float, optional
             Seconds after which the call gives up; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
         optimal : bool
@@ -283,7 +283,7 @@ class Scene:
         interventions: Iterable[str] = (),
         world: str | World = "symbolic",
         goals: Iterable[str] = (),
-        memory: Links | None = None,
+        memory: Memory | Links | None = None,
         mode: str = DEFAULT_MODE,
         seed: int = 0,
         tell: Callable[[Moment], None] | None = None,
@@ -291,8 +291,8 @@ class Scene:
     ) -> Execution:
         """Carry the task out in a closed loop: see `confab.execution.execute`.
 
-        `plan` is what to begin with: a result, a plan, or the name of a file that ``confab plan --json`` wrote. In paper mode
-        replanning from scratch is the paper's, with `memory`.
+        `plan` is what to begin with: a result, a plan, or the name of a file that ``confab plan --json`` wrote. Plans from
+        scratch are made with `memory`; `Memory.live` learns from what came of it.
         """
         from confab.execution import execute, planner_of
         from confab.interchange import read_plan
@@ -302,7 +302,11 @@ class Scene:
             problem, plan = plan.problem, plan.plan
         elif isinstance(plan, str | Path):
             plan = read_plan(Path(plan), problem)
-        planner = planner_of(mode, memory)
+        planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
+        if planner is None and memory is not None and not isinstance(memory, Links):
+            from planner.guided import planner_with
+
+            planner = planner_with(memory.advisor, mode)
         return execute(self, problem, plan, interventions, world, planner, seed, tell, **options)
 
     def __repr__(self) -> str:

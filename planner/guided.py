@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from planner import fast
+from planner.compiling import Program
 from planner.deciding import Field, Ground
 from planner.describing import CROWD, Schema
 from planner.judging import Judge, preferred
@@ -59,6 +60,11 @@ class Memory:
             roles = {behavior.name: schema.roles(behavior) for behavior in behaviors}
             self._judge = Judge(self.experience, schema.problem.parents, roles)
         return self._judge
+
+    def stream(self, program: Program, problem: Problem, level: int) -> Stream:
+        """Return the search that this memory leads."""
+        schema = Schema(program)
+        return Stream(Field(program, problem, level, schema), self.judge(schema))
 
     def knows(self, behaviors: Iterable[str]) -> bool:
         """Whether anything was counted of any of these behaviours."""
@@ -178,8 +184,7 @@ def plan(
     deadline = None if limits.seconds is None else began + limits.seconds
 
     def begin() -> Stream:
-        schema = Schema(using.program)
-        return Stream(Field(using.program, problem, first, schema), memory.judge(schema))
+        return memory.stream(using.program, problem, first)
 
     strict = mode == "strict" or not memory.trusted
     if patience is None:
@@ -208,6 +213,11 @@ def plan(
         search.setdefault(level, Counts()).expanded += expanded
     search.setdefault(first, Counts()).add(Counts(stream.generated, stream.evaluated, stream.expanded))
     return replace(outcome, search=search, seconds=perf_counter() - began)
+
+
+def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], Outcome]:
+    """Return what plans any problem of one domain with experience."""
+    return lambda problem: plan(problem, memory, mode)
 
 
 def refined(problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None) -> Outcome | None:

@@ -102,6 +102,7 @@ class Experience:
     replica: str
     episodes: dict[str, int] = field(default_factory=dict)
     counts: dict[tuple[str, int], Tallies] = field(default_factory=dict)
+    trusts: set[str] = field(default_factory=set)
 
     def learn(self, decisions: Iterable[Decision]) -> None:
         """Count the decisions of one episode.

@@ -91,6 +91,8 @@ def turtle(experience: Experience, names: Names, domain: str, only: str | None =
     iri = f"urn:uuid:{experience.replica}"
     prefixes = {"core": CORE, "owl": PREFIXES["owl"], "rdfs": PREFIXES["rdfs"], "space": SPACE}
     yield HEAD.format(**prefixes, iri=iri, domain=domain, format=FORMAT, replica=experience.replica)
+    for replica in sorted(experience.trusts) if only is None else ():
+        yield f"<{iri}> :trusts {_text(replica)} .\n"
     for replica, episodes in sorted(experience.episodes.items()):
         if only in (None, replica):
             yield f'm:replica_{replica} a owl:NamedIndividual, :Replica ; :replica "{replica}" ; :episodes {episodes} .\n'
@@ -173,8 +175,11 @@ def _experience(
     triples: Iterable[ox.Triple], links: list[tuple[str, str, Tally]], source: str, names: Names | None
 ) -> Experience:
     nodes: dict[str, dict[str, str]] = {}
+    trusts: dict[str, set[str]] = {}
     for triple in triples:
         predicate = triple.predicate.value.removeprefix(CORE)
+        if predicate == "trusts":
+            trusts.setdefault(_id(triple.subject), set()).add(_id(triple.object))
         nodes.setdefault(_id(triple.subject), {})[predicate] = _id(triple.object)
     head = next((node for node in nodes.values() if "memoryFormat" in node), None)
     if head is None:
@@ -186,7 +191,7 @@ def _experience(
             f"{source}: memory of format {head['memoryFormat']}, wanted {FORMAT}: this version doesn't read it; "
             "learn anew, or use the version of Confab that wrote it"
         )
-    experience = Experience(head["learnsAs"])
+    experience = Experience(head["learnsAs"], trusts=trusts.get(f"urn:uuid:{head['learnsAs']}", set()))
     try:
         for node in nodes.values():
             if "episodes" in node:

@@ -15,6 +15,7 @@ from reasoner.experience import Experience
 from reasoner.generate import generate
 from reasoner.graph import load
 from reasoner.reading import Reading, read
+from reasoner.recognition import recognise
 from reasoner.symbols import Problem
 
 
@@ -35,6 +36,15 @@ def problem(
 ) -> Problem:
     """Return a generated scene; `edit` changes its Turtle."""
     return reading_of(edit(generate(family, objects, hands, clutter, seed))).problem
+
+
+@lru_cache(maxsize=64)
+def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Problem:
+    """Return what of a generated scene its task can need, as ``confab plan`` sees it."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.ttl"
+        path.write_text(generate(family, objects, clutter=clutter, seed=seed))
+        return recognise(load(path)).problem
 
 
 def teach(experience: Experience, lesson: Problem, level: int = 1) -> None:

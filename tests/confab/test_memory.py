@@ -1,0 +1,55 @@
+"""Memory at the front desk: who may lead, and what is learned from what was carried out."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import rdflib
+
+import confab
+from planner.episode import Failure
+from reasoner.experience import Candidate, Conclusion, Decision, Experience
+from reasoner.graph import KnowledgeError
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+def test_trust_is_kept_in_the_file_and_not_passed_on(tmp_path: Path, scene: confab.Scene) -> None:
+    memory, other = confab.Memory.of(scene), Experience("other")
+    other.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup", "Location")), (("a", "b"),)))])
+    memory.experience.merge(other)
+    assert not memory.advisor.trusted
+    with pytest.raises(KnowledgeError, match="no replica 'nobody'"):
+        memory.trust(["nobody"])
+    memory.trust(["other"])
+    assert memory.advisor.trusted
+    memory.save(tmp_path / "memory.ttl")
+    assert confab.Memory.load(tmp_path / "memory.ttl", scene).advisor.trusted
+    rdflib.Graph().parse(tmp_path / "memory.ttl").serialize(tmp_path / "theirs.ttl")
+    assert confab.Memory.load(tmp_path / "theirs.ttl", scene).advisor.trusted
+    third = confab.Memory.of(scene)
+    third.merge(confab.Memory.load(tmp_path / "memory.ttl", scene))
+    assert not third.advisor.trusted
+
+
+def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -> None:
+    one, other = confab.Memory.of(scene), confab.Memory.of(scene)
+    execution = scene.execute(memory=one)
+    one.live(scene.problem, execution.episode)
+    other.learn(scene, execution.episode.done)
+    assert one.experience.totals() == other.experience.totals() != {}
+
+
+def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:
+    memory = confab.Memory.of(scene)
+    episode = scene.execute().episode
+    primitive = episode.planned.primitives[0]
+    failure = Failure(primitive, "slipped", (), "it slipped", episode.initial)
+    memory.live(scene.problem, replace(episode, failures=(failure,)))
+    tallies = [(c.behavior, t) for _, c, _, t in memory.experience]
+    above = [step.behavior for step in episode.planned.walk() if step.path in (primitive.path[:1], primitive.path[:2])]
+    assert sorted(behavior for behavior, _ in tallies) == sorted(above)
+    assert all((t.chosen, t.failed) == (0, 1) for _, t in tallies)
