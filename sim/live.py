@@ -196,16 +196,16 @@ def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
 
 
 def take_away(world: World, name: str) -> None:
-    """Take an object, and what is in it, out of the world."""
+    """Take an object, and what is in it, out of the world, unless somebody was faster."""
+    if name not in world.bodies:
+        return
     for bead in contents(world, name):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
-    thing = world.bodies.pop(name, None)
-    if thing is None:
-        return  # somebody was faster
+    thing = world.bodies.pop(name)
     del world.names[thing.body]
     pybullet.removeBody(thing.body, physicsClientId=world.client)
 

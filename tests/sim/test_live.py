@@ -1,0 +1,70 @@
+"""A world in which people interfere: what can happen in it, what does, and who is to blame."""
+
+from collections.abc import Iterator
+
+import pytest
+
+import confab
+from planner.episode import Change, Intervention
+from planner.plan import Step
+from reasoner.symbols import Fact, Symbol
+from sim.live import LiveWorld
+from sim.world import World
+
+REACH = Step((0,), 8, 3, "B3_REACH_HAND_OBJECT", ("right_hand", "bottle1"), {"place": "location4"}, None, ())
+
+
+@pytest.fixture
+def live() -> Iterator[LiveWorld]:
+    scene = confab.load("beverage-serving")
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        yield LiveWorld(world, scene.problem.classes)
+
+
+def put(individual: str, place: str, **when: float) -> Intervention:
+    return Intervention(Change.WORLD, (Fact(Symbol("LOCATION", (individual,)), place),), **when)  # type: ignore[arg-type]
+
+
+def test_what_nobody_can_do_is_known_beforehand(live: LiveWorld) -> None:
+    held = Intervention(Change.WORLD, (Fact(Symbol("HOLDS", ("left_hand",)), "cup1"),))
+    assert live.impossible(put("cup1", "location6")) is None
+    assert "which is no place" in str(live.impossible(put("cup1", "in_hand")))
+    assert "people change BEVERAGE and LOCATION" in str(live.impossible(held))
+    assert "no body on the table" in str(live.impossible(Intervention(Change.REMOVE, individual="left_hand")))
+    assert "has a shape" in str(live.impossible(Intervention(Change.ADD, individual="x", kind="Hand")))
+
+
+def test_a_hand_is_not_to_blame_for_what_a_person_moves_meanwhile(live: LiveWorld) -> None:
+    live.announce((put("cup2", "location6", at=0.4),))
+    assert live.execute(REACH).ok
+    assert live.observe()[Symbol("LOCATION", ("cup2",))] == "location6"
+    assert live.world.elsewhere == set()
+
+
+def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) -> None:
+    live.announce((Intervention(Change.REMOVE, individual="bottle1", at=0.4),))
+    verdict = live.execute(REACH)
+    assert (verdict.ok, verdict.code) == (False, "interrupted")
+    seen = live.observe()
+    assert Symbol("LOCATION", ("bottle1",)) not in seen
+    assert Symbol("HAND_POSITION", ("right_hand",)) in seen  # whatever it is, it has a name
+
+
+def test_what_is_gone_is_moved_by_nobody(live: LiveWorld) -> None:
+    gone = Intervention(Change.REMOVE, individual="cup1")
+    for intervention in (gone, gone, put("cup1", "location6")):
+        live.disturb(intervention)
+    assert "cup1" not in live.world.bodies
+
+
+def test_what_slipped_is_held_the_way_it_is(live: LiveWorld) -> None:
+    grasp = Step((1,), 29, 3, "B3_GRASP", ("right_hand",), {"object": "bottle1"}, None, ())
+    nothing = Step((2,), 30, 3, "B3_PUT_DOWN", ("left_hand",), {"object": "cup1", "location": "location1"}, None, ())
+    assert live.execute(REACH).ok
+    assert live.execute(grasp).ok
+    hand = live.world.hands["right_hand"]
+    assert hand.grasp is not None
+    rotation, base = hand.grasp
+    hand.grasp = rotation, base + 0.05
+    assert not live.execute(nothing).ok
+    assert abs(hand.grasp[1] - base).max() < 0.005
