@@ -10,8 +10,11 @@ import pytest
 
 import confab
 import ontology
+from reasoner.generate import write_scene
+from reasoner.observed import save_observed
 from tests.ontology import owlapi
-from tests.ontology.faults import skeleton
+from tests.ontology.faults import WITH_BODIES, skeleton
+from tests.ontology.test_imports import TEMPLATES
 
 pytestmark = [
     pytest.mark.slow,
@@ -38,21 +41,29 @@ def through_the_owl_api(files: list[Path], target: Path) -> dict[str, list[str]]
     return found
 
 
-def test_shipped_files_and_a_learned_memory_come_back_equal_and_inside_owl_2_dl(tmp_path: Path) -> None:
+def everything(folder: Path) -> list[Path]:
+    """Return every file of triples that is shipped, or that a command writes, but shapes (SHACL) and patterns with gaps."""
     scene = confab.load("beverage-serving")
     memory = confab.Memory.of(scene)
     memory.learn(scene, scene.plan(mode="paper").plan)
-    memory.save(tmp_path / "memory.ttl")
-    assert ontology.ROOT / "alignments" / "soma-alignment.ttl" in ontology.shipped().values()
-    examples = sorted(EXAMPLES.rglob("*.ttl"))
-    assert examples
-    files = [
-        *ontology.shipped().values(),
-        *examples,
-        skeleton(tmp_path),
-        tmp_path / "washing.ttl",
-        tmp_path / "memory.ttl",
+    memory.save(folder / "memory.ttl")
+    save_observed(folder / "observed.ttl", scene.problem.initial, scene.names, scene.iri)
+    write_scene(folder / "swapped.ttl", "swap", 4, 2, 0, 1)
+    skeleton(folder)
+    skeleton(folder, WITH_BODIES)
+    shipped = [
+        path for path in ontology.ROOT.rglob("*.ttl") if not {*TEMPLATES} & {*path.relative_to(ontology.ROOT).parts}
     ]
+    return sorted([*shipped, *EXAMPLES.rglob("*.ttl"), *folder.glob("*.ttl")])
+
+
+def test_every_file_comes_back_equal_and_inside_owl_2_dl(tmp_path: Path) -> None:
+    files = everything(tmp_path)
+    names = [file.name for file in files]
+    assert {"soma-alignment.ttl", "cereal-serving.reach.ttl", "ferry.ttl", "watering-bodies.ttl", "memory.ttl"} <= {
+        *names
+    }
+    assert len(names) == len({*names}), "two files of one name would overwrite each other"
     violations = through_the_owl_api(files, tmp_path / "back")
     assert {file: found for file, found in violations.items() if found} == {}
     assert [file.name for file in files if canonical(file) != canonical(tmp_path / "back" / file.name)] == []
