@@ -164,11 +164,13 @@ def replan(
 
 
 def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
-    """Return the goals that can't hold because what they are about isn't there any more, and why."""
+    """Return the goals that can't hold because what they are about is gone, or lies where no fact speaks of it, and why."""
     return [
         (
             symbol,
-            Reason(f"{symbol} = {value} is wanted, but {symbol.arguments[0]} isn't there", (*symbol.arguments, value)),
+            Reason(
+                f"{symbol} = {value} is wanted, but {symbol.arguments[0]} isn't to be seen", (*symbol.arguments, value)
+            ),
         )
         for symbol, value in problem.goal.items()
         if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean
