@@ -53,7 +53,10 @@ def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Interven
             path = Path(text)
             if not path.is_file():
                 raise KnowledgeError(f"'{text}' is no intervention and no file; wanted {FORMS}")
-            lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+            try:
+                lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+            except UnicodeDecodeError as error:
+                raise KnowledgeError(f"{path}: not UTF-8 text ({error}); wanted one intervention per line") from error
         found += [parse_intervention(problem, line) for line in lines if line]
     return found
 
@@ -82,12 +85,15 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     verb, _, rest = match[3].partition(" ")
     words = rest.split()
     if verb == "goal":
+        if not words:
+            raise KnowledgeError(f"'{text}': wanted 'goal object SITUATION value'")
         return Intervention(Change.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
     if verb == "drop-goal":
         return Intervention(Change.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
     if verb == "remove":
-        (individual,) = words if len(words) == 1 else ("",)
-        return Intervention(Change.REMOVE, individual=_known(problem, individual, text), **when)
+        if len(words) != 1:
+            raise KnowledgeError(f"'{text}': wanted 'remove OBJECT', one object; got {len(words)}")
+        return Intervention(Change.REMOVE, individual=_known(problem, words[0], text), **when)
     if verb == "add":
         return _add(problem, words, text, when)
     return Intervention(Change.WORLD, (Fact(*parse_fact(problem, match[3])),), **when)

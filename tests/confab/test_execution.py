@@ -74,6 +74,8 @@ def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
         (["--both-hands"], "only in the world pybullet"),
         (["--intervene", "after=28 cup9 LOCATION location8"], "did you mean 'cup"),
         (["--intervene", "after=28 remove cup9"], "did you mean 'cup"),
+        (["--intervene", "after=28 remove cup1 cup2"], "one object; got 2"),
+        (["--intervene", "after=28 goal"], "wanted 'goal object"),
         (["--intervene", "after=28 add Cpu cup9 LOCATION location5"], "did you mean 'Cup'"),
         (["--intervene", "after=28 add Cup cup1 LOCATION location5"], "another name"),
         (["--intervene", "after=28 drop-goal cup2 LOCATOIN"], "did you mean"),
