@@ -228,6 +228,9 @@ def query(
         str | None, typer.Option(metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
     ] = None,
     form: Annotated[str, typer.Option("--format", help="table, csv or json.")] = "table",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.ttl", help="What CONSTRUCT gives, as an ontology.")
+    ] = None,
     iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
@@ -249,6 +252,11 @@ def query(
         return
     if sparql is None and affords is None:
         raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
+    if out is not None:
+        if sparql is None:
+            raise KnowledgeError("-o takes what a CONSTRUCT query gives; give the query, too")
+        print(f"{_turtle(out)}: {loaded.construct(_sparql(sparql), out)} triples")
+        return
     table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql))
     form = "json" if as_json else form
     if form == "csv":

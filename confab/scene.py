@@ -150,6 +150,19 @@ class Scene:
         columns, rows = self.knowledge.table(sparql)
         return Table(columns, tuple(tuple(self._cell(term) for term in row) for row in rows))
 
+    def construct(self, sparql: str, path: str | Path) -> int:
+        """Write the triples that a CONSTRUCT query gives into a file that imports this scene; return how many they are.
+
+        Raises
+        ------
+        KnowledgeError
+            The query isn't SPARQL, or gives no triples but rows.
+        """
+        from reasoner.construct import write_construct
+
+        self._pull()
+        return write_construct(self.knowledge, sparql, Path(path))
+
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
         from reasoner.affordance import applicable_query

@@ -30,7 +30,7 @@ FORMATS = {
     ".owl": ox.RdfFormat.RDF_XML,
     ".rdf": ox.RdfFormat.RDF_XML,
 }
-NO_ROWS = "wanted a SELECT query, whose answer is rows; CONSTRUCT, DESCRIBE and ASK give none"
+NO_ROWS = "wanted a SELECT query, whose answer is rows; ASK gives none, and CONSTRUCT goes into a file: -o FILE.ttl"
 PREFIXES = {
     "": CORE,
     "owl": "http://www.w3.org/2002/07/owl#",

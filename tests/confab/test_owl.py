@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-import pyoxigraph as ox
+import pytest
 
 import confab
 import ontology
 from confab.authoring import new_domain
-from reasoner.graph import BASE, load
-from reasoner.reading import read
+from reasoner.graph import KnowledgeError, load
+from reasoner.validate import validate
 
 LABELS = "SELECT ?label WHERE { <https://example.org/tearoom-scene#plate3> rdfs:label ?label }"
 
@@ -38,30 +38,21 @@ def test_what_owlready2_removes_is_gone(tmp_path: Path) -> None:
     assert len(rows) == 0
 
 
-FOREIGN = """
-@prefix soma: <http://www.ease-crc.org/ont/SOMA.owl#> . @prefix dul: <http://www.ontologydesignpatterns.org/ont/dul/DUL.owl#> .
-@prefix k: <https://w3id.org/confab/tabletop#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix : <https://example.org/kitchen#> .
-<https://example.org/kitchen> a owl:Ontology ; owl:imports <https://w3id.org/confab/tabletop> ,
-  <https://w3id.org/confab/soma-alignment> .
-soma:Cup a owl:Class ; rdfs:subClassOf k:Cup . soma:Surface a owl:Class ; rdfs:subClassOf k:Location .
-:mug_3 a owl:NamedIndividual, soma:Cup ; dul:hasLocation :counter_1 . :counter_1 a owl:NamedIndividual, soma:Surface .
-"""
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "kitchen"
 
 
-def test_objects_and_places_of_a_foreign_kitchen_are_read(tmp_path: Path) -> None:
-    (tmp_path / "kitchen.ttl").write_text(FOREIGN)
-    graph = load(tmp_path / "kitchen.ttl")
-    found = graph.query((ontology.ROOT / "alignments" / "places-from-dul.rq").read_text())
-    assert isinstance(found, ox.QueryTriples)
-    for triple in list(found):
-        graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, ox.NamedNode(BASE + "asserted")))
-    problem = read(graph).problem
-    assert problem.classes["Movable"] == ("mug_3",)
-    assert {str(symbol): value for symbol, value in problem.initial.items()} == {
-        "<mug_3, LOCATION>": "counter_1",
-        "<mug_3, BEVERAGE>": "no_beverage",
-    }
+def test_objects_and_places_of_a_foreign_kitchen_are_read_and_planned_with(tmp_path: Path) -> None:
+    for file in EXAMPLE.glob("*.ttl"):
+        (tmp_path / file.name).write_text(file.read_text())
+    query = (ontology.ROOT / "alignments" / "places-from-dul.rq").read_text()
+    assert confab.load(tmp_path / "bridge.ttl").construct(query, tmp_path / "facts.ttl") == 4
+    scene = confab.load(tmp_path / "facts.ttl")
+    assert scene.problem.classes["Movable"] == ("juice_1", "mug_3")
+    steps = scene.plan(["mug_3 LOCATION island"]).json()["steps"]
+    assert [(step["behavior"], step["arguments"]) for step in steps] == [("B1_MOVE", ["mug_3", "island"])]
+    assert [str(finding) for finding in validate([EXAMPLE / "kitchen.ttl"])] == []
+    with pytest.raises(KnowledgeError, match="wanted a CONSTRUCT query"):
+        scene.construct("SELECT ?x WHERE { ?x a k:Cup }", tmp_path / "none.ttl")
 
 
 def test_the_alignment_imports_neither_soma_nor_dul() -> None:
