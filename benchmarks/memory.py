@@ -16,7 +16,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -25,13 +25,16 @@ from statistics import mean, median
 from time import perf_counter, process_time, sleep
 
 from planner import fast, guided
-from planner.deciding import single_level
+from planner.compiling import Program
+from planner.deciding import BROAD, Field, Ground, shortest, single_level
 from planner.guided import Memory
+from planner.judging import Judge
 from planner.learning import learn
 from planner.plan import Limits, Outcome
 from planner.refinement import plan as paper_plan
+from planner.stream import Stream
 from planner.validation import validate
-from reasoner.experience import Experience, Tally
+from reasoner.experience import Candidate, Conclusion, Decision, Experience, Tally
 from reasoner.links import Links
 from reasoner.names import Names
 from reasoner.remembering import load, save
@@ -343,42 +346,99 @@ def killed(path: Path, kills: int) -> int:
     return lost
 
 
+class Grounded(Memory):
+    """Counts of grounded behaviours and the very facts of the world, without roles and classes: for comparison."""
+
+    def stream(self, program: Program, problem: Problem, level: int) -> Stream:
+        """Return the search that these counts lead."""
+        roles = {conclusion.behavior: () for _, conclusion, _, _ in self.experience}
+        return GroundedStream(Field(program, problem, level), Judge(self.experience, {}, roles))
+
+    def knows(self, behaviors: Iterable[str]) -> bool:
+        """Whether anything was counted."""
+        return len(self.experience) > 0
+
+
+class GroundedStream(Stream):
+    """The same search, led by grounded counts."""
+
+    def __init__(self, field: Field, judge: Judge) -> None:
+        super().__init__(field, Judge(Experience("none"), {}, {}))
+        self.judge = judge
+
+    def _odds(self, ground: Ground) -> float:
+        self.evaluated += 1
+        seen = grounded(self.field, ground)
+        return float("-inf") if self.field.roles(ground) is None else self.judge.odds(seen.conclusion, seen.pattern)
+
+
+def grounded(field: Field, ground: Ground) -> Candidate:
+    """Return a behaviour with all facts and goals of the world, each by its name."""
+    facts = [(f"{s} {key}", value) for s, cells in field.table.now.items() for key, value in cells.items()]
+    goals = [(f"goal {s} {key}", value) for (s, key), value in field.goal.items()]
+    return Candidate(Conclusion(" ".join((ground[0], *ground[1])), ()), tuple(sorted(facts + goals)))
+
+
+def teach_grounded(experience: Experience, lesson: Problem) -> None:
+    """Let grounded counts live the same episode as `teach` gives lifted ones."""
+    within = single_level(lesson, 1)
+    program = Program(within)
+    steps = shortest(program, within, 1) or []
+    field, lived = Field(program, within, 1), []
+    for position, step in enumerate(steps):
+        others = [g for g in field.proposals(field.unmet(), breadth=BROAD) if g not in steps[position:]]
+        lived.append(Decision(grounded(field, step), tuple(grounded(field, other) for other in others)))
+        field.do(step)
+    experience.learn(lived)
+
+
 def curve(most: int = 36) -> None:
     """Expansions for each step, and time, over episodes: level 1 of held-out scenes, beside the memoryless search."""
     checks = (0, 1, 2, 4, 6, 12, 18, 24, most)
     tests = [problem(family, 20, HELD_OUT) for family in FAMILIES]
     small = [replace_levels(problem(family, 4, HELD_OUT)) for family in ("served", "swap", "handover")]
-    none = [ratio(fast.plan(within), 1) for within in tests]
-    base = mean(r for r in none if r is not None)
-    experience, links = Experience("curve"), Links()
-    points: list[tuple[int, float, float, float]] = []
+    alone = [cpu(lambda: fast.plan(within, using=fast.compiled(within))) for within in tests]  # noqa: B023
+    base = mean(r for r in (ratio(found, 1) for _, found in alone) if r is not None), mean(t for t, _ in alone) * 1e3
+    lifted, counts, links = Experience("lifted"), Experience("counts"), Links()
+    points: list[tuple[float, ...]] = []
     todo = list(lessons(FAMILIES))[:most]
-    print(f"{'episodes':<10}{'lifted':>8}{'ms':>8}{'none':>8}{'paper, n = 4':>14}")
+    head = (
+        f"{'episodes':<10}{'lifted':>8}{'ms':>8}{'counts':>8}{'ms':>8}{'none':>8}{'ms':>8}{'paper, n = 4':>14}{'ms':>8}"
+    )
+    print(head, flush=True)
     for episode in range(most + 1):
         if episode in checks:
-            memory = Memory(experience)
-            rows = []
-            for within in tests:
-                using = fast.compiled(within)
-                guided.plan(within, memory, using=using)
-                spent, found = cpu(lambda: guided.plan(within, memory, using=using))  # noqa: B023
-                rows.append((ratio(found, 1) or 10.0, spent * 1e3))
-            paper = []
+            row: list[float] = [episode]
+            for memory in (Memory(lifted), Grounded(counts)):
+                spent, ratios = 0.0, []
+                for within in tests:
+                    using = fast.compiled(within)
+                    seconds, found = cpu(lambda: guided.plan(within, memory, "leading", using=using))  # noqa: B023
+                    spent += seconds * 1e3 / len(tests)
+                    ratios.append(ratio(found, 1) or 10.0)
+                row += [mean(ratios), spent]
+            row += base
+            spent, ratios = 0.0, []
             for within in small:
-                found = paper_plan(within, links, limits=Limits(expansions=1000))
-                paper.append(found.search[1].expanded / (len(found.plan.steps) if found.plan else 8))
-            points.append((episode, mean(r for r, _ in rows), mean(t for _, t in rows), mean(paper)))
+                seconds, found = cpu(lambda: paper_plan(within, links, limits=Limits(expansions=1000)))  # noqa: B023
+                spent += seconds * 1e3 / len(small)
+                ratios.append(found.search[1].expanded / (len(found.plan.steps) if found.plan else 8))
+            row += [mean(ratios), spent]
+            points.append(tuple(row))
             print(
-                f"{episode:<10}{points[-1][1]:>8.2f}{points[-1][2]:>8.0f}{base:>8.2f}{points[-1][3]:>14.1f}", flush=True
+                f"{episode:<10}" + "".join(f"{a:>8.2f}{b:>8.0f}" for a, b in zip(row[1:7:2], row[2:7:2], strict=True)),
+                end="",
             )
+            print(f"{row[7]:>14.1f}{row[8]:>8.0f}", flush=True)
         if episode < most:
             family, objects, seed = todo[episode]
             lesson = problem(family, objects, seed)
-            teach(experience, lesson)
+            teach(lifted, lesson)
+            teach_grounded(counts, lesson)
             shown_plan = fast.plan(replace_levels(lesson)).plan
             if shown_plan is not None:
                 links = learn(replace_levels(lesson), shown_plan, links)
-    draw(points, base)
+    draw(points)
 
 
 def replace_levels(within: Problem) -> Problem:
@@ -387,25 +447,23 @@ def replace_levels(within: Problem) -> Problem:
     return replace(within, domain=replace(within.domain, behaviors=top))
 
 
-def draw(points: Sequence[tuple[int, float, float, float]], base: float) -> None:
-    """Draw the learning curve."""
+def draw(points: Sequence[tuple[float, ...]]) -> None:
+    """Draw the learning curve: expansions for each step, and time."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    episodes = [p[0] for p in points]
-    left.axhline(base, color="gray", linestyle="--", label="none (fast planner), n = 20")
-    left.plot(episodes, [p[1] for p in points], "o-", color="tab:blue", label="lifted counts, n = 20")
-    left.plot(episodes, [p[3] for p in points], "s-", color="tab:orange", label="paper's mode, n = 4")
-    left.axhline(1, color="black", linewidth=0.8)
-    left.set_yscale("log")
-    left.set_ylabel("level-1 expansions for each step")
-    right.plot(episodes, [p[2] for p in points], "o-", color="tab:blue", label="lifted counts, n = 20")
-    right.set_ylabel("CPU ms of a planning call")
-    right.set_ylim(bottom=0)
-    for axes in (left, right):
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    names = ("lifted counts, n = 20", "grounded counts, n = 20", "none (fast planner), n = 20", "paper's mode, n = 4")
+    styles = (("o-", "tab:blue"), ("^-", "tab:green"), ("--", "gray"), ("s-", "tab:orange"))
+    labels = "level-1 expansions for each step", "CPU ms of a planning call"
+    for column, (axes, label) in enumerate(zip(figure.subplots(1, 2), labels, strict=True)):
+        for line, (name, (style, color)) in enumerate(zip(names, styles, strict=True)):
+            axes.plot(
+                [p[0] for p in points], [p[1 + 2 * line + column] for p in points], style, color=color, label=name
+            )
+        axes.set_yscale("log")
+        axes.set_ylabel(label)
         axes.set_xlabel("episodes (scenes of 4 to 8 objects)")
-        axes.legend()
+    axes.legend(fontsize=8)
     PICTURE.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURE, dpi=120)
 
