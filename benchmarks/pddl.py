@@ -179,7 +179,10 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
             runs[name, problem] = kept(name, command, domain, problem)
     rejected = [f"{problem}: {name}" for (name, problem), done in runs.items() if done.accepted is False]
     folders = list(dict.fromkeys(place for place, _, _ in found))
-    print("Solved, and CPU seconds over the problems that the planner solved; median length beside lama-first's.\n")
+    print(
+        "Solved, CPU seconds over the problems that the planner solved, geometric mean of plan length over lama-first's where both solve;"
+    )
+    print("of ours, how many plans unified-planning's sequential plan validator accepts.\n")
     print("| problems |", " | ".join(commands), "|")
     print("|---" * (len(commands) + 1) + "|")
     for folder in [*folders, "all"]:
@@ -188,7 +191,9 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
         for name in commands:
             solved = [runs[name, p] for p in here if runs[name, p].plan is not None]
             seconds = sum(r.seconds for r in solved)
-            cells.append(f"{len(solved)} ({seconds:.1f} s{_ratio(runs, name, here)})")
+            judged = [r.accepted for r in solved if r.accepted is not None]
+            valid = f", {sum(judged)} accepted" if judged else ""
+            cells.append(f"{len(solved)} ({seconds:.1f} s{_ratio(runs, name, here)}{valid})")
         print(f"| {folder}: {len(here)} | {' | '.join(cells)} |", flush=True)
     print(f"\nPlans of ours that unified-planning's validator rejects: {len(rejected)}", *rejected, sep="\n")
     for name in commands:

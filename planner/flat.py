@@ -30,6 +30,7 @@ from reasoner.symbols import Problem, State
 BOOST = 1000  # turns that the preferred operators get on a new best h
 ALONE = 1000  # evaluations before the search without lookahead begins to get its share
 SHARE = 3  # of so many evaluations, it gets one
+FAR = 1 << 40  # more than any h
 SHORTEN, SHORTENING = 500_000, 20  # work on the finished plan: so much, and a twentieth of the search's
 
 Prefer = Callable[[int, list[int]], list[int]]
@@ -96,8 +97,8 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Two searches take turns, one with lookahead and one without, since lookahead can lead astray. The same limit of
-    expansions gives the same plan; a deadline can only cut the search short.
+    Three searches take turns: with lookahead; without it, since it can lead astray; by open goals first, and then h. The
+    same limit of expansions gives the same plan; a deadline can only cut the search short.
 
     Parameters
     ----------
@@ -116,12 +117,13 @@ def search(
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
     evaluate = evaluate or automatic(task)
-    searches = [_best_first(task, evaluate, counts, prefer, lookahead) for lookahead in (True, False)]
+    kinds = ((True, False), (False, False), (True, True))  # lookahead, open goals first
+    searches = [_best_first(task, evaluate, counts, prefer, *kind) for kind in kinds]
     turns = 0
     while True:
         turns += 1
         try:
-            next(searches[1 if turns > ALONE and turns % SHARE == 0 else 0])
+            next(searches[1 + turns // SHARE % 2 if turns > ALONE and turns % SHARE == 0 else 0])
         except StopIteration as done:
             if done.value is None:
                 what = f"all {counts.expanded} states that can be reached were searched"
@@ -137,7 +139,7 @@ def search(
 
 
 def _best_first(
-    task: Task, evaluate: Evaluate, counts: Counts, prefer: Prefer | None, lookahead: bool
+    task: Task, evaluate: Evaluate, counts: Counts, prefer: Prefer | None, lookahead: bool, goals_first: bool
 ) -> Generator[None, None, list[int] | None]:
     """Search greedily; yield after each evaluation, return the plan, or None if there is none."""
     apply, goal = task.applied, task.goal
@@ -175,6 +177,8 @@ def _best_first(
             continue
         counts.expanded += 1
         h, relaxed_plan, applicable = evaluation
+        if goals_first:
+            h += FAR * (goal & ~state).bit_count()
         number += 1
         possible = set(applicable)
         preferred = [operator for operator in relaxed_plan if operator in possible]
