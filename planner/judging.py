@@ -20,8 +20,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tallies, lineage
+
+Verdicts: TypeAlias = "dict[tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]], float]"
+"""Cogency by classes, the facts' values, and the individuals where they matter."""
 
 ALPHA = 1.0  # how much the class above weighs in a probability
 KAPPA = 2.0  # how much L weighs against counts of the same pattern
@@ -159,6 +163,9 @@ class Judge:
             )
         self.liked = self._liked(experience.preferences(DECAY))
         self._odds: dict[tuple[Conclusion, Pattern], float] = {}
+        self.verdicts: dict[
+            tuple[str, tuple[str, ...]], Verdicts
+        ] = {}  # by behaviour and the facts that are asked of it
 
     def knows(self, behaviors: Iterable[str]) -> bool:
         """Whether anything was learned of any of these behaviours."""

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from planner.deciding import BROAD, Field, Ground
-from planner.describing import Values
 from planner.judging import Judge
 from planner.table import Cell, Key, arguments_of
 from reasoner.symbols import FALSE
@@ -79,7 +78,10 @@ class Stream:
         for cell, value in field.goal.items():
             for individual in {*arguments_of(cell[1]), value}:
                 self.touching.setdefault(individual, []).append(cell)
-        self._known: dict[tuple[str, tuple[str, ...], Values, tuple[str, ...]], float] = {}
+        self._known = {
+            name: judge.verdicts.setdefault((name, tuple([schema.paths(name)[1][i].name for i in asked])), {})
+            for name, asked in field.view.only.items()
+        }
         if not self.best:
             self.solution = []
 
@@ -190,13 +192,15 @@ class Stream:
             return float("-inf")
         self.evaluated += 1
         name, view = ground[0], self.field.view
-        values = view.values(name, roles) if name in self.judge.facts else ()
-        key = name, tuple([self.field.schema.classes.get(role, "") for role in roles])
-        who = roles if key in self.judge.liked else ()
-        known = self._known.get((*key, values, who))
+        verdicts = self._known.get(name)
+        if verdicts is None:
+            return 0.0
+        values = view.values(name, roles)
+        classes = tuple([self.field.schema.classes.get(role, "") for role in roles])
+        key = classes, values, roles if (name, classes) in self.judge.liked else ()
+        known = verdicts.get(key)
         if known is None:
-            candidate = view.candidate(name, roles, values) if name in self.judge.facts else None
-            known = self._known[(*key, values, who)] = self.judge.cogency(candidate) if candidate else 0.0
+            known = verdicts[key] = self.judge.cogency(view.candidate(name, roles, values))
         return known
 
     # --------------------------------------------------------------------------------------------------------- moving
