@@ -180,9 +180,9 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
     rejected = [f"{problem}: {name}" for (name, problem), done in runs.items() if done.accepted is False]
     folders = list(dict.fromkeys(place for place, _, _ in found))
     print(
-        "Solved, CPU seconds over the problems that the planner solved, geometric mean of plan length over lama-first's where both solve;"
+        "Solved, CPU seconds over the problems that the planner solved, geometric mean of plan length over lama-first's where"
     )
-    print("of ours, how many plans unified-planning's sequential plan validator accepts.\n")
+    print("both solve; of ours, how many plans unified-planning's sequential plan validator accepts.\n")
     print("| problems |", " | ".join(commands), "|")
     print("|---" * (len(commands) + 1) + "|")
     for folder in [*folders, "all"]:
