@@ -307,25 +307,27 @@ def learning() -> None:
         ends = [_obstructed(scene.problem, learns, seed, EPISODES, patience) for seed in range(100)]
         rates = [sum(run[i] for run in ends) / 100 for i in range(EPISODES)]
         print(
-            f"| symbolic, obstacle fails 9 of 10, 100 robots | {learns} "
+            f"| symbolic, obstacle fails 9 of 10, 100 robots, ends at failure {patience.failures} | {learns} "
             f"| {' '.join(f'{100 * r:.0f} %' for r in rates)} | | |",
             flush=True,
         )
         curves["symbolic, 100 robots" + (", learning" if learns else "")] = rates
-    for learns in (False, True):
-        runs = [_beside_a_post(scene, learns, 100 * robot, EPISODES, patience) for robot in range(1, ROBOTS + 1)]
-        columns = list(zip(*runs, strict=True))
-        rates = [sum(e.status is End.REACHED for e in column) / ROBOTS for column in columns]
-        failed = [sum(len(e.failures) for e in column) / ROBOTS for column in columns]
-        seconds = [sum(e.seconds["simulated"] for e in column) / ROBOTS for column in columns]
-        print(
-            f"| PyBullet, perturbed, {ROBOTS} robots | {learns} | {' '.join(f'{100 * r:.0f} %' for r in rates)} "
-            f"| {' '.join(f'{n:.1f}' for n in failed)} | {' '.join(f'{t:.0f}' for t in seconds)} |",
-            flush=True,
-        )
-        curves[f"PyBullet, {ROBOTS} robots" + (", learning" if learns else "")] = rates
-    print(f"\nAn episode ends at failure {patience.failures} (`Patience`).")
-    print(f"The picture: {_save_curves(curves, OUT / 'learning.png')}")
+    for robots, episodes, limit in ((ROBOTS, EPISODES, patience), (1, EPISODES // 2, Patience())):
+        for learns in (False, True):
+            runs = [_beside_a_post(scene, learns, 100 * robot, episodes, limit) for robot in range(1, robots + 1)]
+            columns = list(zip(*runs, strict=True))
+            rates = [sum(e.status is End.REACHED for e in column) / robots for column in columns]
+            failed = [sum(len(e.failures) for e in column) / robots for column in columns]
+            seconds = [sum(e.seconds["simulated"] for e in column) / robots for column in columns]
+            print(
+                f"| PyBullet, perturbed, {robots} robots, ends at failure {limit.failures} | {learns} "
+                f"| {' '.join(f'{100 * r:.0f} %' for r in rates)} | {' '.join(f'{n:.1f}' for n in failed)} "
+                f"| {' '.join(f'{t:.0f}' for t in seconds)} |",
+                flush=True,
+            )
+            if limit is patience:
+                curves[f"PyBullet, {robots} robots" + (", learning" if learns else "")] = rates
+    print(f"\nThe picture: {_save_curves(curves, OUT / 'learning.png')}")
 
 
 def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, patience: Patience) -> list[Episode]:

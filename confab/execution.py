@@ -399,6 +399,8 @@ def _with_both_hands(
         known = problem if caution is None else caution.applied(problem, planner or fast_plan)
         plan = (planner or fast_plan)(known).plan or Plan(())
     done = perform(live.world, problem, plan.primitives)
+    if not done.ok:
+        live.take_stock()
     before = [
         Event(slot.step, slot.begin, slot.end, verdict.ok, verdict.code)
         for slot, verdict in zip(done.slots, done.verdicts, strict=True)

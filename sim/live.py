@@ -24,6 +24,9 @@ from sim.urdf import Array
 from sim.verdict import SkillError, Verdict
 from sim.world import Bead, Thing, World
 
+STOPPED = 0.02
+"""Radians by which a joint stays behind its command if something stops it."""
+
 PAUSE = 60
 """Simulation steps in which what was moved comes to rest."""
 
@@ -71,11 +74,20 @@ class LiveWorld:
         finally:
             self.concerned, self.world.elsewhere = set(), set()
         if not verdict.ok:
-            self._regard_grips()
+            self.take_stock()
         return verdict
 
-    def _regard_grips(self) -> None:
-        """Take what slipped in a hand as held the way it is now: the next primitive asks if it slips further."""
+    def take_stock(self) -> None:
+        """After a failure, begin from how things are.
+
+        An arm that something stopped no longer presses against it, and what slipped in a hand is held the way it is now: the next
+        primitive asks if it slips further.
+        """
+        stopped = [h for h in self.world.hands.values() if float(np.abs(h.measured() - h.posture).max()) > STOPPED]
+        for hand in stopped:
+            hand.command(hand.measured())
+        if stopped:
+            self.world.run(PAUSE)
         for name, hand in self.world.hands.items():
             held = self.world.held(name)
             if held is not None and hand.grasp is not None:
