@@ -101,13 +101,11 @@ def plan(
     as_json: AsJson = False,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
-    from confab.scene import load
-
-    loaded = load(scene, iri)
+    loaded = _load(scene, iri)
     if diff is not None:
         from confab.authoring import difference
 
-        changed = difference(load(diff), loaded, mode)
+        changed = difference(_load(diff), loaded, mode)
         _print(changed.json() if as_json else str(changed))
         raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
@@ -152,9 +150,8 @@ def verify(
 ) -> None:
     """Carry a plan out in physics and check every primitive."""
     from confab.physics import counted
-    from confab.scene import load
 
-    loaded = load(scene)
+    loaded = _load(scene)
     with counted(rollouts) as done:
         report = loaded.verify(
             _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
@@ -188,9 +185,8 @@ def execute(
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
     from confab.live import spectator
-    from confab.scene import load
 
-    loaded = load(scene, iri)
+    loaded = _load(scene, iri)
     remembered = _memory(memory, no_memory, loaded)
     if learn and (memory is None or remembered is None):
         raise KnowledgeError("--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)")
@@ -235,15 +231,13 @@ def query(
     as_json: AsJson = False,
 ) -> None:
     """Ask a scene in SPARQL, or what its objects afford."""
-    from confab.scene import load
-
     asked = {"QUERY": sparql, "--show": show, "--affords": affords}
     given = [name for name, value in asked.items() if value is not None]
     if len(given) > 1:
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
     if applicable and show is None:
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
-    loaded = load(scene, iri)
+    loaded = _load(scene, iri)
     if show is not None:
         from reasoner.quantify import behavior_named, query_for
 
@@ -281,11 +275,10 @@ def learn(
     """Learn from own plans or from a demonstration."""
     from confab.interchange import read_plan
     from confab.memory import Memory
-    from confab.scene import load
 
     remembered: Memory | None = None
     for name in scenes:
-        loaded = load(name)
+        loaded = _load(name)
         if remembered is None:
             remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
         shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered).plan
@@ -400,9 +393,8 @@ def explain(
     """Say why this behaviour and not that, or why no plan."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
-    from confab.scene import load
 
-    loaded = load(scene)
+    loaded = _load(scene)
     remembered = _memory(memory, False, loaded)
     result = loaded.plan(goal or (), remembered)
     if not result.solved or remembered is None:
@@ -517,6 +509,14 @@ def export(
 
     for path in export_pddl(load(scene).problem, level, out):
         print(path)
+
+
+def _load(source: str, iri: str | None = None) -> Scene:
+    """Load a scene, with what its hands reach if it has a body."""
+    from confab.reaching import with_current_reach
+    from confab.scene import load
+
+    return with_current_reach(load(source, iri), lambda what: print(f"confab: {what}", file=sys.stderr))
 
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:

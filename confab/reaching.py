@@ -3,14 +3,42 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 import pyoxigraph as ox
 
+import ontology
 from confab.scene import Scene
+from reasoner.embody import EmbodimentError
 from reasoner.graph import BASE, KnowledgeError
 from reasoner.reach import reach_hash, reach_relation, save_reach
 
 log = logging.getLogger(__name__)
+ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
+SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
+
+
+def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:
+    """Return the scene with reach facts if it has a robot and they are missing, or older than one of the user's own files.
+
+    A scene whose bodies aren't complete yet can be planned in all the same; `tell` then hears what is missing.
+    """
+    graph = scene.knowledge
+    if graph.remote or graph.path is None or graph.path.is_relative_to(ontology.ROOT) or not graph.select(ROBOTS):
+        return scene
+    file = graph.path.with_name(f"{graph.path.stem}.reach.ttl")
+    own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]
+    if file.is_file() and file.stat().st_mtime >= max(path.stat().st_mtime for path in own):
+        return scene
+    tell("computing what the hands reach")
+    try:
+        reached = with_reach(scene)
+        if file.is_file():
+            file.touch()
+        return reached
+    except (KnowledgeError, EmbodimentError, OSError) as error:
+        tell(f"what the hands reach isn't known: {error}")
+        return scene
 
 
 def with_reach(scene: Scene) -> Scene:

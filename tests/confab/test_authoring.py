@@ -1,11 +1,13 @@
 """Beginning a domain, seeing what an edit changed, and taking memory along in a rename."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 import confab
 from confab.authoring import difference, migrate, new_domain, unknown_terms
+from confab.reaching import with_current_reach
 from reasoner.graph import KnowledgeError
 from reasoner.validate import validate
 
@@ -29,6 +31,26 @@ def test_a_new_domain_overwrites_nothing(tmp_path: Path) -> None:
         new_domain("tearoom", tmp_path)
     with pytest.raises(KnowledgeError, match="can't be a domain's name"):
         new_domain("tea room", tmp_path)
+
+
+def test_what_hands_reach_is_computed_when_it_is_missing_or_old(tmp_path: Path) -> None:
+    new_domain("shop", tmp_path, bodies=True)
+    scene, reach, said = tmp_path / "shop-scene.ttl", tmp_path / "shop-scene.reach.ttl", list[str]()
+    assert not confab.load(scene).plan().solved
+    assert with_current_reach(confab.load(scene), said.append).plan().solved
+    before = reach.read_text()
+    with_current_reach(confab.load(scene), said.append)
+    assert said == ["computing what the hands reach"]
+    table = tmp_path / "shop-table.ttl"
+    table.write_text(table.read_text().replace("e:x 0.4 ; e:y 0.2 ;", "e:x 0.4 ; e:y 0.48 ;"))
+    os.utime(table, (reach.stat().st_mtime + 5,) * 2)
+    with_current_reach(confab.load(scene), said.append)
+    assert reach.read_text() != before
+    bodies = tmp_path / "shop-bodies.ttl"
+    bodies.write_text(bodies.read_text().replace("e:graspHeight 0.045 ;", ""))
+    os.utime(bodies, (reach.stat().st_mtime + 5,) * 2)
+    assert with_current_reach(confab.load(scene), said.append).plan(mode="paper").solved
+    assert "has no :graspHeight" in said[-1]
 
 
 def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -> None:
