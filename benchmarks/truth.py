@@ -1,0 +1,200 @@
+"""What can be reached, counted by a program that shares no code with the planner: the truth that random tables are held against.
+
+It reads behaviours by way of the validator's interpreter alone (`planner.validation.successor`), and asks that one only once for
+every combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which
+arrays of states descend.
+
+code    a state as one integer, a field of bits per symbol
+tree    dictionary from a value of the symbol that was looked at to a tree; a leaf is what is assigned, or None (not applicable)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.validation import successor
+from reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
+
+Codes = NDArray[np.uint64]
+UNSEEN, DEAD, ALIVE = 0, 1, 2
+
+
+class TooManyError(Exception):
+    """More states than asked for, or a state doesn't fit into 63 bits."""
+
+
+@dataclass
+class Truth:
+    """`states` can be reached in all; `shortest` is the least number of steps to the goal, or None if it can't be reached."""
+
+    states: int
+    shortest: int | None
+
+
+class Asked(dict[Symbol, str]):
+    """A state that notes what is looked at. What its copies hold is `None`, so that every assignment to a copy shows."""
+
+    def __init__(self, values: dict[Symbol, str]) -> None:
+        super().__init__(dict.fromkeys(values))  # type: ignore[arg-type]
+        self.values_, self.looked = values, dict[Symbol, str]()
+
+    def get(self, symbol: Symbol, default: Any = None) -> Any:
+        """Return a symbol's value, and note it."""
+        if symbol not in self.values_:
+            return default
+        self.looked.setdefault(symbol, self.values_[symbol])
+        return self.values_[symbol]
+
+
+@dataclass
+class Node:
+    """Where the interpreter looks at a symbol next; `known` says of each of its values whether it was seen, and leads on."""
+
+    symbol: int
+    known: NDArray[np.int8]
+    after: dict[int, Any] = field(default_factory=dict)
+
+
+class World:
+    """The lowest level of a problem, as states in 63 bits."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        level = problem.domain.levels[-1]
+        situations = problem.domain.situations
+        behaviors = problem.domain.at_level(level)
+        changing = {effect.situation for behavior in behaviors for effect in behavior.effects}
+        state = dict(problem.initial)
+        for situation in situations.values():
+            if situation.boolean:
+                for arguments in product(*(problem.classes.get(kind, ()) for kind in situation.arguments)):
+                    state.setdefault(Symbol(situation.name, arguments), FALSE)
+        self.fixed = {symbol: value for symbol, value in state.items() if symbol.situation not in changing}
+        self.symbols = [symbol for symbol in state if symbol.situation in changing]
+        self.values, self.shifts, self.widths, bits = [], [], [], 0
+        for symbol in self.symbols:
+            situation = situations[symbol.situation]
+            members = (FALSE, TRUE) if situation.boolean else problem.classes.get(situation.range, ())
+            self.values.append(list(dict.fromkeys((state[symbol], *members))))
+            width = max((len(self.values[-1]) - 1).bit_length(), 1)
+            self.shifts.append(np.uint64(bits))
+            self.widths.append(np.uint64((1 << width) - 1))
+            bits += width
+        if bits > 63:
+            raise TooManyError(f"a state takes {bits} bits")
+        self.number = {symbol: i for i, symbol in enumerate(self.symbols)}
+        self.ranks = [{value: rank for rank, value in enumerate(values)} for values in self.values]
+        self.steps: list[tuple[Behavior, tuple[str, ...]]] = [
+            (ordered, arguments)
+            for behavior in behaviors
+            for ordered in [replace(behavior, preconditions=tuple(sorted(behavior.preconditions, key=_breadth)))]
+            for arguments in product(*(problem.classes.get(p.kind, ()) for p in behavior.parameters))
+        ]
+        self.trees: list[Any] = [UNSEEN] * len(self.steps)
+
+    def field(self, codes: Codes, symbol: int) -> NDArray[np.int64]:
+        """Return the ranks of a symbol's values in states."""
+        return ((codes >> self.shifts[symbol]) & self.widths[symbol]).astype(np.int64)
+
+    def explore(self, most: int) -> Truth:
+        """Go through all states, whether or not the goal comes on the way."""
+        layer: Codes = np.zeros(1, np.uint64)
+        known, depth, shortest = layer, 0, None
+        while len(layer):
+            if shortest is None and self.wanted(layer).any():
+                shortest = depth
+            fields = [self.field(layer, i) for i in range(len(self.symbols))]
+            found = [after for number in range(len(self.steps)) for after in self.do(number, layer, fields)]
+            new = np.sort(np.concatenate(found)) if found else layer[:0]
+            new = new[np.concatenate([[True], new[1:] != new[:-1]])] if len(new) else new
+            places = np.searchsorted(known, new)
+            fresh = known[np.minimum(places, len(known) - 1)] != new
+            layer = new[fresh]
+            known = np.insert(known, places[fresh], layer)
+            depth += 1
+            if len(known) > most:
+                raise TooManyError(f"more than {most} states")
+        return Truth(len(known), shortest)
+
+    def wanted(self, codes: Codes) -> NDArray[np.bool_]:
+        """Return which states have all facts of the goal."""
+        fits = np.ones(len(codes), np.bool_)
+        for symbol, value in self.problem.goal.items():
+            if symbol in self.number:
+                i = self.number[symbol]
+                fits &= self.field(codes, i) == self.ranks[i].get(value, -1)
+            else:
+                fits &= self.fixed.get(symbol, FALSE) == value
+        return fits
+
+    def do(self, number: int, codes: Codes, fields: list[NDArray[np.int64]]) -> Iterator[Codes]:
+        """Yield the states after a quantified behaviour, where it is applicable, by the leaves of its tree."""
+        if self.trees[number] is UNSEEN:
+            self.trees[number] = self.grown(number, UNSEEN, codes[0])
+        waiting: list[tuple[Any, NDArray[np.int64] | None]] = [(self.trees[number], None)]
+        while waiting:
+            tree, rows = waiting.pop()
+            if tree is None:
+                continue
+            if not isinstance(tree, Node):
+                kept, given = tree
+                yield ((codes if rows is None else codes[rows]) & kept) | given
+                continue
+            ranks = fields[tree.symbol] if rows is None else fields[tree.symbol][rows]
+            state = tree.known[ranks]
+            for rank in np.unique(ranks[state == UNSEEN]).tolist():
+                row = int(np.flatnonzero(ranks == rank)[0])
+                self.grown(number, self.trees[number], codes[row if rows is None else rows[row]])
+            state = tree.known[ranks]
+            alive = np.flatnonzero(state == ALIVE)
+            if len(alive):
+                ranks = ranks[alive]
+                rows = alive if rows is None else rows[alive]
+                for rank in [r for r, s in enumerate(tree.known.tolist()) if s == ALIVE]:
+                    here = rows[ranks == rank]
+                    if len(here):
+                        waiting.append((tree.after[rank], here))
+
+    def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
+        """Ask the interpreter about one state, and return the tree with its answer."""
+        ranks = [int(self.field(np.array([code]), i)[0]) for i in range(len(self.symbols))]
+        asked = Asked({s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
+        behavior, arguments = self.steps[number]
+        after = successor(self.problem, behavior, arguments, asked)
+        leaf = None
+        if after is not None:
+            kept, given = 2**64 - 1, 0
+            for symbol, value in after.items():
+                if value is not None and symbol in self.number:
+                    i = self.number[symbol]
+                    kept &= ~(int(self.widths[i]) << int(self.shifts[i]))
+                    given |= self.ranks[i][value] << int(self.shifts[i])
+            leaf = np.uint64(kept), np.uint64(given)
+        path = [self.number[symbol] for symbol in asked.looked if symbol in self.number]
+        root: Any = leaf
+        place: Node | None = None
+        rank = 0
+        for position, i in enumerate(path):
+            if not isinstance(tree, Node):
+                tree = Node(i, np.zeros(len(self.values[i]), np.int8))
+                if place is not None:
+                    place.after[rank] = tree
+            assert tree.symbol == i, "the interpreter looks elsewhere in the same state"
+            root = tree if position == 0 else root
+            place, rank = tree, ranks[i]
+            place.known[rank] = DEAD if leaf is None and position == len(path) - 1 else ALIVE
+            tree = place.after.get(rank, UNSEEN)
+        if place is not None and leaf is not None:
+            place.after[rank] = leaf
+        return root
+
+
+def _breadth(condition: Condition) -> int:
+    """Return whether a condition looks at many symbols: in what order a conjunction is asked for doesn't matter."""
+    return 2 * isinstance(condition, Witness | AnyOf) + isinstance(condition, ValueCondition)
