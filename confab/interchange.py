@@ -43,6 +43,7 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         for level, c in outcome.search.items()
     }
     data["fallbacks"] = outcome.fallbacks
+    data["cache"] = {"hits": outcome.hits, "misses": outcome.misses}
     data["seconds"] = {**{k: round(v, 6) for k, v in seconds.items()}, "search": round(outcome.seconds, 6)}
     return data
 

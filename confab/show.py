@@ -53,7 +53,12 @@ def summary(outcome: Outcome) -> str:
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
     bound = "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
     lengths = " / ".join(map(str, outcome.plan.length.values())) or "no"
-    return f"solved: {lengths} steps per level, {expanded} expansions in all, {outcome.seconds * 1000:.0f} ms of search{bound}"
+    effort = f"{expanded} expansions in all"
+    if outcome.hits or outcome.misses:
+        effort += (
+            f", refinements {outcome.hits} from the cache and {outcome.misses} searched, {outcome.fallbacks} fallbacks"
+        )
+    return f"solved: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
 
 
 def plan_html(plan: Plan, notes: Notes | None = None) -> str:

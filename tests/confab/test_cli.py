@@ -35,6 +35,8 @@ def test_plan_as_json_has_the_documented_keys() -> None:
     assert data["length"] == {"1": 4, "2": 10, "3": 32}
     assert set(data["search"]["1"]) == {"generated", "evaluated", "expanded"}
     assert {"load", "quantify", "search"} <= set(data["seconds"])
+    assert data["fallbacks"] == 0
+    assert set(data["cache"]) == {"hits", "misses"}
     assert set(data["steps"][0]) >= {"path", "id", "level", "behavior", "arguments", "bindings", "steps"}
     assert data["steps"][0]["steps"][0]["steps"][1]["bindings"] == {"object": "cup1"}
 
