@@ -11,11 +11,13 @@ import pytest
 from planner.flat import plan_level, search
 from planner.grounding import TooLargeError, ground
 from planner.kernel import heuristic as compiled_heuristic
-from planner.plan import Limits, Reason, Status
+from planner.plan import Limits, Plan, Reason, Status
 from planner.relaxed import heuristic
 from planner.task import Task
 from planner.validation import validate
-from planner.windows import shortened
+from planner.windows import regrouped, shortened, shorter
+from reasoner.pddl_import import imported
+from reasoner.pddl_syntax import parse
 from reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
@@ -91,6 +93,56 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
     light = next(o for o in plan if task.describe(o)[0] == "LIGHT")
     doubled = [light, *plan] if task.applied(task.initial, light) is not None else [*plan, light]
     assert len(shortened(task, doubled)) <= len(plan)
+
+
+def carrier(parcels: int) -> Problem:
+    """Two places, a carrier with two arms, and parcels to be brought from one place to the other."""
+    names = " ".join(f"x{i}" for i in range(parcels))
+    domain = """(define (domain carry) (:requirements :typing) (:types room parcel arm)
+     (:predicates (me ?r - room) (at ?x - parcel ?r - room) (free ?a - arm) (carry ?x - parcel ?a - arm))
+     (:action move :parameters (?p ?q - room) :precondition (me ?p) :effect (and (me ?q) (not (me ?p))))
+     (:action pick :parameters (?x - parcel ?r - room ?a - arm) :precondition (and (me ?r) (at ?x ?r) (free ?a))
+      :effect (and (carry ?x ?a) (not (at ?x ?r)) (not (free ?a))))
+     (:action drop :parameters (?x - parcel ?r - room ?a - arm) :precondition (and (me ?r) (carry ?x ?a))
+      :effect (and (at ?x ?r) (free ?a) (not (carry ?x ?a)))))"""
+    text = f"""(define (problem p) (:domain carry) (:objects here there - room {names} - parcel left right - arm)
+     (:init (me here) (free left) (free right) {" ".join(f"(at x{i} here)" for i in range(parcels))})
+     (:goal (and {" ".join(f"(at x{i} there)" for i in range(parcels))})))"""
+    return imported(parse(domain, text)).problem
+
+
+def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
+    task = ground(carrier(6))
+    assert isinstance(task, Task)
+    first: list[int] = []
+    search(task, found=first.extend)
+    plan = shorter(task, first, work=10**7)
+    assert plan == shorter(task, first, work=10**7)
+    assert len(plan) == 17 < len(shortened(task, first))  # three times two parcels, and twice back
+    state: int | None = task.initial
+    for operator in plan:
+        assert state is not None
+        state = task.applied(state, operator)
+    assert state is not None and state & task.goal == task.goal
+    assert shorter(task, first, work=0) == shortened(task, first)
+
+
+def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
+    task = ground(tabletop)
+    assert isinstance(task, Task)
+    plan = list(search(task).plan)
+    again = regrouped(task, plan)
+    assert sorted(again) == sorted(plan)
+    assert validate(tabletop, Plan(task.steps(again))) == []
+
+
+def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba", reason="needs the extra 'fast'")
+    task = ground(tabletop)
+    assert isinstance(task, Task)
+    plain = search(task, evaluate=heuristic(task))
+    monkeypatch.setattr("planner.kernel.PLAIN", 5 * len(task.owners))
+    assert search(task) == plain
 
 
 def test_preferred_operators_are_ordered_by_the_function_passed_in(tabletop: Problem) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from confab.pddl_commands import export_pddl, import_pddl, read_pddl_plan
 from planner.flat import plan_level, search
 from planner.grounding import ground
-from planner.plan import Limits, Status
+from planner.plan import Limits, Plan, Status, Step
 from planner.task import Task
 from planner.validation import validate as faults
 from reasoner.graph import KnowledgeError, load
@@ -266,6 +267,18 @@ def test_a_hundred_thousand_objects_are_read_in_seconds(tmp_path: Path) -> None:
 # -------------------------------------------------------------------------------------------------------------- export
 
 
+def bound(problem: Problem, plan: Plan) -> Iterator[Step]:
+    """Yield a plan's steps with what their variables stand for, which the grounded task knows too."""
+    task = ground(problem, plan.steps[0].level)
+    assert isinstance(task, Task)
+    state = task.initial
+    for step in plan.steps:
+        operators = (o for o in range(len(task)) if task.describe(o)[:2] == (step.behavior, step.arguments))
+        operator = next(o for o in operators if task.applied(state, o) is not None)
+        yield task.steps([operator])[0]
+        state = task.applied(state, operator) or 0
+
+
 @pytest.mark.parametrize("level", [1, 2, 3])
 def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tmp_path: Path) -> None:
     problem = tabletop()
@@ -278,6 +291,8 @@ def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tm
     lines = "".join(f"({second.line(*grounded.describe(operator)[:2])})\n" for operator in found.plan)
     plan = read_pddl_plan(problem, level, lines)
     assert faults(problem, plan) == []
+    assert faults(problem, read_pddl_plan(problem, level, lines, regroup=True)) == []
+    assert [step.bindings for step in plan.steps] == [step.bindings for step in bound(problem, plan)]
     assert exported.actions.keys() >= {line.strip("()").split()[0] for line in lines.splitlines()}
     with pytest.raises(KnowledgeError, match="line 1: no action 'fly'"):
         read_pddl_plan(problem, level, "(fly left_hand)")
