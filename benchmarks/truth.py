@@ -23,6 +23,7 @@ from reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, S
 
 Codes = NDArray[np.uint64]
 UNSEEN, DEAD, ALIVE = 0, 1, 2
+FEW = 200
 
 
 class TooManyError(Exception):
@@ -88,6 +89,7 @@ class World:
             bits += width
         if bits > 63:
             raise TooManyError(f"a state takes {bits} bits")
+        self.places = [(int(shift), int(mask)) for shift, mask in zip(self.shifts, self.widths, strict=True)]
         self.number = {symbol: i for i, symbol in enumerate(self.symbols)}
         self.ranks = [{value: rank for rank, value in enumerate(values)} for values in self.values]
         self.steps: list[tuple[Behavior, tuple[str, ...]]] = [
@@ -148,22 +150,23 @@ class World:
                 continue
             ranks = fields[tree.symbol] if rows is None else fields[tree.symbol][rows]
             state = tree.known[ranks]
-            for rank in np.unique(ranks[state == UNSEEN]).tolist():
-                row = int(np.flatnonzero(ranks == rank)[0])
-                self.grown(number, self.trees[number], codes[row if rows is None else rows[row]])
-            state = tree.known[ranks]
-            alive = np.flatnonzero(state == ALIVE)
-            if len(alive):
-                ranks = ranks[alive]
-                rows = alive if rows is None else rows[alive]
-                for rank in [r for r, s in enumerate(tree.known.tolist()) if s == ALIVE]:
-                    here = rows[ranks == rank]
-                    if len(here):
-                        waiting.append((tree.after[rank], here))
+            if not state.all():
+                for rank in set(ranks[state == UNSEEN].tolist()):
+                    row = int((ranks == rank).argmax())
+                    self.grown(number, self.trees[number], codes[row if rows is None else rows[row]])
+                state = tree.known[ranks]
+            alive = (state == ALIVE).nonzero()[0]
+            if not len(alive):
+                continue
+            ranks = ranks[alive]
+            rows = alive if rows is None else rows[alive]
+            present = set(ranks.tolist()) if len(ranks) < FEW else set(np.unique(ranks).tolist())
+            for rank in sorted(present):
+                waiting.append((tree.after[rank], rows if len(present) == 1 else rows[ranks == rank]))
 
     def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
         """Ask the interpreter about one state, and return the tree with its answer."""
-        ranks = [int(self.field(np.array([code]), i)[0]) for i in range(len(self.symbols))]
+        ranks = [(int(code) >> shift) & mask for shift, mask in self.places]
         asked = Asked({s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
         behavior, arguments = self.steps[number]
         after = successor(self.problem, behavior, arguments, asked)
