@@ -101,7 +101,7 @@ def repair(
     """Return what is to be done with as much of `rest` as is still valid, or None if that wasn't found.
 
     The least counts what was planned and isn't touched by the changes, what was in progress, and for each goal that is open the
-    step that achieves it; of the steps that concern the same thing that is touched, one.
+    step that achieves it; of the steps that concern one thing that is touched, or that a new step concerns, one.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
@@ -128,7 +128,8 @@ def repair(
         return None
     costs = [_cost(call, done) for done in call.steps]
     needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))} | _last_steps(call)
-    for individual in touched:  # steps that concern the same thing could perhaps be done as one
+    new = set(range(begun, len(costs))).difference(kept)
+    for individual in touched.union(*(call.steps[i][2] for i in new)):  # its steps could perhaps be done as one
         together = [i for i in needed if individual in call.steps[i][2]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
