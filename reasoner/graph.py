@@ -279,7 +279,7 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
     fetch = f", or fetch it: confab fetch {iri} --into {importer.parent}" if web else ""
     raise KnowledgeError(
         f"{importer}: imports <{iri}>, which neither {beside.name} beside it nor the shipped catalog knows; "
-        f"put its file beside this one, name it in the catalog{fetch} (nothing is fetched unasked)"
+        f"put its file beside this one or name it in the catalog{fetch} (nothing is fetched unasked)"
     )
 
 

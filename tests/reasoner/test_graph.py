@@ -28,7 +28,7 @@ def test_an_import_is_found_beside_the_file_by_its_name(tmp_path: Path) -> None:
     [
         ("@prefix : <x", "mine.ttl"),
         ("<a> <b> <c> .", "wanted one 'a owl:Ontology'"),
-        (HEADER.format("https://example.org/nowhere"), "nothing is fetched from the network"),
+        (HEADER.format("https://example.org/nowhere"), "confab fetch https://example.org/nowhere --into"),
     ],
     ids=["syntax", "no-ontology", "unknown-import"],
 )
