@@ -26,6 +26,7 @@ import venv
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from math import exp, log
 from pathlib import Path
 from time import process_time
@@ -143,8 +144,8 @@ def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
     return done
 
 
-def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
-    """Run one planner on one problem, within the limits."""
+def run(command: Sequence[str], domain: Path, problem: Path, cap: int = SECONDS) -> Run:
+    """Run one planner on one problem, within the limits: so many CPU seconds for each of its processes."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "problem.pddl"  # pyperplan writes its plan beside the problem
         copy.write_text(problem.read_text())
@@ -153,7 +154,13 @@ def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         try:
             done = subprocess.run(
-                words, cwd=ROOT, capture_output=True, text=True, timeout=20 * SECONDS, preexec_fn=_limit, check=False
+                words,
+                cwd=ROOT,
+                capture_output=True,
+                text=True,
+                timeout=20 * cap,
+                preexec_fn=partial(_limit, cap),
+                check=False,
             )
             output = done.stdout + done.stderr
         except subprocess.TimeoutExpired:
@@ -166,8 +173,8 @@ def run(command: Sequence[str], domain: Path, problem: Path) -> Run:
         return Run(lines, seconds, output)
 
 
-def _limit() -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+def _limit(cap: int) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (cap, cap + 1))
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
 

@@ -1,9 +1,11 @@
 """The fast planner: scale, peers, lengths, random tables against exhaustion, and what each part contributes.
 
     python -m benchmarks search
-    CONFAB_SEARCH=scale,random …     some of: scale, peers, lengths, random, parts, hands
+    CONFAB_SEARCH=scale,random …     some of: scale, hands, peers, optimal, lengths, random, parts
     CONFAB_TABLES=2000 …             so many random tables (200 if not given)
     CONFAB_SECONDS=480 …             no further random table after so many seconds
+    CONFAB_ROWS=FILE …               keep each random table's row there, and go on from what is there
+    CONFAB_PEER_ROWS=FILE …          the same for the peers' runs
 
 Seconds are CPU seconds, which a busy machine changes little; medians of several runs. Nothing here was looked at while the
 planner was developed with other seeds than those below 60,000: random tables come from seeds above 3,000,000, families from 100 on.
@@ -28,7 +30,8 @@ from statistics import mean, median
 from time import perf_counter, process_time
 from typing import Any
 
-from benchmarks.pddl import peers, planners, run
+from benchmarks._beside import beside_peers, optimal_costs
+from benchmarks.pddl import peers
 from benchmarks.truth import TooManyError, World
 from planner import serialise
 from planner.fast import Compiled, compiled, plan
@@ -38,7 +41,6 @@ from planner.segments import Ground, Segments
 from planner.validation import validate
 from reasoner.generate import write_scene
 from reasoner.graph import load
-from reasoner.pddl_export import to_pddl
 from reasoner.reading import read
 from reasoner.symbols import Domain, Problem
 from tests.planner.families import random_table
@@ -53,7 +55,8 @@ def main() -> None:
     sections: dict[str, Callable[[], None]] = {
         "scale": scale,
         "hands": hands,
-        "peers": beside_peers,
+        "peers": lambda: beside_peers(peers_with_gtpyhop(), SEED),
+        "optimal": lambda: optimal_costs(peers_with_gtpyhop(), SEED),
         "lengths": lengths,
         "random": random_tables,
         "parts": parts,
@@ -187,32 +190,6 @@ def gtpyhop(python: str, problem: Problem) -> tuple[str, str]:
         except subprocess.TimeoutExpired:
             done = []
     return (f"{float(done[0]) * 1e3:.1f}", done[1]) if len(done) == 2 else ("–", "–")
-
-
-def beside_peers() -> None:
-    """Run whole processes on the flat primitive problem, 30 s of CPU each.
-
-    The peers get a domain by hand, which has a tenth of the operators of the exported one or less (`_tabletop.pddl` says why).
-    """
-    commands = planners(peers_with_gtpyhop())
-    print("| n | confab plan | its steps | lama-first | its steps | pyperplan gbf hff | its steps |")
-    print("|---|---|---|---|---|---|---|")
-    for n in (4, 10, 20, 50, 100):
-        row = [str(n)]
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"served-{n}.ttl"
-            write_scene(path, "served", n, 2, 0, SEED)
-            problem = read(load(str(path))).problem
-            ours = [str(Path(sys.executable).with_name("confab")), "plan", str(path), "--json"]
-            found = run(ours, path, path)
-            length = json.loads(found.output[found.output.index("{") :])["length"]["3"] if "{" in found.output else "–"
-            row += [f"{found.seconds:.2f} s", str(length)]
-            domain, file = Path(__file__).with_name("_tabletop.pddl"), Path(folder) / "problem.pddl"
-            file.write_text(to_pddl(problem).problem)
-            for name in ("lama-first", "pyperplan"):
-                peer = run(commands[name], domain, file)
-                row += [f"{peer.seconds:.2f} s" if peer.plan else "–", str(len(peer.plan)) if peer.plan else "–"]
-        print(f"| {' | '.join(row)} |", flush=True)
 
 
 # ------------------------------------------------------------------------------------------------------------- lengths
