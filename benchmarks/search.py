@@ -16,11 +16,13 @@ from __future__ import annotations
 import gc
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import log
@@ -31,13 +33,15 @@ from time import perf_counter, process_time
 from typing import Any
 
 from benchmarks._beside import beside_peers, optimal_costs
+from benchmarks.memory import trained
 from benchmarks.pddl import peers
 from benchmarks.truth import TooManyError, World
-from planner import serialise
+from planner import guided, serialise
 from planner.fast import Compiled, compiled, plan
 from planner.flat import plan_level
-from planner.plan import Limits, Outcome
-from planner.segments import Ground, Segments
+from planner.guided import Memory
+from planner.plan import Limits, Outcome, Reason, Status
+from planner.segments import Ground, LimitError, Segments
 from planner.validation import validate
 from reasoner.generate import write_scene
 from reasoner.graph import load
@@ -47,6 +51,8 @@ from tests.planner.families import random_table
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SEED, TABLES = 100, int(os.environ.get("CONFAB_SEEDS", "3_000_000"))
+PARTS_SEED, BUDGET = 110, 20.0
+"""Memory's lessons have seeds from 100 to 104; CPU seconds."""
 LENGTHS = Path(__file__).with_name("lengths.json")
 
 
@@ -311,47 +317,72 @@ class Everything(Segments):
         return 1
 
 
+@contextmanager
+def budget(seconds: float) -> Iterator[None]:
+    """Raise `LimitError`, which planners take for their own limit, after so many CPU seconds."""
+
+    def stop(*_: object) -> None:
+        raise LimitError(f"{seconds:g} s of CPU")
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
+    """Return the outcome of a planning call that has so many CPU seconds."""
+    try:
+        with budget(seconds):
+            return variant()
+    except LimitError as limit:
+        return Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
+
+
+def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome]]:
+    """Return planning calls by what they do without."""
+    limits, level = Limits(expansions=10**7), problem.domain.levels[-1]
+    only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
+    flat = replace(problem, domain=Domain(problem.domain.situations, only, problem.domain.first_ids))
+
+    def without_relevance() -> Outcome:
+        kept = serialise.Segments  # type: ignore[attr-defined]
+        serialise.Segments = Everything  # type: ignore[attr-defined]
+        try:
+            return plan(problem, limits=limits, improve=0)
+        finally:
+            serialise.Segments = kept  # type: ignore[attr-defined]
+
+    def without_templates() -> Outcome:
+        return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, replay=False))
+
+    return {
+        "nothing, memory leading": partial(guided.plan, problem, memory, "leading", limits),
+        "nothing, memory guarded": partial(guided.plan, problem, memory, "guarded", limits),
+        "memory": partial(plan, problem, limits=limits, improve=0),
+        "memory, cached refinements": without_templates,
+        "memory, relevance": without_relevance,
+        "memory, levels": partial(plan, flat, limits=limits, improve=0),
+        "memory, levels, goal order (flat h_FF)": partial(plan_level, problem, limits=limits),
+    }
+
+
 def parts() -> None:
-    """Switch each part off in turn, 20 s each, to see what it contributes."""
+    """Switch each part off in turn, `BUDGET` CPU seconds each, to see what it contributes."""
+    memory = trained()
     print("| family | n | without | status | CPU ms | expansions 1/2/3 | primitives |")
     print("|---|---|---|---|---|---|---|")
-    for family in ("served", "swap"):
-        for n in (4, 10, 50):
-            problem, _ = scene(family, n)
-            limits = Limits(seconds=20)
-
-            def without_levels(problem: Problem = problem, limits: Limits = limits) -> Outcome:
-                level = problem.domain.levels[-1]
-                only = {b.name: b for b in problem.domain.at_level(level)}
-                flat = Domain(problem.domain.situations, only, problem.domain.first_ids)
-                return plan(replace(problem, domain=flat), limits=limits, improve=0)
-
-            def without_relevance(problem: Problem = problem, limits: Limits = limits) -> Outcome:
-                kept = serialise.Segments  # type: ignore[attr-defined]
-                serialise.Segments = Everything  # type: ignore[attr-defined]
-                try:
-                    return plan(problem, limits=limits, improve=0)
-                finally:
-                    serialise.Segments = kept  # type: ignore[attr-defined]
-
-            def without_templates(problem: Problem = problem, limits: Limits = limits) -> Outcome:
-                return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, replay=False))
-
-            def flat_search(problem: Problem = problem, limits: Limits = limits) -> Outcome:
-                return plan_level(problem, limits=limits)
-
-            variants: dict[str, Callable[[], Outcome]] = {
-                "nothing": partial(plan, problem, limits=limits, improve=0),
-                "cached refinements": without_templates,
-                "relevance": without_relevance,
-                "levels": without_levels,
-                "levels and goal order (flat h_FF)": flat_search,
-            }
-            for name, variant in variants.items():
-                outcome, seconds = timed(variant, 1)
-                expansions = "/".join(str(count.expanded) for count in outcome.search.values())
-                length = len(outcome.plan.primitives) if outcome.plan else "–"
-                print(
-                    f"| {family} | {n} | {name} | {outcome.status.value} | {seconds * 1e3:.1f} | {expansions} | {length} |",
-                    flush=True,
-                )
+    cases = [(family, n) for family in ("served", "swap") for n in (4, 10, 50)]
+    for family, n in [*cases, ("full", 20), ("full", 50)]:
+        problem, _ = scene(family, n, seed=PARTS_SEED)
+        for name, variant in variants(problem, memory).items():
+            outcome, seconds = timed(partial(within, BUDGET, variant), 1)
+            expansions = "/".join(str(count.expanded) for count in outcome.search.values())
+            length = len(outcome.plan.primitives) if outcome.plan else "–"
+            print(
+                f"| {family} | {n} | {name} | {outcome.status.value} | {seconds * 1e3:.1f} | {expansions} | {length} |",
+                flush=True,
+            )
