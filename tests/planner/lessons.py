@@ -48,14 +48,14 @@ def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Pr
 
 
 def teach(experience: Experience, lesson: Problem, level: int = 1) -> None:
-    """Let an experience live one episode: a shortest plan, or where none is found soon one of the fast planner, shortened."""
+    """Let an experience live one episode: a shortest plan, or where none is found soon the fast planner's, shortened."""
     within = single_level(lesson, level)
     program = Program(within)
     steps = shortest(program, within, level) if level == 1 else None
     if steps is None:
-        found = plan(within).plan
-        if found is None or any(step.level != level for step in found.steps):
-            return
+        found = plan(lesson).plan
+        if found is None or any(step.level > level for step in found.steps):
+            return  # some of it was planned without this level
         made = [(step.behavior, step.arguments) for step in found.at_level(level)]
         steps = shortened(program, within, level, made)
     experience.learn(decisions(program, within, level, steps))
