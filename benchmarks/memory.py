@@ -139,7 +139,7 @@ def transfer(levels: Sequence[int] = (1,), seeds: int = 10) -> None:
 
 
 def flat() -> None:
-    """The same for problems that begin on level 2."""
+    """Print the same for problems that begin on level 2."""
     transfer((2,), 3)
 
 
