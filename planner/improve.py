@@ -2,6 +2,7 @@
 
 Both work below the most abstract level, where a step "hands empty again" costs something, and leave a step of the upper level
 in the plan only where its own refinement is still intact. Every change is played through on the table before it is kept.
+What the levels above ask of a change is asked of steps that are planned anew, too (`planner.binding`).
 
 whole    a task so small that its states are few is planned anew as a whole, one level above the lowest
 detour   two steps of which the second undoes what the first did (put down, picked up again), and nothing between needed it
@@ -14,12 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
+from planner.binding import binding
 from planner.exhaust import Space, TooLargeError
 from planner.lifted import Done, Refiner, Template
 from planner.nearby import world
 from planner.segments import Ground, LimitError
 from planner.table import Cell, arguments_of, key_of
-from reasoner.symbols import Problem, Symbol
+from reasoner.symbols import Domain, Problem, Symbol
 
 REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
@@ -62,6 +64,7 @@ class Improver:
         self.states = min(STATES * self.clusters_left, 40 * STATES)
         self.work = WHOLE_WORK * self.clusters_left
         self.lowest = self.segments.program.levels[-1]
+        self.bound: dict[int, Domain] = {}
 
     def improve(self, steps: Sequence[Done]) -> list[Done]:
         """Return steps to the same end, no longer than these; the table is left in the initial state."""
@@ -121,7 +124,8 @@ class Improver:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
         space = None
         try:
-            space = Space(problem, level, min(OPERATORS, self.work // PER_OPERATOR))
+            bound = replace(problem, domain=self._binding(level))
+            space = Space(bound, level, min(OPERATORS, self.work // PER_OPERATOR))
             self.work -= PER_OPERATOR * len(space.operators)
             most = min(states, self.work // max(len(space.operators), 1))
             found = space.search(most, self.segments.deadline, length(old, level) - 1)
@@ -132,6 +136,11 @@ class Improver:
         except TimeoutError as error:
             raise LimitError("the time limit") from error
         return [(step.behavior, step.arguments) for step in found.steps or ()]
+
+    def _binding(self, level: int) -> Domain:
+        if level not in self.bound:
+            self.bound[level] = binding(self.segments.program.problem, level)
+        return self.bound[level]
 
     # ---------------------------------------------------------------------------------------------------------- detours
 

@@ -1,0 +1,81 @@
+"""What only an upper level asks is asked of shortened plans, too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from planner.binding import binding
+from planner.fast import plan
+from planner.plan import Plan
+from planner.validation import successor, validate
+from reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition
+from tests.planner.families import family, tabletop
+
+
+def filled_and_moved(problem: Problem, found: Plan) -> list[str]:
+    """Return the primitives that put down a filled cup elsewhere than where it was filled, replaying them one by one."""
+    state, at, moved = dict(problem.initial), dict[str, str](), list[str]()
+    for step in found.primitives:
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
+        assert after is not None
+        for cup in problem.classes["Cup"]:
+            place = after[Symbol("LOCATION", (cup,))]
+            rests = after[Symbol("BEVERAGE", (cup,))] != "no_beverage" and place != "in_hand"
+            if rests and at.setdefault(cup, place) != place:
+                moved.append(str(step))
+        state = after
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"), [("served", 100), ("served", 101), ("served", 102), ("blocked", 100), ("blocked", 101)]
+)
+def test_shortening_moves_no_filled_cup(name: str, seed: int) -> None:
+    problem = family(name, 4, seed)
+    found = plan(problem).plan
+    assert found is not None
+    assert not validate(problem, found)
+    assert not filled_and_moved(problem, found)
+
+
+def test_without_the_rule_shortening_would_move_one() -> None:
+    """Shows that the test above can fail: without the condition on filled cups such plans are shorter, and found."""
+    problem = family("served", 4, 101)
+    move = problem.domain.behaviors["B1_MOVE"]
+    loose = replace(move, preconditions=tuple(c for c in move.preconditions if "BEVERAGE" not in repr(c)))
+    domain = replace(problem.domain, behaviors={**problem.domain.behaviors, "B1_MOVE": loose})
+    free, bound = plan(replace(problem, domain=domain)).plan, plan(problem).plan
+    assert free is not None
+    assert bound is not None
+    assert filled_and_moved(problem, free)
+    assert free.length[3] < bound.length[3]
+
+
+def test_plans_that_keep_to_the_rule_are_still_shortened() -> None:
+    problem = family("blocked", 4, 100)
+    first, short = plan(problem, improve=0).plan, plan(problem).plan
+    assert first is not None
+    assert short is not None
+    assert short.length[3] < first.length[3]
+
+
+def test_what_a_level_asks_is_said_in_the_lower_level_s_terms() -> None:
+    problem = tabletop()
+    own = problem.domain.behaviors["B2_PLACE"].preconditions
+    bound = binding(problem, 2).behaviors["B2_PLACE"].preconditions
+    assert bound[: len(own)] == own
+    (guard,) = bound[len(own) :]
+    assert ValueCondition("BEVERAGE", ("?object",), "no_beverage") in guard.alternatives[0][0].alternatives[0]  # type: ignore[union-attr]
+    assert ClassCondition("?object", "Cup", negated=True) in guard.alternatives[0][0].alternatives[1]  # type: ignore[union-attr]
+
+
+def test_values_between_those_of_the_upper_level_are_free() -> None:
+    problem = tabletop()
+    assert binding(problem, 2).behaviors["B2_PICK"] == problem.domain.behaviors["B2_PICK"]
+
+
+def test_the_uppermost_level_is_bound_by_nothing() -> None:
+    problem = tabletop()
+    assert binding(problem, 1) == problem.domain
