@@ -115,11 +115,13 @@ def repair(
             else:
                 del pending[:1]
             settle(call)
-        begun = len(call.steps) if rest and touched.isdisjoint(rest[0].arguments) else 0
+        finished = len(call.steps)
+        begun = finished if rest and touched.isdisjoint(rest[0].arguments) else 0
         _restore(call, pending)
         restored = len(call.steps)
         whole = _replay(call, pending, wanted)
         kept = range(restored, len(call.steps)) if whole else ()  # where nothing is dropped, all has its purpose
+        begun = begun if whole else 0
         settle(call)
         solved = not unattainable(call.segments) and call.serialise()
     except (LimitError, UnsolvableError):
@@ -127,9 +129,11 @@ def repair(
     if not solved:
         return None
     costs = [_cost(call, done) for done in call.steps]
-    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))} | _last_steps(call)
-    new = set(range(begun, len(costs))).difference(kept)
-    for individual in touched.union(*(call.steps[i][2] for i in new)):  # its steps could perhaps be done as one
+    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
+    needed |= {i for i in _last_steps(call) if i < begun or i >= finished}
+    old, first = {(step.behavior, step.arguments) for step in rest}, call.program.levels[0]
+    new = [step[2] for step in call.steps if step[0] == first and (step[1], step[2]) not in old]
+    for individual in touched.union(*new):  # its steps could perhaps be done as one
         together = [i for i in needed if individual in call.steps[i][2]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
