@@ -21,7 +21,7 @@ from reasoner.symbols import Problem
 
 HERE = Path(__file__).parent
 SHORT, LONG, PROVING = 60, 300, 20
-"""CPU seconds for a planner's process (long: lama-first on the encoding by hand from 50 objects on), and for a proof of optimality."""
+"""CPU seconds for a planner's process (long: lama-first on the encoding by hand from 50 objects on), and for a proof of cost."""
 RUNS, QUICK = 3, 5.0
 """Runs of which the median is taken, of what takes less than so many seconds."""
 
