@@ -406,7 +406,8 @@ def curve(most: int = 36) -> None:
     checks = (0, 1, 2, 4, 6, 12, 18, 24, most)
     tests = [problem(family, 20, HELD_OUT) for family in FAMILIES]
     small = [replace_levels(problem(family, 4, HELD_OUT)) for family in ("served", "swap", "handover")]
-    alone = [cpu(lambda: fast.plan(within, using=fast.compiled(within))) for within in tests]  # noqa: B023
+    prepared = [(within, fast.compiled(within)) for within in tests]
+    alone = [cpu(partial(fast.plan, within, using=using)) for within, using in prepared]
     base = mean(r for r in (ratio(found, 1) for _, found in alone) if r is not None), mean(t for t, _ in alone) * 1e3
     lifted, counts, links = Experience("lifted"), Experience("counts"), Links()
     points: list[tuple[float, ...]] = []
