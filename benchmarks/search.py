@@ -48,6 +48,7 @@ from reasoner.generate import write_scene
 from reasoner.graph import load
 from reasoner.reading import read
 from reasoner.symbols import Domain, Problem
+from tests.planner.families import family as packed
 from tests.planner.families import random_table
 from tests.planner.lessons import problem as lesson
 from tests.planner.lessons import teach
@@ -147,11 +148,12 @@ def hands() -> None:
     print("|---|---|---|---|---|---|---|---|")
     cases = [(family, 2, n) for family in FAMILIES for n in (4, 10, 20, 50)]
     cases += [(family, number, n) for family in ("served", "swap", "rotate") for number in (4, 8) for n in (20, 50)]
+    cases += [("packed", 2, n) for n in (4, 10, 20, 50)]  # full tables without any free place
     for family, number, n in cases:
-        problem, _ = scene(family, n, number)
+        problem = scene(family, n, number)[0] if family != "packed" else packed("packed", n, SEED)
         program = compiled(problem)
-        outcome, seconds = timed(cold(problem, program, 0), 3)
-        check(problem, outcome, f"{family} {n}", easy=family != "full")
+        outcome, seconds = timed(cold(problem, program, 0), 3 if family != "packed" else 1)
+        check(problem, outcome, f"{family} {n}", easy=family not in ("full", "packed"))
         steps = "/".join(str(outcome.plan.length.get(level, 0)) for level in (1, 2, 3))
         expansions = "/".join(str(count.expanded) for count in outcome.search.values())
         print(
