@@ -583,10 +583,9 @@ def _print(what: Any) -> None:
     elif isinstance(what, str):
         print(what)
     else:
-        from rich.console import Console
+        from confab.show import show as show_whole
 
-        console = Console(width=None if sys.stdout.isatty() else 120)
-        console.print(what, soft_wrap=True)
+        show_whole(what)
 
 
 def main() -> NoReturn:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,13 +28,15 @@ if TYPE_CHECKING:
 class Report:
     """What physics said about a plan: one or more rollouts, and the film of the first.
 
-    A rollout is good if every primitive did what it promises and the goal's facts were seen in the end.
+    A rollout is good if every primitive did what it promises and the goal's facts were seen in the end. `trusted` are the
+    situation types that the plan changes and nothing perceives: that part of it is taken on trust.
     """
 
     plan: Plan
     goal: State
     rollouts: tuple[Rollout, ...]
     video: Path | None = None
+    trusted: tuple[str, ...] = ()
 
     @property
     def verified(self) -> bool:
@@ -63,6 +65,7 @@ class Report:
         return {
             "status": "verified" if self.verified else "failed",
             "success": {"verified": self.good, "of": len(self.rollouts), "interval": interval, "poured": self.poured},
+            "trusted": list(self.trusted),
             "rollouts": [rollout.as_json() for rollout in self.rollouts],
         }
 
@@ -86,7 +89,9 @@ class Report:
         return (
             f"verified: {len(first.steps)} primitives"
             + (f", poured {poured} of a serving" if poured else "")
-            + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s{several}"
+            + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s"
+            + (f"; on trust, since nothing perceives it: {', '.join(self.trusted)}" if self.trusted else "")
+            + several
         )
 
     def rate(self) -> str:
@@ -179,7 +184,15 @@ def verify(
         finished += roll_out(trial, seeds, workers, done) if seeds else []
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
-    return Report(plan, scene.problem.goal if goal is None else goal, tuple(finished), video)
+    wanted = scene.problem.goal if goal is None else goal
+    return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected))
+
+
+def on_trust(scene: Scene, expected: Sequence[State]) -> tuple[str, ...]:
+    """Return the situation types that change on the way through some expected states and that nothing perceives."""
+    initial = scene.problem.initial
+    changed = {s.situation for state in expected for s, value in state.items() if initial.get(s) != value}
+    return tuple(sorted(changed - scene.embodiment.perceivers.keys()))
 
 
 def require_skills(scene: Scene, behaviors: Iterable[str]) -> None:

@@ -10,6 +10,7 @@ from confab.memory import Memory
 from confab.physics import Report, progress_bar
 from confab.reaching import with_reach
 from confab.scene import Result, Scene, load
+from confab.show import show
 from planner.plan import Status
 from reasoner.files import write_whole
 from reasoner.observed import assert_observed, save_observed
@@ -33,13 +34,10 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     KnowledgeError
         The scene, or the memory, can't be read.
     """
-    from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=True)
     tell("validating")
     findings = validate([name])
     if findings:
-        console.print("\n".join(map(str, findings)), markup=False, highlight=False)
+        print("\n".join(map(str, findings)))
     if any(finding.serious for finding in findings):
         return NO
     tell("loading the scene, and computing what the hands reach if that isn't known")
@@ -48,15 +46,15 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
     result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
-        console.print(result)
+        show(result)
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
     report = verified(scene, result, seed, out / "run.mp4" if film else None, gui)
-    console.print(report)
+    show(report)
     assert_observed(scene.knowledge, report.rollouts[0].state, scene.names)
     if report.verified:
         remembered.learn(scene, result.plan)
     for what, path in written(scene, result, report, remembered, out).items():
-        console.print(f"{what:<9} {path}", highlight=False)
+        print(f"{what:<9} {path}")
     return YES if report.verified else NO
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import html
+import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from planner.plan import Outcome, Plan, Step
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.text import Text
     from rich.tree import Tree
 
@@ -16,12 +18,28 @@ STYLES = ("bold cyan", "green", "default")
 Notes = Mapping[tuple[int, ...], str]
 """What to say behind a step, by its path: a verdict, for instance."""
 
+UNLIMITED = 100_000
+"""Columns of a page that is no terminal: no line is broken or cut there."""
+
+
+def page() -> Console:
+    """Return stdout as rich writes to it: as wide as the terminal, without limit in a pipe or a file."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else UNLIMITED)
+
+
+def show(what: Any) -> None:
+    """Print what rich can show to stdout, whole: lines wrap in a terminal, and are left as long as they are elsewhere."""
+    page().print(what, markup=False, highlight=False)
+
 
 def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> Tree:
     """Return the plan as a rich tree: ID, behaviour and arguments of every step."""
+    from rich.text import Text
     from rich.tree import Tree
 
-    tree = Tree(title, guide_style="dim")
+    tree = Tree(Text(title), guide_style="dim")
     for step in plan.steps:
         _grow(tree, step, notes or {})
     return tree

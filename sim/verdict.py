@@ -37,14 +37,22 @@ class Verdict:
     def __str__(self) -> str:
         """Return one line, e.g. ``tracking error: hidden wall (joint_lag_rad 0.084)``."""
         numbers = ", ".join(f"{name} {value:.3g}" for name, value in self.measured.items())
-        head = "done" if self.ok else f"{self.code}: {', '.join(self.objects) or self.message}"
+        head = "done" if self.ok else f"{self.code}: {self._what()}"
         return head + (f" ({numbers})" if numbers else "")
+
+    def _what(self) -> str:
+        """Return the objects, and the message where it says more than the code and names not all of them."""
+        if self.message in CODES.values():
+            return ", ".join(self.objects) or self.message
+        unnamed = not all(name in self.message for name in self.objects)
+        return ", ".join([*(self.objects if unnamed else ()), *([self.message] if self.message else [])])
 
     def as_json(self) -> dict[str, Any]:
         """Return it as `confab verify --json` prints it."""
         return {
             "ok": self.ok,
             "code": self.code,
+            "message": self.message,
             "objects": list(self.objects),
             "measured": {name: round(value, 6) for name, value in self.measured.items()},
         }

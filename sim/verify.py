@@ -153,6 +153,7 @@ def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
         if wanted is not None and got != wanted:
             code = perceiver(world.embodiment.perceivers[symbol.situation].perceiver).code
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
-            message = f"{symbol} should be {wanted} and is {got or 'nothing that can be perceived'}"
+            who = f"{symbol.situation} of {' '.join(symbol.arguments)}"
+            message = f"{who}: expected {wanted}, seen {got or 'nothing that can be told'}"
             return Verdict(False, code, objects, verdict.measured, message)
     return verdict

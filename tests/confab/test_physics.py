@@ -3,18 +3,24 @@
 import json
 import sys
 import time
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pybullet
 import pytest
+from rich.console import Console
 
 import confab
 from confab.authoring import new_domain
-from confab.physics import Report
+from confab.physics import Report, on_trust
+from confab.show import plan_tree, show
 from planner.plan import Plan
 from reasoner.reach import reach_hash
+from reasoner.symbols import Symbol
 from sim.faults import hidden_wall
 from sim.reach import fingerprint, reach
+from sim.verdict import SkillError, Verdict
 from sim.verify import Rollout
 
 
@@ -56,6 +62,41 @@ def test_a_wall_before_a_bottle_fails_at_its_step_with_code_object_and_number(sc
     assert failure.verdict.measured
     assert json.loads(json.dumps(failed.json()))["status"] == "failed"
     assert "hidden wall" in failed.notes()[failure.step.path]
+
+
+def test_a_failure_shows_what_was_expected_and_seen_or_what_the_code_does_not_say() -> None:
+    told = "HAND_TILT of left_hand: expected upright, seen tilted"
+    assert str(Verdict(False, "unexpected", ("left_hand", "upright", "tilted"), message=told)) == f"unexpected: {told}"
+    lost = SkillError("slip or drop", ("jar1",), "it isn't in the hand").verdict
+    assert str(lost) == "slip or drop: jar1, it isn't in the hand"
+    blocked = SkillError("goal in collision", ("tray1", "jar1"), clearance_m=-0.0034).verdict
+    assert str(blocked) == "goal in collision: tray1, jar1 (clearance_m -0.0034)"
+    assert blocked.as_json()["message"] == "the hand, or what it holds, would touch something there"
+
+
+def test_what_nothing_perceives_is_said_to_be_on_trust(scene: confab.Scene, report: Report) -> None:
+    assert report.trusted == ()
+    symbol = Symbol("GREETED", ("cup1",))
+    assert on_trust(scene, [{**scene.problem.initial, symbol: "warmly"}]) == ("GREETED",)
+    assert replace(report, trusted=("GREETED",)).summary().endswith("; on trust, since nothing perceives it: GREETED")
+
+
+def test_nothing_is_cut_off_in_a_pipe_and_lines_wrap_in_a_terminal(
+    report: Report, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, told = report.plan.primitives[0].path, "goal in collision: " + "tray1, jar1 " * 20 + "(clearance_m -0.0034)"
+    tree = plan_tree(report.plan, "[a title] " + "word " * 40 + "of search", {path: f"✗ {told}"})
+    show(tree)
+    piped = capsys.readouterr().out
+    assert f"✗ {told}\n" in piped
+    assert "[a title] word" in piped.splitlines()[0]
+    assert piped.splitlines()[0].endswith("of search")
+    file = StringIO()
+    Console(file=file, force_terminal=True, color_system=None, width=60).print(tree, markup=False, highlight=False)
+    wrapped = file.getvalue()
+    assert max(map(len, wrapped.splitlines())) <= 60
+    assert "-0.0034)" in wrapped
+    assert "of search" in " ".join(wrapped.split("├")[0].split())
 
 
 def test_a_plan_that_stops_before_the_goal_is_not_verified(scene: confab.Scene) -> None:
