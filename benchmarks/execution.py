@@ -39,7 +39,7 @@ from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
 OUT = Path("confab-out/execution")
 SYMBOLIC, PHYSICAL = 1000, 50
-ROBOTS, EPISODES = 3, 8
+SYMBOLIC_ROBOTS, ROBOTS, EPISODES = 40, 3, 8
 
 
 @dataclass(frozen=True)
@@ -304,14 +304,14 @@ def learning() -> None:
     curves: dict[str, list[float]] = {}
     print("| world | learning | goal reached, by episode | failures | simulated s |\n|---|---|---|---|---|")
     for learns in (False, True):
-        ends = [_obstructed(scene.problem, learns, seed, EPISODES, patience) for seed in range(100)]
-        rates = [sum(run[i] for run in ends) / 100 for i in range(EPISODES)]
+        ends = [_obstructed(scene.problem, learns, seed, EPISODES, patience) for seed in range(SYMBOLIC_ROBOTS)]
+        rates = [sum(run[i] for run in ends) / SYMBOLIC_ROBOTS for i in range(EPISODES)]
         print(
-            f"| symbolic, obstacle fails 9 of 10, 100 robots, ends at failure {patience.failures} | {learns} "
+            f"| symbolic, obstacle fails 9 of 10, {SYMBOLIC_ROBOTS} robots, ends at failure {patience.failures} | {learns} "
             f"| {' '.join(f'{100 * r:.0f} %' for r in rates)} | | |",
             flush=True,
         )
-        curves["symbolic, 100 robots" + (", learning" if learns else "")] = rates
+        curves[f"symbolic, {SYMBOLIC_ROBOTS} robots" + (", learning" if learns else "")] = rates
     for robots, episodes, limit in ((ROBOTS, EPISODES, patience), (1, EPISODES // 2, Patience())):
         for learns in (False, True):
             runs = [_beside_a_post(scene, learns, 100 * robot, episodes, limit) for robot in range(1, robots + 1)]
