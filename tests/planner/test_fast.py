@@ -11,6 +11,7 @@ from time import perf_counter
 
 import pytest
 
+from benchmarks.truth import TooManyError, World
 from planner import optimal
 from planner.behaviors import Model, ground
 from planner.exhaust import Space, TooLargeError
@@ -294,3 +295,14 @@ def test_a_goal_out_of_reach_is_proved_without_grounding_a_large_table() -> None
     assert outcome.reason is not None
     assert cup in outcome.reason.text
     assert most < 300e6
+
+
+def test_the_benchmarks_truth_and_exhaustion_agree_though_they_share_no_code() -> None:
+    for seed in range(43_000, 43_010):
+        problem = random_table(seed)
+        try:
+            truth = World(problem).explore(20_000)
+        except TooManyError:
+            continue
+        steps = Space(problem, 3).search(20_000).steps
+        assert truth.shortest == (None if steps is None else len(steps)), seed
