@@ -197,7 +197,7 @@ class Judge:
         prior = 0.0
         weights = dict.fromkeys((fact for fact, _ in pattern), 0.0)
         ratios: dict[str, tuple[float, float]] = {}
-        strata = [("", sums) for sums in levels]
+        strata = [("", sums) for sums in levels if sums.chosen + sums.passed] or [("", levels[0])]
         given = dict(pattern)
         while (part := strata[-1][1].part(given)) is not None:
             strata.append(part)
