@@ -14,6 +14,9 @@ from reasoner.graph import FORMATS, KnowledgeGraph
 from reasoner.names import local_name
 
 ERROR, WARNING = "error", "warning"
+CAUSES = ("unreadable", "undeclared-term")
+"""Rules whose findings come first: others may follow from them."""
+
 LABEL = ox.NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
 
 
@@ -104,8 +107,8 @@ def fill(template: str, words: Mapping[str, str]) -> str:
 
 
 def unique(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings once each, by file and line."""
-    return sorted(set(findings))
+    """Return the findings once each, by file and line; first what others may follow from."""
+    return sorted(set(findings), key=lambda finding: (finding.rule not in CAUSES, finding))
 
 
 def _subjects(file: Path) -> dict[str, list[str]]:

@@ -64,24 +64,39 @@ class Case:
 def undeclared_terms(case: Case) -> Iterator[Fault]:
     """Find predicates that are no property, types that are no class, and individuals without a type."""
     seen = set()
+    for subject, iri, wanted, kinds in _undeclared(case):
+        if iri in seen:
+            continue
+        seen.add(iri)
+        name = local_name(iri)
+        known = [local_name(other) for other, types in case.types.items() if not kinds or kinds & types]
+        yield (
+            subject.value if isinstance(subject, ox.NamedNode) else iri,
+            f"{name} is used as {wanted}, but isn't declared as one{nearest(name, known)}",
+            "an unknown name is read as a new one, without a warning; what was meant by it is lost",
+            f"mend the name, or declare <{iri}>",
+        )
+
+
+def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
+    """Yield each use of a term that isn't declared: the subject, the term, what it has to be, in words and as classes."""
     for triple in case.triples:
-        predicate = triple.predicate.value
-        for iri, wanted, kinds in _uses(triple, case.types.get(predicate, set())):
-            if iri in seen or iri.startswith(BUILT_IN) or kinds & case.types.get(iri, set()):
-                continue
-            if not kinds and case.types.get(iri):
-                continue
-            seen.add(iri)
-            name, subject = local_name(iri), triple.subject
-            known = [local_name(other) for other, types in case.types.items() if not kinds or kinds & types]
-            hint = nearest(name, known)
-            where = subject.value if isinstance(subject, ox.NamedNode) else iri
-            yield (
-                where,
-                f"{name} is used as {wanted}, but isn't declared as one{hint}",
-                "an unknown name is read as a new one, without a warning; what was meant by it is lost",
-                f"mend the name, or declare <{iri}>",
-            )
+        for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
+            types = case.types.get(iri, set())
+            if not iri.startswith(BUILT_IN) and not (kinds & types if kinds else types):
+                yield triple.subject, iri, wanted, kinds
+
+
+def misread(case: Case) -> set[str]:
+    """Return what names a term that isn't declared, and what names that: other faults of these may follow from it."""
+    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)}
+    return first | {
+        triple.subject.value
+        for triple in case.triples
+        if isinstance(triple.object, ox.NamedNode)
+        and isinstance(triple.subject, ox.NamedNode)
+        and triple.object.value in first
+    }
 
 
 def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str, str, set[str]]]:

@@ -29,10 +29,23 @@ from reasoner.graph import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_f
 from reasoner.inference import infer
 from reasoner.names import local_name
 from reasoner.reading import Reading, read
-from reasoner.rules import RULES, Case
+from reasoner.rules import RULES, Case, misread
 
 if TYPE_CHECKING:
     import rdflib
+
+CONSEQUENCES = {
+    "fact-without-situation-type",
+    "fact-outside-range",
+    "goal-without-situation-type",
+    "value-outside-range",
+    "effect-without-situation-type",
+    "condition-without-situation-type",
+    "object-without-shape",
+    "relation-outside-domain",
+    "relation-outside-range",
+}
+"""What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
 
 ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
 SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
@@ -52,7 +65,7 @@ def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding
     Returns
     -------
     list of Finding
-        In order of file and line; empty if nothing is wrong. Those that aren't `serious` are warnings.
+        In order of file and line, undeclared terms first; empty if nothing is wrong. Those that aren't `serious` are warnings.
 
     Raises
     ------
@@ -76,8 +89,10 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
     places = Places(graph)
     yield from _merged(graph, places)
     found = [*_violations(graph, places), *_ill_formed(graph, places)]
-    yield from found
     reading, problem = _read(graph)
+    case = Case(graph, reading)
+    unsure = misread(case)
+    yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
     if problem and not any(finding.serious for finding in found):
         why = "the planner reads the file in the same way"
         yield Finding(
@@ -85,7 +100,6 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
         )
     if not any(finding.serious for finding in found):
         yield from _measured(graph, places, reading)
-    case = Case(graph, reading)
     for rule, faults in RULES.items():
         for node, what, why, remedy in faults(case):
             yield places.finding(rule, node, what, why, remedy)

@@ -1,6 +1,7 @@
 """What is shipped is free of faults, and every rule of validation catches a seeded one."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from reasoner.graph import KnowledgeError
 from reasoner.hermit import NoJavaError
 from reasoner.rules import RULES
 from reasoner.validate import checks, validate
-from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, Fault, found, seed, skeleton
+from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, found, seed, skeleton
 
 
 @pytest.mark.parametrize("file", ontology.shipped().values(), ids=lambda path: path.stem)
@@ -63,6 +64,17 @@ def test_a_finding_names_file_line_node_and_label(tmp_path: Path) -> None:
     assert finding.node.endswith("-scene#plate1")
     assert finding.label == "plate 1"
     assert lines[finding.line - 1].startswith(":plate1 a ")
+
+
+def test_an_undeclared_term_comes_first_and_hides_what_follows_from_it(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path, WITH_BODIES)
+    domain = tmp_path / f"{WITH_BODIES}.ttl"
+    domain.write_text(re.sub(r"\bCan\b", "Jug", domain.read_text(encoding="utf-8")), encoding="utf-8")
+    table = tmp_path / f"{WITH_BODIES}-table.ttl"
+    table.write_text(table.read_text(encoding="utf-8").replace("e:z 0.73", "e:z 0.83"), encoding="utf-8")
+    first, *others = validate([scene])
+    assert first.what.startswith("Can is used as a class, but isn't declared as one")
+    assert [finding.rule for finding in others] == ["place-in-the-air"] * 2
 
 
 def test_findings_come_as_json_with_exit_code_1(tmp_path: Path) -> None:
