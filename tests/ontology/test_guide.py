@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 import ontology
+from confab.authoring import new_domain
 from reasoner.graph import load, text
 from reasoner.names import local_name
+from reasoner.validate import validate
 from sim.perception import BUILT_IN as PERCEIVERS
 from sim.skills import BUILT_IN as SKILLS
 
@@ -36,13 +38,25 @@ def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
             assert done.returncode == 0, done.stdout + done.stderr
     story = "\n".join(said)
     print(story)
-    assert story.count("nothing is wrong") == 4
+    assert story.count("nothing is wrong") == 5
     assert story.count("verified: ") == 2
     assert "B3_TIP left_hand" in story
     assert all((tmp_path / "plants" / f"{name}.png").stat().st_size > 5000 for name in ("table", "classes", "behavior"))
     assert "T1_TIDY toy1 location6" in story
     assert "T1_TAKE_OUT toy2 location2" in story
     assert "the plan is the same" in story
+
+
+def test_the_guide_s_renaming_leaves_a_domain_without_faults(tmp_path: Path) -> None:
+    files = new_domain("plants", tmp_path / "plants", bodies=True)
+    (script,) = re.findall(r"^```sh\n(.*?)^```$", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    subprocess.run(["sh", "-c", script], cwd=tmp_path, check=True)
+    (scene,) = (file for file in files if file.stem.endswith("-scene"))
+    assert [str(finding) for finding in validate([scene])] == []
+    said = [re.sub(r'"[^"]*"|(?m:(^|\s)#+ .*)', "", file.read_text(encoding="utf-8")) for file in files[:4]]
+    terms = set(re.findall(r"(?:^|\s)\w?:(\w+)", "\n".join(said)))
+    assert {"Ladle", "B1_FILL", "B3_LADLE", "SOUP", "tomato_soup", "canReach"} <= terms
+    assert [term for term in sorted(terms) if re.search(r"water|dry$|pot|^can(?!Reach)", term, re.IGNORECASE)] == []
 
 
 def test_the_guide_names_every_skill_and_perceiver_with_what_it_asks_for() -> None:
