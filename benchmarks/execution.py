@@ -220,7 +220,7 @@ def repair() -> None:
         "| CPU ms, median | CPU ms, p95 | replanned |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
-    for objects, count in ((4, 500), (20, 1000), (200, 200)):
+    for objects, count in ((4, 500), (20, 1000), (200, 60)):
         _repair_row(objects, count)
     print("\nEach cell: repair / replanning from scratch. Distance counts primitives dropped and added, in sequence.")
 
