@@ -16,9 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from confab.scene import Scene
+    from sim.urdf import Array
+    from sim.world import World
 
 KINDS = (".png", ".svg", ".pdf")
 REACHED, UNREACHED = (30, 140, 60), (200, 40, 40)
+VIEWPOINT = "seen from across the table: the robot's left is on the right"
 GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"
 PARTS = """SELECT DISTINCT ?behavior ?part ?label WHERE {{
   ?behavior :{property} ?part . OPTIONAL {{ ?part rdfs:label ?label }}
@@ -162,8 +165,17 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
     )
 
 
+def _top(world: World, name: str) -> Array:
+    """Return the middle of a body's top."""
+    from sim.bodies import outline
+
+    rotation, base = world.truth(name)
+    top: Array = base + rotation[:, 2] * float(outline(world.bodies[name].shape)[0][-1])
+    return top
+
+
 def _table(scene: Scene, path: Path) -> Path:
-    """Take a picture of the world as it begins, with the places, and who reaches those that not every hand does."""
+    """Take a picture of the world as it begins, with objects, places, and who reaches those that not every hand does."""
     import numpy as np
     from PIL import Image, ImageDraw, ImageFont
 
@@ -183,11 +195,11 @@ def _table(scene: Scene, path: Path) -> Path:
         camera = view_of(scene.embodiment, 800, 448)
         hide_vessels(world)
         image = Image.fromarray(picture(world, camera))
+        tops = {name: _top(world, name) for name in world.bodies}
     every = [hand for robot in scene.embodiment.robots for hand in robot.hands]
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     for place in scene.embodiment.places.values():
-        right, up, ahead = camera.axes @ (np.array(place.position) - np.array(camera.eye))
-        x, y = camera.width / 2 + camera.focal * right / ahead, camera.height / 2 - camera.focal * up / ahead
+        x, y = camera.pixel(np.array(place.position))
         hands = sorted(hand for hand, *rest in reached if rest == [place.name])
         who = ", ".join(hands) if len(hands) < len(every) else ""
         words = f"{place.name}: {who or 'no hand'}" if who or not hands else place.name
@@ -195,5 +207,12 @@ def _table(scene: Scene, path: Path) -> Path:
         width = pen.textlength(words, font=font)
         pen.rectangle((x - width / 2 - 3, y + 6, x + width / 2 + 3, y + 22), fill=(250, 251, 253))
         pen.text((x - width / 2, y + 7), words, font=font, fill=(30, 36, 46))
-    image.quantize(255, dither=Image.Dither.NONE).save(path, optimize=True)
+    for name, top in tops.items():
+        x, y = camera.pixel(top)
+        width = pen.textlength(name, font=font)
+        pen.rectangle((x - width / 2 - 3, y - 22, x + width / 2 + 3, y - 6), fill=(60, 72, 92))
+        pen.text((x - width / 2, y - 21), name, font=font, fill=(250, 251, 253))
+    pen.rectangle((0, 0, pen.textlength(VIEWPOINT, font=font) + 12, 18), fill=(250, 251, 253))
+    pen.text((6, 2), VIEWPOINT, font=font, fill=(30, 36, 46))
+    image.save(path, optimize=True)
     return path

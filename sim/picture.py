@@ -75,6 +75,11 @@ class Camera:
         whole = np.broadcast_to(SKY * (1 - part) + GROUND * part, (self.height, self.width, 3))
         return np.ascontiguousarray(whole, dtype=np.float32)
 
+    def pixel(self, point: Array) -> tuple[float, float]:
+        """Return the column and row of a point."""
+        x, y, z = self.axes @ (point - np.array(self.eye))
+        return float(self.width / 2 + self.focal * x / z), float(self.height / 2 - self.focal * y / z)
+
     def window(self, center: Array, radius: float) -> tuple[slice, slice] | None:
         """Return the rows and columns that a sphere can cover, or None if it's out of the picture."""
         x, y, z = self.axes @ (center - np.array(self.eye))
@@ -116,11 +121,15 @@ def picture(world: World, camera: Camera) -> Array:
     """Return what the camera sees."""
     image, depth = _opaque(world, camera)
     _cast_shadows(world, image, depth, camera)
+    vessels = [(world.truth(name), thing.shape) for name, thing in world.bodies.items() if thing.shape.kind == "vessel"]
+    for (rotation, base), shape in vessels:
+        if shape.color[3] >= 1:
+            _draw_opaque(image, depth, camera, rotation, base, shape)
     for center, radius, color in _drops(world):
         _draw_sphere(image, depth, camera, center, radius, color)
-    vessels = [(world.truth(name), thing.shape) for name, thing in world.bodies.items() if thing.shape.kind == "vessel"]
+    glasses = [vessel for vessel in vessels if vessel[1].color[3] < 1]
     eye = np.array(camera.eye)
-    for (rotation, base), shape in sorted(vessels, key=lambda v: -float(np.linalg.norm(v[0][1] - eye))):
+    for (rotation, base), shape in sorted(glasses, key=lambda v: -float(np.linalg.norm(v[0][1] - eye))):
         _draw_glass(image, depth, camera, rotation, base, shape)
     shown: Array = np.clip(image, 0, 255).astype(np.uint8)
     return shown
@@ -243,6 +252,33 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
     light = np.clip(normal @ SUN, 0.0, 1.0)
     shade = (0.5 + 0.5 * light)[..., None] * color + 18 * (light**30)[..., None]
     image[window][seen] = shade[seen]
+    depth[window][seen] = distance[seen]
+
+
+def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
+    """Draw a vessel of clay or tin where nothing is before it: the wall that a ray meets first, or the bottom inside."""
+    heights, radii = np.array(shape.profile).T
+    radii = radii + wall(shape)
+    reach = float(np.hypot(heights[-1] / 2, radii.max()))
+    window = camera.window(base + rotation[:, 2] * heights[-1] / 2, reach)
+    if window is None:
+        return
+    rays = camera.rays[window] @ rotation
+    origin = (np.array(camera.eye) - base) @ rotation
+    distance, _ = _walls(origin, rays, heights, radii)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        floor = (heights[0] - origin[2]) / rays[..., 2]
+        inside = np.hypot(*(origin[axis] + floor * rays[..., axis] for axis in (0, 1))) <= radii[0]
+    on_floor = inside & (floor > 0) & (floor < distance)
+    distance = np.where(on_floor, floor, distance)
+    seen = np.isfinite(distance) & (distance < depth[window])
+    point = origin + np.where(seen, distance, 0.0)[..., None] * rays
+    normal = np.where(on_floor[..., None], np.array([0.0, 0.0, 1.0]), _normals(point, heights, radii))
+    within = np.einsum("ijk,ijk->ij", normal, rays) > 0
+    lit = np.clip(np.where(within[..., None], -normal, normal) @ (SUN @ rotation), 0.0, 1.0)
+    shade = (0.62 + 0.42 * lit) * np.where(within | on_floor, 0.7, 1.0)
+    color = np.clip(shade[..., None] * np.array(shape.color[:3]) * 255, 0, 255)
+    image[window][seen] = color[seen]
     depth[window][seen] = distance[seen]
 
 

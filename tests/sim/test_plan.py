@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from PIL import Image, ImageSequence
 
 from sim.faults import hidden_wall
 from sim.film import BAR, DOING, DONE, Film
-from sim.picture import hide_vessels, picture, view_of
+from sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
 from sim.verify import verify
 from sim.world import World
 
@@ -119,3 +120,21 @@ def test_a_film_may_be_a_gif_with_caption_and_plan_strip_in_every_frame(serving:
         assert np.sum(caption.max(-1) < 120) > 40
     done = [int(np.sum(np.abs(frame[-10] - DONE).max(-1) < 40)) for frame in frames]
     assert done[0] == 0 < done[-1]
+
+
+def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(serving: Case) -> None:
+    shape = next(body.shape for body in serving.embodiment.bodies.values() if body.shape.kind == "vessel")
+    clay = replace(shape, color=(0.8, 0.4, 0.2, 1.0))
+    camera = Camera((1.0, 0.0, 0.3), (0.0, 0.0, 0.05), 20.0, 120, 80)
+    behind = np.random.default_rng(0).uniform(0, 255, (80, 120, 3))
+    image, depth = behind.copy(), np.full((80, 120), 8.0)
+    _draw_opaque(image, depth, camera, np.eye(3), np.zeros(3), clay)
+    drawn = depth < 8
+    assert 200 < drawn.sum() < drawn.size
+    assert (image[~drawn] == behind[~drawn]).all()
+    red, green, blue = image[drawn].T
+    assert np.allclose(red, 2 * green)
+    assert np.allclose(green, 2 * blue)
+    again = behind.copy()
+    _draw_opaque(again, np.full((80, 120), 0.5), camera, np.eye(3), np.zeros(3), clay)
+    assert (again == behind).all()
