@@ -19,21 +19,25 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from time import perf_counter
 
 from planner.exhaust import TooLargeError
 from planner.flat import plan_level
-from planner.improve import Improver
+from planner.improve import Improver, length
+from planner.lifted import Done
 from planner.plan import Limits, Outcome, Plan, Reason, Status
 from planner.proofs import contested, unattainable
 from planner.segments import Advice, LimitError
 from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled, exhaust
-from reasoner.symbols import Problem
+from reasoner.symbols import FALSE, Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
+DETOURS = 1.25
+"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 FIRST_TURN = 2_000
@@ -111,6 +115,7 @@ def _plan(
         if call.serialise():
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
+                    call.steps = turned(call)
                     call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
             return outcome(Status.SOLVED, call.tree())
     except UnsolvableError as proof:
@@ -122,6 +127,27 @@ def _plan(
         text = f"goals in series found no plan, and {call.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
     return outcome(*last_resort(problem, limits, deadline))
+
+
+def turned(call: Call) -> list[Done]:
+    """Return the shorter of a call's steps and those that come out with the goals in reverse order.
+
+    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is tried
+    uses the most abstract level alone and expands no more nodes than the call did.
+    """
+    unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
+    if len(call.steps) <= DETOURS * unmet or len(call.program.levels) < 2:
+        return call.steps
+    problem = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
+    other = Call(
+        problem, call.using, call.segments.deadline, None, call.segments.expanded
+    )  # advice races the first plan
+    other.proved = True  # there is a plan
+    other.efforts = tuple((level, effort) for level, effort in other.efforts if level == call.program.levels[0])
+    with suppress(LimitError):
+        if other.serialise() and length(other.steps) < length(call.steps):
+            return other.steps
+    return call.steps
 
 
 def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:
