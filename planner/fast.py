@@ -115,8 +115,9 @@ def _plan(
         if call.serialise():
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
-                    call.steps = turned(call)
-                    call.steps = Improver(call.refiner, call.using.shapes, improve).improve(call.steps)
+                    first, call.steps = call.steps, turned(call)
+                    left = improve if call.steps is first else (improve + 1) // 2
+                    call.steps = Improver(call.refiner, call.using.shapes, left).improve(call.steps)
             return outcome(Status.SOLVED, call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
