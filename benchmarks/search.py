@@ -378,7 +378,7 @@ def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
     try:
         with budget(seconds):
             return variant()
-    except LimitError as limit:
+    except (LimitError, SystemError) as limit:  # the latter is what numba makes of what a signal raises
         return Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
 
 

@@ -29,7 +29,7 @@ LARGEST = 7
 """So many steps a cluster has at most."""
 OPERATORS, STATES = 400, 5_000
 """The largest world in which a cluster is planned anew, the states for each cluster allowed."""
-WORK, WHOLE_WORK, PER_OPERATOR = 1_200_000, 1_700_000, 4_000
+WORK, WHOLE_WORK, PER_OPERATOR = 1_000_000, 1_700_000, 4_000
 """For each cluster allowed so many pairs of a state and an operator may be looked at in all, in clusters and in a whole plan;
 putting an operator in counts as so many. A million take some 8 ms, so that time is bounded without a look at the clock."""
 WHOLE_BITS, WHOLE_STATES = 48, 20_000
