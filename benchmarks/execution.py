@@ -349,7 +349,7 @@ def _beside_a_post(scene: Scene, learns: bool, seed: int, episodes: int, patienc
     return found
 
 
-def hidden_post(world: Any, at: tuple[float, float, float] = (0.35, -0.05, 0.7), height: float = 0.09) -> None:
+def hidden_post(world: Any, at: tuple[float, float, float] = (0.35, -0.05, 0.7), height: float = 0.06) -> None:
     """Put up a post 2 cm thick that the robot doesn't perceive; a hand that comes from the right gets past it."""
     import pybullet
 
