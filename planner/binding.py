@@ -11,10 +11,11 @@ between two values of the upper level (the place that something in a hand came f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from planner.behaviors import mentions
+from planner.schemas import substituted
 from reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -23,7 +24,6 @@ from reasoner.symbols import (
     Domain,
     EqualityCondition,
     Problem,
-    RelationCondition,
     ValueCondition,
     ValueEffect,
     Witness,
@@ -117,8 +117,8 @@ def _asked(
             ):
                 names[condition.value] = found[symbol]
         own.append(condition)
-    asked += [c for c in _renamed_all(_closed(own, set(names), terms), names) if c not in lower.preconditions]
-    yield tuple(asked)
+    closed = [substituted(condition, names) for condition in _closed(own, set(names), terms)]
+    yield (*asked, *(condition for condition in closed if condition not in lower.preconditions))
 
 
 def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
@@ -129,30 +129,3 @@ def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str
             variable = condition.value
             about = [c for c in conditions if variable in mentions(c) and mentions(c) <= {*known, variable}]
             yield Witness(variable, terms[variable], tuple(about))
-
-
-def _renamed_all(conditions: Iterable[Condition], names: Mapping[str, str]) -> list[Condition]:
-    return [_renamed(condition, names) for condition in conditions]
-
-
-def _renamed(condition: Condition, names: Mapping[str, str]) -> Condition:
-    """Return a condition with terms replaced; the variable of a witness keeps its name unless it is one of the new ones."""
-
-    def of(terms: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(names.get(term, term) for term in terms)
-
-    match condition:
-        case ValueCondition(situation, arguments, value, negated):
-            return ValueCondition(situation, of(arguments), names.get(value, value), negated)
-        case RelationCondition(relation, arguments, negated):
-            return RelationCondition(relation, of(arguments), negated)
-        case ClassCondition(term, kind, negated):
-            return ClassCondition(names.get(term, term), kind, negated)
-        case EqualityCondition(left, right, negated):
-            return EqualityCondition(names.get(left, left), names.get(right, right), negated)
-        case Witness(variable, kind, conditions, negated):
-            own = f"{variable}_above" if variable in names.values() else variable
-            inner = {**names, variable: own}
-            return Witness(own, kind, tuple(_renamed_all(conditions, inner)), negated)
-        case AnyOf(alternatives, negated):
-            return AnyOf(tuple(tuple(_renamed_all(group, names)) for group in alternatives), negated)

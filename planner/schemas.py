@@ -263,7 +263,8 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
         case EqualityCondition(left, right, negated):
             return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
         case Witness(variable, kind, conditions, negated):
-            inner = {name: term for name, term in terms.items() if name != variable}
-            return Witness(variable, kind, tuple(substituted(c, inner) for c in conditions), negated)
+            own = f"{variable}_inside" if variable in terms.values() else variable  # else it would capture that term
+            inner = {**terms, variable: own}
+            return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
         case AnyOf(alternatives, negated):
             return AnyOf(tuple(tuple(substituted(c, terms) for c in group) for group in alternatives), negated)
