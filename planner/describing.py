@@ -173,6 +173,11 @@ class Schema:
             for s in plain:
                 if not deep and not self.members.get(s.arguments[0], frozenset()).isdisjoint(end.members):
                     found.append(Question(f"{end.name} wanted {s.name}", "wanted", (i,), s.name))
+            for name, (right_of, left_of) in self.partners.items():
+                if len(right_of) <= CROWD and not end.members.isdisjoint(left_of):
+                    found.append(Question(f"how many {name} {end.name}", "many", (i,), name))
+                if len(left_of) <= CROWD and not end.members.isdisjoint(right_of):
+                    found.append(Question(f"{end.name} {name} how many", "many", (i,), name))
             for j in range(roles):
                 if i > j and end.start != j and not end.members.isdisjoint(ends[j].members):
                     found.append(Question(f"{end.name} = {ends[j].name}", "same", (i, j)))
@@ -320,6 +325,15 @@ class View:
             cells = self.table.now[question.of] if question.kind == "pair" else self.wanted[question.of]
             return lambda ends: cells.get((ends[i][0], ends[j][0]), FALSE if question.kind == "pair" else NONE)
         right_of, left_of = schema.partners[question.of]
+        if question.kind == "many":
+            sides = left_of if question.name.startswith("how") else right_of
+            total = len(right_of if sides is left_of else left_of)
+
+            def many(x: str) -> str:
+                count = len(sides.get(x, ()))
+                return "all" if count == total else str(min(count, 1)) if count < 2 else "several"
+
+            return lambda ends: _joined([many(x) for x in ends[i]])
         partners = left_of if question.kind == "joined" else {**right_of, **left_of}
         nobody: frozenset[str] = frozenset()
         if question.kind == "joined":

@@ -17,7 +17,7 @@ flat search             the rest, until a limit comes                   `planner
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from time import perf_counter
@@ -28,7 +28,7 @@ from planner.improve import Improver, length
 from planner.lifted import Done
 from planner.plan import Limits, Outcome, Plan, Reason, Status
 from planner.proofs import contested, unattainable
-from planner.segments import Advice, LimitError
+from planner.segments import Advice, LimitError, Watch, nobody
 from planner.serialise import EASY, Call, Compiled, UnsolvableError, compiled, exhaust
 from reasoner.symbols import FALSE, Problem
 
@@ -53,7 +53,7 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
-    watch: Callable[[], None] | None = None,
+    watch: Watch = nobody,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
 
@@ -67,8 +67,9 @@ def plan(
         How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
     using : Compiled, optional
         From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
-    watch : callable, optional
-        Told when the first level has been tried in vain, before proofs and lower levels begin.
+    watch : Watch, optional
+        Told the level of each expansion, and `None` before what costs most: detours for several goals, and lower levels where
+        relaxed reachability disproves nothing.
 
     Returns
     -------
@@ -96,12 +97,12 @@ def _plan(
     limits: Limits,
     improve: int,
     using: Compiled | None,
-    watch: Callable[[], None] | None,
+    watch: Watch,
 ) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
-    call.watch = watch
+    call.segments.watch = watch
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         seconds, cache = perf_counter() - begin, call.refiner
@@ -140,9 +141,7 @@ def turned(call: Call) -> list[Done]:
     if len(call.steps) <= DETOURS * unmet or len(call.program.levels) < 2:
         return call.steps
     problem = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
-    other = Call(
-        problem, call.using, call.segments.deadline, None, call.segments.expanded
-    )  # advice races the first plan
+    other = Call(problem, call.using, call.segments.deadline, None, call.segments.expanded)
     other.proved = True  # there is a plan
     other.efforts = tuple((level, effort) for level, effort in other.efforts if level == call.program.levels[0])
     with suppress(LimitError):

@@ -14,19 +14,18 @@ strict mode whatever was asked for, and one that knows none of the level's behav
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from planner import fast
 from planner.compiling import Program
-from planner.deciding import Field, Ground
+from planner.deciding import Field
 from planner.describing import CROWD, Schema
 from planner.judging import Judge, preferred
 from planner.plan import Counts, Limits, Outcome, Status
 from planner.stream import Stream
-from planner.table import Table
 from reasoner.experience import Experience
 from reasoner.symbols import Problem
 
@@ -119,21 +118,16 @@ class Race:
             self.begun = self.begin()
         return self.begun
 
-    def hook(self, level: int, table: Table, choices: Sequence[Ground]) -> Sequence[Ground]:
-        """Count an expansion of the base, let the stream have its share, and leave the base's choices as they are."""
+    def watch(self, level: int | None) -> None:
+        """Let the stream have its share before an expansion of the base; before what costs most (None) whatever the patience."""
         if self.strict:
             if self.base >= DEBT and self.stream.expanded < self.base // DEBT and self.stream.expand():
                 raise ArrivedError
-        elif self.base >= max(self.owed, self.patience) and self.lead():
+        elif self.base >= (self.owed if level is None else max(self.owed, self.patience)) and self.lead():
             raise ArrivedError
-        self.base += level == self.level
-        self.spent[level] = self.spent.get(level, 0) + 1
-        return choices
-
-    def watch(self) -> None:
-        """Lead, whatever the patience: the base has tried its first level in vain, and what it does now costs most."""
-        if not self.strict and self.base >= self.owed and self.lead():
-            raise ArrivedError
+        if level is not None:
+            self.base += level == self.level
+            self.spent[level] = self.spent.get(level, 0) + 1
 
     def lead(self) -> bool:
         """Let the stream go on as long as it gets nearer; whether it reached the goal."""
@@ -195,7 +189,7 @@ def plan(
     while outcome is None:
         if race.begun is None or race.begun.solution is None:
             with suppress(ArrivedError):
-                outcome = fast.plan(problem, advice=race.hook, limits=limits, using=using, watch=race.watch)
+                outcome = fast.plan(problem, limits=limits, using=using, watch=race.watch)
         if race.begun is not None and race.begun.solution is not None:
             outcome = refined(problem, using, race.begun, deadline)
     if outcome.status is Status.GAVE_UP and not race.strict:

@@ -33,6 +33,8 @@ Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
 """A quantified behaviour, and the changes since the segment began after which it is forbidden."""
 Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
 """Orders what could be done, given the level and the state; may leave nothing out."""
+Watch: TypeAlias = "Callable[[int | None], object]"
+"""Told the level of each expansion, and `None` before what costs most begins."""
 
 
 FIRST = 3
@@ -41,6 +43,10 @@ FIRST = 3
 
 class LimitError(Exception):
     """A limit of the planning call has been reached; the message says which."""
+
+
+def nobody(level: int | None) -> None:
+    """Watch nothing."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,7 @@ class Segments:
     deadline : float, optional
         `perf_counter` at which `LimitError` is raised.
     advice : Advice, optional
+    watch : Watch, optional
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
     """
@@ -82,6 +89,7 @@ class Segments:
     deadline: float | None = None
     advice: Advice | None = None
     most: int = 200_000
+    watch: Watch = nobody
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -249,6 +257,7 @@ class Segments:
         counts = self.counts[level]
         counts.expanded += 1
         self.expanded += 1
+        self.watch(level)
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
         self.check_time()
@@ -317,7 +326,7 @@ class Segments:
                 want
                 for achiever, unmet, env in blocked
                 for number in unmet
-                for want in self.wants.of(achiever, achiever.soft[number], env, level)
+                for want in self.wants.towards(achiever, number, env, level)
             ]
 
     def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
@@ -326,7 +335,7 @@ class Segments:
         for achiever in self.program.achievers.get((level, cell[0]), ()):
             for _, unmet, env in self.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
                 for number in unmet:
-                    for situation, key, _ in self.wants.of(achiever, achiever.soft[number], env, level):
+                    for situation, key, _ in self.wants.towards(achiever, number, env, level):
                         found[situation, key] = None
         return list(found)
 

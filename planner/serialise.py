@@ -13,7 +13,7 @@ forbidden there, and the segment searched again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
@@ -42,6 +42,8 @@ TOGETHER = Effort(depth=0, expansions=2_000)
 
 FEW_OPERATORS, FEW_STATES = 300, 30_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
+COSTLY = 4
+"""So many goals that need detours are a task of which a watcher is told."""
 MOST_ROWS, MOST_CHANGES, MOST_TOGETHER = 2_000_000, 10_000_000, 3_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded: the lowest (600 MB),
 and another for all goals at once."""
@@ -130,7 +132,6 @@ class Call:
         self.proved = False
         self.too_large: Reason | None = None
         self.together_at: dict[int, int] = {}
-        self.watch: Callable[[], None] | None = None  # told before what costs most begins
         *upper, lowest = self.program.levels
         self.efforts = (
             *product(upper[:1], (SHORT, NEARBY, WIDER, LONG)),
@@ -207,6 +208,8 @@ class Call:
                 yield from asleep
 
         for level, effort in self.efforts:
+            if effort is NEARBY and len(self.goal) - len(self.kept) >= COSTLY:
+                self.segments.watch(None)
             if level != self.program.levels[0] or effort is LONG:
                 self.prove()
             if effort is TOGETHER:
@@ -234,14 +237,13 @@ class Call:
         """
         if not self.proved:
             self.proved = True
-            if self.watch is not None:
-                self.watch()
             level, deadline = self.program.levels[-1], self.segments.deadline
             try:
                 reached = closed(self.problem, level, deadline)
                 for symbol, value in sorted(self.problem.goal.items()):
                     if not reached.possible(symbol, value):
                         raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
+                self.segments.watch(None)
                 self.too_large = refusal(reached)
                 if self.too_large is not None:
                     return

@@ -20,7 +20,7 @@ from planner.judging import Judge
 from planner.table import Cell, Key, arguments_of
 from reasoner.symbols import FALSE
 
-WEIGHT = 1  # open goals that one discrepancy weighs
+WEIGHT = 2  # open goals that one discrepancy weighs
 SURE = 0.0  # ln odds: rather chosen than passed over
 LOST = 3  # expansions without getting nearer, after which more than the first of its sort is thought of
 NEAR, FAR = 3, 6  # steps ahead from which a candidate may work towards a goal; the second if the first gives none

@@ -3,6 +3,7 @@
 now    situation type → key → value. The key is the individual, or the tuple of individuals where a type has several arguments
 who    situation type → value → the keys that have it, in the order in which they came to it; not kept for `FALSE`
 trail  what was overwritten, oldest first; `undo` takes it back to a mark
+age    how often anything was changed, undoing included: what was read off the table at this age still holds
 
 Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world.
 """
@@ -46,6 +47,7 @@ class Table:
         self.now: dict[str, dict[Key, str]] = {name: {} for name in situations}
         self.who: dict[str, dict[str, dict[Key, None]]] = {name: {} for name in self.now}
         self.trail: list[tuple[str, Key, str]] = []
+        self.age = 0
         for symbol, value in state.items():
             key = key_of(symbol.arguments)
             self.now[symbol.situation][key] = value
@@ -54,6 +56,7 @@ class Table:
 
     def put(self, situation: str, key: Key, value: str) -> None:
         """Give a symbol a value, and remember the old one."""
+        self.age += 1
         cells = self.now[situation]
         old = cells.get(key, FALSE)
         cells[key] = value

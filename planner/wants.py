@@ -6,7 +6,8 @@ thousand free places count as one; the values that goals name are proposed besid
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 from planner.compiling import FEW, Achiever, Program, mentioned
@@ -47,9 +48,35 @@ class Wants:
         self._cursors: dict[int, int] = {}
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, tuple[str, ...], Condition]] = {}
+        self._negations: dict[int, tuple[ValueCondition, ValueCondition]] = {}
+        self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
+        self._fresh: dict[tuple[object, ...], list[Want]] = {}
+        self._age = -1
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
             self.wanted.setdefault(situation, {})[value] = None
+
+    def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Want]:
+        """Return alternative wants for the soft condition `number`, as `of` does; the same as long as nothing changes."""
+        if self._age != self.table.age:
+            self._age = self.table.age
+            self._fresh.clear()
+        scope = self._scopes.get((id(achiever), number))
+        if scope is None:
+            scope = self._scopes[id(achiever), number] = self._scope(achiever, achiever.soft[number])
+        key = id(achiever), number, level, self.breadth, *[env.get(term) for term in scope]
+        found = self._fresh.get(key)
+        if found is None:
+            found = self._fresh[key] = list(self.of(achiever, achiever.soft[number], env, level))
+        return found
+
+    def _scope(self, achiever: Achiever, condition: Condition) -> tuple[str, ...]:
+        """Return the variables on which the wants of a condition depend."""
+        found = dict.fromkeys(self._about(condition)[1])
+        for term in tuple(found):
+            if term in achiever.determined:
+                found.update(dict.fromkeys(a for a in achiever.determined[term][1] if a.startswith("?")))
+        return tuple(found)
 
     def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
         """Yield alternative wants, any of which may bring an achiever's unmet condition nearer."""
@@ -73,7 +100,7 @@ class Wants:
                         inner = {**env, variable: individual}
                         for c in conditions:
                             if isinstance(c, ValueCondition):
-                                yield from self.of(achiever, _negation(c), inner, level)
+                                yield from self.of(achiever, self._negation(c), inner, level)
                 else:
                     for individual in self._some(kind):
                         inner = {**env, variable: individual}
@@ -85,7 +112,7 @@ class Wants:
                 for group in alternatives:
                     for c in group:
                         if isinstance(c, ValueCondition) and self.holds(c, env) is negated:
-                            yield from self.of(achiever, _negation(c) if negated else c, env, level)
+                            yield from self.of(achiever, self._negation(c) if negated else c, env, level)
         yield from self._redetermined(achiever, condition, env)
 
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
@@ -113,6 +140,14 @@ class Wants:
             found = _static(condition), tuple(sorted(mentioned(condition))), condition
             self._conditions[id(condition)] = found
         return found
+
+    def _negation(self, condition: ValueCondition) -> ValueCondition:
+        """Return the opposite of a condition, always the same one."""
+        found = self._negations.get(id(condition))
+        if found is None:
+            opposite = replace(condition, negated=not condition.negated)
+            found = self._negations[id(condition)] = opposite, condition
+        return found[0]
 
     def _would_hold(self, condition: Condition, env: Env, term: str, value: str) -> bool:
         """Whether a condition would hold with another value for a variable; what is static is asked once."""
@@ -212,10 +247,6 @@ class Wants:
 
 def _fluent(condition: Condition) -> bool:
     return isinstance(condition, ValueCondition | Witness | AnyOf)
-
-
-def _negation(condition: ValueCondition) -> ValueCondition:
-    return ValueCondition(condition.situation, condition.arguments, condition.value, not condition.negated)
 
 
 def _static(condition: Condition) -> bool:
