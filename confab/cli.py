@@ -281,8 +281,10 @@ def learn(
         loaded = _load(name)
         if remembered is None:
             remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
-        shown = read_plan(demonstration, loaded.problem) if demonstration else loaded.plan(memory=remembered).plan
-        remembered.learn(loaded, shown)
+        if demonstration:
+            remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+        else:
+            remembered.teach(loaded, loaded.plan(memory=remembered).plan)
     assert remembered is not None
     remembered.save(memory)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}

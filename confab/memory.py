@@ -119,6 +119,38 @@ class Memory:
             raise KnowledgeError(str(error)) from error
         self.experience.learn(lived)
 
+    def teach(self, scene: Scene, plan: Plan) -> None:
+        """Learn how a scene is best solved: of each level shortest steps where they are found soon, else those of a plan.
+
+        Parameters
+        ----------
+        scene : Scene
+        plan : Plan
+            For what isn't found, and for the paper's links.
+
+        Raises
+        ------
+        KnowledgeError
+            The plan can't be done in the scene's situation; nothing is learned then.
+        """
+        from planner.compiling import Program
+        from planner.deciding import decisions, single_level
+        from planner.teaching import lesson
+
+        try:
+            lived = decisions_of(scene.problem, plan)
+            links = learn_plan(scene.problem, plan, self.links)
+        except LearningError as error:
+            raise KnowledgeError(str(error)) from error
+        level = scene.problem.domain.levels[0]
+        steps = lesson(scene.problem, level)
+        if steps:
+            within = single_level(scene.problem, level)
+            below = [d for d in lived if scene.problem.domain.behaviors[d.chosen.conclusion.behavior].level != level]
+            lived = decisions(Program(within), within, level, steps) + below
+        self.links = links
+        self.experience.learn(lived)
+
     def merge(self, other: Memory, trust: bool = False) -> None:
         """Take in another memory's counts; with `trust`, they may lead. The paper's links can't be merged and stay as they are."""
         self.experience.merge(other.experience)

@@ -6,7 +6,6 @@ could as well do now isn't passed over.
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias
@@ -21,7 +20,6 @@ from reasoner.symbols import FALSE, Problem
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 REACH = 3  # how many steps ahead alternatives may begin to work towards a goal
-MOST = 1000  # expansions in search of a shortest plan to learn from
 BROAD = 12  # so many taken values of a sort are thought of where none is free
 
 
@@ -142,62 +140,6 @@ def decisions(
         found.append(Decision(chosen, tuple(others)))
         field.do(step)
     return found
-
-
-def shortened(program: Program, problem: Problem, level: int, steps: Sequence[Ground]) -> list[Ground]:
-    """Return a plan without steps that the goal doesn't need, nor steps that only those need.
-
-    Action elimination: H. Nakhost and M. Müller, "Action elimination and plan neighborhood graph search", ICAPS 2010.
-    """
-    field = Field(program, problem, level)
-    kept = list(steps)
-    i = 0
-    while i < len(kept):
-        mark = len(field.table.trail)
-        trial = [step for step in kept[i + 1 :] if field.do(step)]
-        reached = not field.unmet()
-        field.table.undo(mark)
-        if reached:
-            kept[i:] = trial
-        else:
-            field.do(kept[i])
-            i += 1
-    return kept
-
-
-def shortest(program: Program, problem: Problem, level: int, most: int = MOST) -> list[Ground] | None:
-    """Return a shortest plan of one level, of what works towards its goals; None if `most` expansions don't find one.
-
-    A* with the number of goals that are open, over the most that one step changes: a teacher for small problems.
-    """
-    field = Field(program, problem, level)
-    table, widest = field.table, field.segments.widest[level]
-    start = len(table.trail)
-    queue: list[tuple[int, int, int, frozenset[tuple[Cell, str]], tuple[Ground, ...]]] = [(0, 0, 0, frozenset(), ())]
-    reached = {queue[0][3]: 0}
-    expanded = number = 0
-    while queue and expanded < most:
-        _, _, _, here, steps = heapq.heappop(queue)
-        if reached[here] < len(steps):
-            continue
-        table.undo(start)
-        for (situation, key), value in here:
-            table.put(situation, key, value)
-        unmet = field.unmet()
-        if not unmet:
-            return list(steps)
-        expanded += 1
-        mark = len(table.trail)
-        for ground in field.proposals(unmet, breadth=BROAD):
-            field.do(ground)
-            there = frozenset(table.since(start).items())
-            left = -(-len(field.unmet()) // widest)
-            table.undo(mark)
-            if reached.get(there, len(steps) + 2) > len(steps) + 1:
-                reached[there] = len(steps) + 1
-                number += 1
-                heapq.heappush(queue, (len(steps) + 1 + left, left, number, there, (*steps, ground)))
-    return None
 
 
 def single_level(problem: Problem, level: int) -> Problem:

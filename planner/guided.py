@@ -23,8 +23,10 @@ from planner import fast
 from planner.compiling import Program
 from planner.deciding import Field
 from planner.describing import CROWD, Schema
+from planner.improve import Improver
 from planner.judging import Judge, preferred
 from planner.plan import Counts, Limits, Outcome, Status
+from planner.segments import LimitError
 from planner.stream import Stream
 from reasoner.experience import Experience
 from reasoner.symbols import Problem
@@ -32,7 +34,7 @@ from reasoner.symbols import Problem
 DEBT = 20
 STRETCH = 12
 PATIENCE = 100  # expansions of the base before experience leads, and besides
-PER_GOAL = 5  # for each goal that is open
+PER_GOAL = 15  # for each goal that is open
 
 
 @dataclass
@@ -150,6 +152,7 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: fast.Compiled | None = None,
     patience: int | None = None,
+    improve: int = fast.IMPROVEMENTS,
 ) -> Outcome:
     """Plan with experience.
 
@@ -164,6 +167,8 @@ def plan(
         As for `planner.fast.plan`.
     patience : int
         Expansions that the base gets before experience leads; if left out, as `mode` says.
+    improve : int
+        As for `planner.fast.plan`.
 
     Returns
     -------
@@ -174,7 +179,7 @@ def plan(
     using = using or fast.compiled(problem)
     first = problem.domain.levels[0]
     if memory is None or not memory.knows(b.name for b in problem.domain.at_level(first)):
-        return fast.plan(problem, limits=limits, using=using)
+        return fast.plan(problem, limits=limits, improve=improve, using=using)
     deadline = None if limits.seconds is None else began + limits.seconds
 
     def begin() -> Stream:
@@ -189,16 +194,16 @@ def plan(
     while outcome is None:
         if race.begun is None or race.begun.solution is None:
             with suppress(ArrivedError):
-                outcome = fast.plan(problem, limits=limits, using=using, watch=race.watch)
+                outcome = fast.plan(problem, limits=limits, improve=improve, using=using, watch=race.watch)
         if race.begun is not None and race.begun.solution is not None:
-            outcome = refined(problem, using, race.begun, deadline)
+            outcome = refined(problem, using, race.begun, deadline, improve)
     if outcome.status is Status.GAVE_UP and not race.strict:
         stream = race.stream
         while outcome.plan is None and stream.expanded < limits.expansions and not stream.exhausted:
             if deadline is not None and perf_counter() > deadline:
                 break
             if stream.expand():
-                outcome = refined(problem, using, stream, deadline) or outcome
+                outcome = refined(problem, using, stream, deadline, improve) or outcome
     if race.begun is None:
         return replace(outcome, seconds=perf_counter() - began)
     stream = race.begun
@@ -214,8 +219,10 @@ def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], O
     return lambda problem: plan(problem, memory, mode)
 
 
-def refined(problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None) -> Outcome | None:
-    """Refine the stream's solution down to primitives; None if a step can't be, which is then forbidden where it stands."""
+def refined(
+    problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None, improve: int
+) -> Outcome | None:
+    """Refine the stream's solution down to primitives and shorten it; None if a step can't be, which is then forbidden there."""
     assert stream.solution is not None
     call = fast.Call(problem, using, deadline, None, Limits().expansions)
     first = problem.domain.levels[0]
@@ -225,5 +232,8 @@ def refined(problem: Problem, using: fast.Compiled, stream: Stream, deadline: fl
             stream.forbid(stream.solution[: position + 1])
             return None
         call.steps.append(step)
+    with suppress(LimitError):  # then the first plan is what there is
+        if improve:
+            call.steps = Improver(call.refiner, using.shapes, (improve + 1) // 2).improve(call.steps)
     cache, counts = call.refiner, call.segments.counts
     return Outcome(Status.SOLVED, call.tree(), None, counts, call.fallbacks, hits=cache.hits, misses=cache.misses)

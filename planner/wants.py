@@ -47,10 +47,11 @@ class Wants:
         self.breadth = 1
         self._cursors: dict[int, int] = {}
         self._known: dict[tuple[object, ...], bool] = {}
-        self._conditions: dict[int, tuple[bool, tuple[str, ...], Condition]] = {}
+        self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[ValueCondition, ValueCondition]] = {}
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
+        self._free: dict[tuple[str, str, int], list[str]] = {}
         self._age = -1
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
@@ -58,9 +59,7 @@ class Wants:
 
     def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Want]:
         """Return alternative wants for the soft condition `number`, as `of` does; the same as long as nothing changes."""
-        if self._age != self.table.age:
-            self._age = self.table.age
-            self._fresh.clear()
+        self._forget()
         scope = self._scopes.get((id(achiever), number))
         if scope is None:
             scope = self._scopes[id(achiever), number] = self._scope(achiever, achiever.soft[number])
@@ -70,9 +69,16 @@ class Wants:
             found = self._fresh[key] = list(self.of(achiever, achiever.soft[number], env, level))
         return found
 
+    def _forget(self) -> None:
+        """Forget what was read off the table before it changed."""
+        if self._age != self.table.age:
+            self._age = self.table.age
+            self._fresh.clear()
+            self._free.clear()
+
     def _scope(self, achiever: Achiever, condition: Condition) -> tuple[str, ...]:
         """Return the variables on which the wants of a condition depend."""
-        found = dict.fromkeys(self._about(condition)[1])
+        found = dict.fromkeys(self._about(condition)[2])
         for term in tuple(found):
             if term in achiever.determined:
                 found.update(dict.fromkeys(a for a in achiever.determined[term][1] if a.startswith("?")))
@@ -119,7 +125,7 @@ class Wants:
         """Yield wants for other values of the symbols that determine a condition's variables."""
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
-        for term in self._about(condition)[1]:
+        for term in self._about(condition)[2]:
             if term in achiever.determined:
                 situation, arguments = achiever.determined[term]
                 key = self._key(arguments, env)
@@ -133,11 +139,14 @@ class Wants:
                 if values:
                     yield situation, key, values
 
-    def _about(self, condition: Condition) -> tuple[bool, tuple[str, ...], Condition]:
-        """Return whether nothing can change a condition, its variables, and itself (so that its `id` stays its own)."""
+    def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
+        """Return whether nothing can change a condition, whether it compares, its variables, and itself.
+
+        Itself, so that its `id` stays its own.
+        """
         found = self._conditions.get(id(condition))
         if found is None:
-            found = _static(condition), tuple(sorted(mentioned(condition))), condition
+            found = _static(condition), _compares(condition), tuple(sorted(mentioned(condition))), condition
             self._conditions[id(condition)] = found
         return found
 
@@ -150,11 +159,16 @@ class Wants:
         return found[0]
 
     def _would_hold(self, condition: Condition, env: Env, term: str, value: str) -> bool:
-        """Whether a condition would hold with another value for a variable; what is static is asked once."""
-        static, others, _ = self._about(condition)
+        """Whether a condition would hold with another value for a variable.
+
+        What is static is asked once, unless it compares individuals once for all that no static fact tells apart.
+        """
+        static, compares, others, _ = self._about(condition)
         if not static:
             return self.holds(condition, {**env, term: value})
-        key = id(condition), term, value, *[env[other] for other in others if other in env]
+        sort = {} if compares else self.program.alike.sort
+        bound = [value if other == term else env.get(other) for other in others]
+        key = id(condition), *[None if who is None else sort.get(who, who) for who in bound]
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self.holds(condition, {**env, term: value})
@@ -165,13 +179,15 @@ class Wants:
         members = self.program.problem.classes.get(kind, ())
         if len(members) <= FEW:
             return members
-        groups = self.program.alike.groups(members)
-        found = representatives(
-            groups, self.table.who[situation], self.wanted.get(situation, {}), self.breadth, self._cursors
-        )
+        self._forget()
+        found = self._free.get((situation, kind, self.breadth))
+        if found is None:
+            groups, wanted = self.program.alike.groups(members), self.wanted.get(situation, {})
+            found = representatives(groups, self.table.who[situation], wanted, self.breadth, self._cursors)
+            self._free[situation, kind, self.breadth] = found
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
-            found.insert(0, goal)
+            return (goal, *found)
         return tuple(found)
 
     def _others(self, situation: str, key: Key, avoid: str | None, level: int) -> tuple[str, ...]:
@@ -258,3 +274,15 @@ def _static(condition: Condition) -> bool:
         case AnyOf(alternatives):
             return all(_static(c) for group in alternatives for c in group)
     return True
+
+
+def _compares(condition: Condition) -> bool:
+    """Whether a condition says that individuals are the same, or aren't."""
+    match condition:
+        case EqualityCondition():
+            return True
+        case Witness(_, _, conditions):
+            return any(map(_compares, conditions))
+        case AnyOf(alternatives):
+            return any(_compares(c) for group in alternatives for c in group)
+    return False

@@ -8,9 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from planner.compiling import Program
-from planner.deciding import decisions, shortened, shortest, single_level
-from planner.fast import plan
+from planner.deciding import decisions, single_level
 from planner.guided import Memory
+from planner.teaching import lesson
 from reasoner.experience import Experience
 from reasoner.generate import generate
 from reasoner.graph import load
@@ -47,18 +47,12 @@ def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Pr
         return recognise(load(path)).problem
 
 
-def teach(experience: Experience, lesson: Problem, level: int = 1) -> None:
-    """Let an experience live one episode: a shortest plan, or where none is found soon the fast planner's, shortened."""
-    within = single_level(lesson, level)
-    program = Program(within)
-    steps = shortest(program, within, level) if level == 1 else None
-    if steps is None:
-        found = plan(lesson).plan
-        if found is None or any(step.level > level for step in found.steps):
-            return  # some of it was planned without this level
-        made = [(step.behavior, step.arguments) for step in found.at_level(level)]
-        steps = shortened(program, within, level, made)
-    experience.learn(decisions(program, within, level, steps))
+def teach(experience: Experience, problem: Problem, level: int = 1) -> None:
+    """Let an experience live one good example."""
+    steps = lesson(problem, level)
+    if steps:
+        within = single_level(problem, level)
+        experience.learn(decisions(Program(within), within, level, steps))
 
 
 @lru_cache(maxsize=8)

@@ -6,11 +6,12 @@ import pytest
 
 from planner import fast, guided
 from planner.compiling import Program
-from planner.deciding import Field, Ground, shortest, single_level
+from planner.deciding import Field, Ground, single_level
 from planner.describing import Schema
 from planner.guided import Memory
 from planner.judging import Judge
 from planner.plan import Outcome, Status
+from planner.teaching import shortest
 from planner.validation import validate
 from reasoner.experience import Candidate, Decision, Experience, Tally
 from reasoner.symbols import Problem, Symbol

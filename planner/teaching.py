@@ -1,0 +1,98 @@
+"""Good examples: what is worth learning from.
+
+What a teacher does without need is learned, too: a poor example is worse than none. So the steps of the most abstract level are the
+fewest where A* finds them soon, and elsewhere the goal needs each of them.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+
+from planner import fast
+from planner.compiling import Program
+from planner.deciding import BROAD, Field, Ground, single_level
+from planner.table import Cell
+from reasoner.symbols import Problem
+
+MOST = 1000  # expansions in search of a shortest plan
+
+
+def lesson(problem: Problem, level: int) -> list[Ground]:
+    """Return steps of a level to learn from, none where no plan is found.
+
+    Those of the first level are shortest if A* finds them soon; else it is the fast planner's plan, without needless steps.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : int
+        Its first level, or a lower one, which is then learned as a problem of its own.
+    """
+    within = single_level(problem, level)
+    program = Program(within)
+    first = level == problem.domain.levels[0]
+    steps = shortest(program, within, level) if first else None
+    if steps is None:
+        found = fast.plan(problem).plan
+        if found is None or any(step.level > level for step in found.steps):
+            return []
+        made = [(step.behavior, step.arguments) for step in found.at_level(level)]
+        steps = shortened(program, within, level, made)
+    return steps
+
+
+def shortened(program: Program, problem: Problem, level: int, steps: Sequence[Ground]) -> list[Ground]:
+    """Return a plan without steps that the goal doesn't need, nor steps that only those need.
+
+    Action elimination: H. Nakhost and M. Müller, "Action elimination and plan neighborhood graph search", ICAPS 2010.
+    """
+    field = Field(program, problem, level)
+    kept = list(steps)
+    i = 0
+    while i < len(kept):
+        mark = len(field.table.trail)
+        trial = [step for step in kept[i + 1 :] if field.do(step)]
+        reached = not field.unmet()
+        field.table.undo(mark)
+        if reached:
+            kept[i:] = trial
+        else:
+            field.do(kept[i])
+            i += 1
+    return kept
+
+
+def shortest(program: Program, problem: Problem, level: int, most: int = MOST) -> list[Ground] | None:
+    """Return a shortest plan of one level, of what works towards its goals; None if `most` expansions don't find one.
+
+    A* with the number of goals that are open, over the most that one step changes: a teacher for small problems.
+    """
+    field = Field(program, problem, level)
+    table, widest = field.table, field.segments.widest[level]
+    start = len(table.trail)
+    queue: list[tuple[int, int, int, frozenset[tuple[Cell, str]], tuple[Ground, ...]]] = [(0, 0, 0, frozenset(), ())]
+    reached = {queue[0][3]: 0}
+    expanded = number = 0
+    while queue and expanded < most:
+        _, _, _, here, steps = heapq.heappop(queue)
+        if reached[here] < len(steps):
+            continue
+        table.undo(start)
+        for (situation, key), value in here:
+            table.put(situation, key, value)
+        unmet = field.unmet()
+        if not unmet:
+            return list(steps)
+        expanded += 1
+        mark = len(table.trail)
+        for ground in field.proposals(unmet, breadth=BROAD):
+            field.do(ground)
+            there = frozenset(table.since(start).items())
+            left = -(-len(field.unmet()) // widest)
+            table.undo(mark)
+            if reached.get(there, len(steps) + 2) > len(steps) + 1:
+                reached[there] = len(steps) + 1
+                number += 1
+                heapq.heappush(queue, (len(steps) + 1 + left, left, number, there, (*steps, ground)))
+    return None
