@@ -254,7 +254,7 @@ def harm(seeds: int = 3) -> None:
                     for mode, row in worst.items():
                         free = guided.plan(within, memory, mode, LIMITS, using).search[1].expanded
                         row.append((free / max(alone, 1), free - 1.05 * alone))
-                        held &= row[-1][1] <= guided.STRETCH * (1 + len(within.goal))
+                        held &= row[-1][1] <= guided.stretch_for(within) * (1 + len(within.goal))
                     doubted = guided.plan(within, replace(memory, trusted=False), "leading", LIMITS, using)
                     same &= doubted.search[1].expanded == here
         cells = [f"{max(r for r, _ in row):.2f} ({max(e for _, e in row):+.0f})" for row in worst.values()]

@@ -3,8 +3,8 @@
 base       the fast planner, exactly as it is without memory
 stream     the search that experience leads (`planner.stream`), one expansion at a time, between two expansions of the base
 strict     the stream gets one expansion for every `DEBT` of the base on its level: never more than 1.05 times the base alone
-leading    the stream leads as long as it gets on; after `STRETCH` expansions without a new least number of open goals it owes the
-           base `DEBT` expansions for each of them
+leading    the stream leads as long as it gets on; after a stretch (`stretch_for`) of expansions without a new least number of
+           open goals it owes the base `DEBT` expansions for each of them
 guarded    the same, but only once the base has searched longer than such a task usually takes it (`patience_for`), or has tried
            its first level in vain: in what it solves before, memory has no part. A clear preference is obeyed from the first on
 
@@ -32,7 +32,7 @@ from reasoner.experience import Experience
 from reasoner.symbols import Problem
 
 DEBT = 20
-STRETCH = 12
+STRETCH, PER_OPEN = 12, 1.5  # expansions without getting on: at least, and for each goal that is open in the beginning
 PATIENCE = 100  # expansions of the base before experience leads, and besides
 PER_GOAL = 15  # for each goal that is open
 
@@ -91,8 +91,17 @@ class Memory:
 
 def patience_for(problem: Problem) -> int:
     """Return how many expansions the base gets before experience leads: a search that takes no more is cheaper without it."""
-    unmet = sum(problem.initial.get(symbol) != value for symbol, value in problem.goal.items())
-    return PATIENCE + PER_GOAL * unmet
+    return PATIENCE + PER_GOAL * unmet(problem)
+
+
+def stretch_for(problem: Problem) -> int:
+    """Return how many expansions experience may make without getting on: the more goals, the longer the ways around."""
+    return max(STRETCH, int(PER_OPEN * unmet(problem)))
+
+
+def unmet(problem: Problem) -> int:
+    """Return how many goals are open in the beginning."""
+    return sum(problem.initial.get(symbol) != value for symbol, value in problem.goal.items())
 
 
 class ArrivedError(Exception):
@@ -107,6 +116,7 @@ class Race:
     level: int
     strict: bool
     patience: int
+    stretch: int
     deadline: float | None = None
     spent: dict[int, int] = field(default_factory=dict)
     base: int = 0
@@ -136,12 +146,12 @@ class Race:
         stream = self.stream
         stream.fruitless = 0
         began = stream.expanded
-        while not stream.exhausted and stream.fruitless < STRETCH:
+        while not stream.exhausted and stream.fruitless < self.stretch:
             if self.deadline is not None and stream.expanded % 16 == 15 and perf_counter() > self.deadline:
                 break
             if stream.expand():
                 return True
-        self.owed = self.base + DEBT * max(min(stream.expanded - began, STRETCH), 1)
+        self.owed = self.base + DEBT * max(min(stream.expanded - began, self.stretch), 1)
         return False
 
 
@@ -189,7 +199,7 @@ def plan(
     if patience is None:
         eager = mode == "leading" or memory.prefers(problem, first)
         patience = 0 if eager or strict else patience_for(problem)
-    race = Race(begin, first, strict, patience, deadline)
+    race = Race(begin, first, strict, patience, stretch_for(problem), deadline)
     outcome: Outcome | None = None
     while outcome is None:
         if race.begun is None or race.begun.solution is None:

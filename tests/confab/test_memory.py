@@ -8,6 +8,7 @@ import rdflib
 
 import confab
 from planner.episode import Failure
+from planner.teaching import lesson
 from reasoner.experience import Candidate, Conclusion, Decision, Experience
 from reasoner.graph import KnowledgeError
 
@@ -41,6 +42,18 @@ def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -
     one.live(scene.problem, execution.episode)
     other.learn(scene, execution.episode.done)
     assert one.experience.totals() == other.experience.totals() != {}
+
+
+def test_teaching_shows_the_fewest_steps_of_the_first_level_and_the_plan_below(scene: confab.Scene) -> None:
+    memory, plan = confab.Memory.of(scene), scene.plan().plan
+    memory.teach(scene, plan)
+    chosen = [(c.behavior, t.chosen) for c, table in memory.experience.totals().items() for t in table.values()]
+    first = [count for behavior, count in chosen if behavior.startswith("B1_")]
+    assert sum(first) == len(lesson(scene.problem, 1)) <= len(plan.at_level(1))
+    assert sum(count for behavior, count in chosen if behavior.startswith("B2_")) == len(plan.at_level(2))
+    assert len(memory.links)
+    with pytest.raises(KnowledgeError):
+        memory.teach(confab.load("moved-serving"), plan)
 
 
 def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:

@@ -11,11 +11,13 @@ from planner.describing import Schema
 from planner.guided import Memory
 from planner.judging import Judge
 from planner.plan import Outcome, Status
-from planner.teaching import shortest
+from planner.teaching import lesson, shortened, shortest
 from planner.validation import validate
 from reasoner.experience import Candidate, Decision, Experience, Tally
 from reasoner.symbols import Problem, Symbol
 from tests.planner.lessons import problem, taught, teach
+
+TRAINING = "served", "swap", "rotate", "full", "handover", "blocked"
 
 
 def expanded(outcome: Outcome, level: int = 1) -> int:
@@ -52,7 +54,7 @@ def judge_of(memory: Memory, schema: Schema) -> Judge:
 @pytest.mark.parametrize(("family", "objects"), [("served", 30), ("swap", 30)])
 def test_on_scenes_five_times_as_large_every_expansion_is_a_step(family: str, objects: int) -> None:
     within = problem(family, objects, 1)
-    outcome = guided.plan(within, taught(), "leading")
+    outcome = guided.plan(within, taught(), "leading", improve=0)
     assert outcome.plan is not None
     assert validate(within, outcome.plan) == []
     assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
@@ -125,10 +127,43 @@ def test_one_free_place_and_zones_that_hands_share_are_learned() -> None:
     for seed in range(200, 208):
         teach(experience, problem("full", 8, seed))
     within = problem("full", 20, 1003)
-    outcome = guided.plan(within, Memory(experience), "leading")
+    outcome = guided.plan(within, Memory(experience), "leading", improve=0)
     assert outcome.plan is not None
     assert validate(within, outcome.plan) == []
     assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
+
+
+def test_a_plan_that_memory_led_to_is_made_shorter_like_any_other() -> None:
+    within = problem("random", 20, 20015)
+    first, plan = (guided.plan(within, taught(TRAINING), "leading", improve=shapes).plan for shapes in (0, 2))
+    assert first is not None
+    assert plan is not None
+    assert validate(within, plan) == []
+    assert len(plan.primitives) < len(first.primitives)
+
+
+@pytest.mark.parametrize(
+    ("family", "objects", "costly"), [("full", 40, True), ("random", 20, False), ("swap", 40, False)]
+)
+def test_memory_is_asked_before_several_goals_need_detours_and_not_for_few(
+    family: str, objects: int, costly: bool
+) -> None:
+    told: list[int | None] = []
+    fast.plan(problem(family, objects, 20001), watch=told.append)
+    assert (None in told) == costly
+    assert told.count(1) < guided.patience_for(problem(family, objects, 20001))
+
+
+def test_a_lesson_is_a_plan_without_needless_steps_and_nothing_where_there_is_none() -> None:
+    for family, objects, level in (("full", 6, 1), ("blocked", 6, 2)):
+        within = single_level(problem(family, objects, 101), level)
+        program = Program(within)
+        steps, found = lesson(problem(family, objects, 101), level), fast.plan(problem(family, objects, 101)).plan
+        assert found is not None
+        assert Field(program, within, level).works(steps)
+        assert shortened(program, within, level, steps) == steps
+        assert len(steps) <= len(found.at_level(level))
+    assert lesson(problem("unsolvable", 4), 1) == []
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
@@ -143,7 +178,7 @@ def test_an_inverted_memory_costs_no_more_than_the_guard_and_spoils_no_plan() ->
         alone, misled = fast.plan(within), guided.plan(within, inverted(taught()), "leading")
         assert misled.plan is not None
         assert validate(within, misled.plan) == []
-        assert expanded(misled) <= 1.05 * expanded(alone) + guided.STRETCH * (1 + len(within.goal))
+        assert expanded(misled) <= 1.05 * expanded(alone) + guided.stretch_for(within) * (1 + len(within.goal))
 
 
 def test_what_is_unsolvable_stays_so() -> None:
