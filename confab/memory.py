@@ -18,11 +18,11 @@ from confab.table import Table
 from planner.learning import LearningError
 from planner.learning import learn as learn_plan
 from planner.plan import Plan, Step
-from reasoner.experience import Decision, Experience
+from reasoner.experience import Decision, Experience, Tallies
 from reasoner.files import write_whole
 from reasoner.graph import KnowledgeError
 from reasoner.links import Links
-from reasoner.memory import links_text, load_links, memory_names
+from reasoner.memory import links_text, load_links, memory_lines, memory_names
 from reasoner.names import Names
 from reasoner.remembering import FORMAT, new_replica, parse, probability, pull, push, turtle
 
@@ -86,11 +86,11 @@ class Memory:
             found = cls(Links(), names, iri, pull(url, names))
         else:
             path = Path(source)
-            iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path)
-            found = cls(load_links(path, names), names, iri)
-            text = path.read_text(encoding="utf-8")
-            if ":memoryFormat" in text or "core#memoryFormat" in text:
-                found.experience = parse(text, str(path), names)
+            lines = memory_lines(path)
+            iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path, lines)
+            found = cls(load_links(path, names, lines), names, iri)
+            if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
+                found.experience = parse(lines, str(path), names)
             elif not len(found.links):
                 raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
@@ -221,22 +221,23 @@ class Memory:
 
     def counts(self, most: int | None = None) -> Table:
         """Return what was counted of single facts, what tells chosen from passed over first."""
-        from planner.judging import Sums
+        from planner.counting import Ledger
 
-        rows: list[tuple[float, tuple[str, ...]]] = []
-        behaviors: dict[str, Sums] = {}
+        behaviors: dict[str, Tallies] = {}
         for conclusion, patterns in self.experience.totals().items():
-            sums = behaviors.setdefault(conclusion.behavior, Sums())
-            for pattern, tally in patterns.items():
-                sums.add(pattern, tally.chosen, tally.passed_over + tally.failed)
-        for behavior, sums in behaviors.items():
-            for fact, values in sums.facts.items():
-                for value, (c, p) in values.items():
-                    share = (
-                        f"{c / sums.chosen if sums.chosen else 0:.2f}",
-                        f"{p / sums.passed if sums.passed else 0:.2f}",
-                    )
-                    rows.append((sums.relevance(fact), (behavior, fact, value, f"{c:g}", f"{p:g}", *share)))
+            behaviors.setdefault(conclusion.behavior, {})[conclusion] = patterns
+        rows: list[tuple[float, tuple[str, ...]]] = []
+        for behavior, tallies in behaviors.items():
+            ledger = Ledger(tallies)
+            sums = ledger.sums()
+            for (fact, value), code in ledger.code.items():
+                c, p = (float(counts[code]) for counts in sums.values)
+                share = (
+                    f"{c / sums.chosen if sums.chosen else 0:.2f}",
+                    f"{p / sums.passed if sums.passed else 0:.2f}",
+                )
+                relevance = float(sums.relevance[ledger.facts[fact]])
+                rows.append((relevance, (behavior, fact, value, f"{c:g}", f"{p:g}", *share)))
         rows.sort(key=lambda row: (-row[0], row[1]))
         columns = ("behaviour", "fact", "value", "chosen", "not", "p(value | chosen)", "p(value | not)", "relevance")
         return Table(columns, tuple((*row, f"{relevance:.2f}") for relevance, row in rows[:most]))

@@ -79,6 +79,10 @@ class Schema:
         self.variables = program.variables
         self.mentioned = mentioned(problem)
         self.names = frozenset(named(problem)) | {TRUE, FALSE}
+        self._narrowest = sorted(
+            (kind for kind in self.mentioned if kind in self.members),
+            key=lambda kind: (len(self.members[kind]), -_depth(kind, problem), kind),
+        )
         self.kinds = {who: self._kind(who) for members in problem.classes.values() for who in members}
         self.classes = _most_specific(problem)
         self.partners = {name: _partners(tuples) for name, tuples in problem.relations.items()}
@@ -103,8 +107,7 @@ class Schema:
         """Return the name of an individual that behaviours mention; of another the class, as far as behaviours mention it."""
         if individual in self.names:
             return individual
-        within = [kind for kind in self.mentioned if individual in self.members.get(kind, ())]
-        return min(within, key=lambda kind: (len(self.members[kind]), -_depth(kind, self.problem), kind), default=NONE)
+        return next((kind for kind in self._narrowest if individual in self.members[kind]), NONE)
 
     def _ends(self, behavior: Behavior) -> list[End]:
         """Return the roles, then what paths lead to; a determined value is what a path of one step leads to."""

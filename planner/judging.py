@@ -19,9 +19,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+
+from planner.counting import Floats, Ledger, Sums
 from reasoner.experience import Candidate, Conclusion, Experience, Pattern, Tallies, lineage
 
 Verdicts: TypeAlias = "dict[tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]], float]"
@@ -33,8 +36,6 @@ DECAY = 0.9  # per episode, of what was preferred among equals
 CLEAR = 3.0  # so many times as often taken as passed over is a clear preference
 IS_WHO = " is who"
 TOGETHER = "all of this together"
-ENOUGH = 4  # of both choices and passes, for a fact to be looked at within the counts of another
-TELLING = 0.02  # relevance of a fact from which it is worth that
 LEAST = 1e-3  # a fact of less relevance isn't looked at
 
 
@@ -45,70 +46,6 @@ class Factor:
     fact: str
     value: str
     weight: float
-
-
-@dataclass
-class Sums:
-    """The counts of all conclusions of a class level: of facts, and of whole patterns of the relevant facts."""
-
-    chosen: float = 0.0
-    passed: float = 0.0
-    facts: dict[str, dict[str, list[float]]] = field(default_factory=dict)
-    patterns: dict[Pattern, list[float]] = field(default_factory=dict)
-    weights: dict[str, float] = field(default_factory=dict)
-    apart: str | None = None
-    parts: dict[str, Sums] | None = None
-
-    def add(self, pattern: Pattern, chosen: float, passed: float) -> None:
-        """Count a pattern and each of its facts."""
-        self.chosen += chosen
-        self.passed += passed
-        for fact, value in pattern:
-            pair = self.facts.setdefault(fact, {}).setdefault(value, [0.0, 0.0])
-            pair[0] += chosen
-            pair[1] += passed
-
-    def relevance(self, fact: str) -> float:
-        """Return w of a fact, in [0, 1]; asked once all is counted."""
-        if fact not in self.weights:
-            self.weights[fact] = relevance([(c, p) for c, p in self.facts.get(fact, {}).values()])
-        return self.weights[fact]
-
-    def part(self, pattern: Mapping[str, str]) -> tuple[str, Sums] | None:
-        """Return the fact that discriminates most here and the counts of its value alone; None where counts are thin."""
-        if self.parts is None:
-            self.parts = {}
-            if min(self.chosen, self.passed) >= ENOUGH:
-                self.apart = max(self.facts, key=lambda fact: (self.relevance(fact), fact), default=None)
-                if self.apart is not None and self.relevance(self.apart) < TELLING:
-                    self.apart = None
-            if self.apart is not None:
-                for known, (c, p) in self.patterns.items():
-                    value = dict(known).get(self.apart)
-                    if value is not None:
-                        part = self.parts.setdefault(value, Sums())
-                        part.add(known, c, p)
-                        part.patterns[known] = [c, p]
-        within = self.parts.get(pattern.get(self.apart, "")) if self.apart is not None else None
-        return None if within is None or self.apart is None else (self.apart, within)
-
-
-def relevance(pairs: Sequence[tuple[float, float]]) -> float:
-    """Return the Jensen–Shannon divergence of two distributions given as counts, less its small-sample bias, in [0, 1].
-
-    >>> relevance([(50, 0), (0, 50)]) > 0.9, relevance([(50, 50), (50, 50)]), relevance([(1, 0), (0, 1)]) < 0.7
-    (True, 0.0, True)
-    """
-    chosen, passed = sum(c for c, _ in pairs), sum(p for _, p in pairs)
-    if not chosen or not passed:
-        return 0.0
-    divergence = 0.0
-    for c, p in pairs:
-        a, b = c / chosen, p / passed
-        middle = (a + b) / 2
-        divergence += (a * math.log(a / middle) if a else 0.0) + (b * math.log(b / middle) if b else 0.0)
-    bias = (len(pairs) - 1) / 8 * (1 / chosen + 1 / passed)
-    return min(max((divergence / 2 - bias) / math.log(2), 0.0), 1.0)
 
 
 def preferred(experience: Experience) -> set[tuple[str, str, str]]:
@@ -146,21 +83,23 @@ class Judge:
         self.parents = parents
         self.roles = {behavior: [kind for _, kind in pairs] for behavior, pairs in roles.items()}
         self.names = {behavior: [name for name, _ in pairs] for behavior, pairs in roles.items()}
-        self.tallies: dict[str, Tallies] = {}
+        tallies: dict[str, Tallies] = {}
         for conclusion, patterns in experience.totals().items():
             if len(conclusion.classes) == len(roles.get(conclusion.behavior, ())):
-                self.tallies.setdefault(conclusion.behavior, {})[conclusion] = patterns
+                tallies.setdefault(conclusion.behavior, {})[conclusion] = patterns
+        self.conclusions = {behavior: tuple(known) for behavior, known in tallies.items()}
         self._chains: dict[Conclusion, tuple[tuple[str, ...], ...]] = {}
         self._sums: dict[tuple[str, tuple[str, ...]], Sums] = {}
         self.facts: dict[str, frozenset[str]] = {}
-        for behavior in self.tallies:
-            top = self._raw(behavior, tuple(self.roles[behavior]))
-            within = [self._raw(behavior, c.classes) for c in self.tallies[behavior]]
-            self.facts[behavior] = frozenset(
-                fact
-                for fact in top.facts
-                if fact not in without and any(sums.relevance(fact) > LEAST for sums in (top, *within))
-            )
+        self.ledgers: dict[str, Ledger] = {}
+        for behavior, known in tallies.items():
+            ledger = Ledger(known)
+            levels = {tuple(self.roles[behavior]), *(conclusion.classes for conclusion in known)}
+            relevance = [ledger.sums(self._members(behavior, classes)).relevance for classes in levels]
+            telling = np.max(relevance, axis=0) > LEAST
+            looked = frozenset(f for f, tells in zip(ledger.facts, telling, strict=True) if tells and f not in without)
+            self.facts[behavior] = looked
+            self.ledgers[behavior] = ledger.narrowed(looked)
         self.liked = self._liked(experience.preferences(DECAY))
         self._odds: dict[tuple[Conclusion, Pattern], float] = {}
         self.verdicts: dict[
@@ -169,7 +108,7 @@ class Judge:
 
     def knows(self, behaviors: Iterable[str]) -> bool:
         """Whether anything was learned of any of these behaviours."""
-        return any(behavior in self.tallies for behavior in behaviors)
+        return any(behavior in self.ledgers for behavior in behaviors)
 
     def odds(self, conclusion: Conclusion, pattern: Pattern) -> float:
         """Return ln(o / (1 - o)): positive if such a candidate is rather chosen than passed over.
@@ -189,55 +128,52 @@ class Judge:
     def factors(self, candidate: Candidate) -> list[Factor]:
         """Return the summands of a candidate's cogency, the facts in their order."""
         behavior = candidate.conclusion.behavior
-        if behavior not in self.tallies:
+        ledger = self.ledgers.get(behavior)
+        if ledger is None:
             return []
-        looked = self.facts[behavior]
-        pattern = tuple(pair for pair in candidate.pattern if pair[0] in looked)
+        given, facts, codes = ledger.read(candidate.pattern)
+        by_fact = dict(zip(facts.tolist(), codes.tolist(), strict=True))
         levels = [self._level(behavior, classes) for classes in self._chain(candidate.conclusion)]
-        prior = 0.0
-        weights = dict.fromkeys((fact for fact, _ in pattern), 0.0)
-        ratios: dict[str, tuple[float, float]] = {}
-        strata = [("", sums) for sums in levels if sums.chosen + sums.passed] or [("", levels[0])]
-        given = dict(pattern)
-        while (part := strata[-1][1].part(given)) is not None:
+        strata: list[tuple[int | None, Sums]] = [(None, sums) for sums in levels if sums.chosen + sums.passed]
+        strata = strata or [(None, levels[0])]
+        while (part := strata[-1][1].part(by_fact)) is not None:
             strata.append(part)
-        moved = dict.fromkeys(given, 0.0)
+        prior = 0.0
+        moved, weights = np.zeros(len(given)), np.zeros(len(given))
+        ratios: tuple[Floats, Floats] | None = None
         for apart, sums in strata:
-            total = sums.chosen + sums.passed
-            before = prior
+            total, before = sums.chosen + sums.passed, prior
             here = math.log((sums.chosen + 0.5) / (sums.passed + 0.5))
             prior = (total * here + ALPHA * prior) / (total + ALPHA)
-            if apart:
-                moved[apart] += prior - before
+            if apart is not None:
+                moved[facts == apart] += prior - before
             m = min(sums.chosen, sums.passed)
             if not m:
                 continue
-            for fact, value in pattern:
-                table = sums.facts.get(fact, {})
-                above = ratios.get(fact) or (1 / (len(table) + 1),) * 2
-                c, p = table.get(value, (0.0, 0.0))
-                ratios[fact] = (
-                    (m * c / sums.chosen + ALPHA * above[0]) / (m + ALPHA),
-                    (m * p / sums.passed + ALPHA * above[1]) / (m + ALPHA),
-                )
-                weights[fact] = (m * sums.relevance(fact) + ALPHA * weights[fact]) / (m + ALPHA)
-        found = [Factor(f"{candidate.conclusion}", "prior", prior - sum(moved.values()))]
-        found += [
-            Factor(fact, value, moved[fact] + weights[fact] * math.log(ratios[fact][0] / ratios[fact][1]))
-            for fact, value in pattern
-            if fact in ratios
-        ]
+            above = ratios or (1 / (sums.sizes[facts] + 1),) * 2
+            chosen, passed = sums.values
+            ratios = (
+                (m * chosen[codes] / sums.chosen + ALPHA * above[0]) / (m + ALPHA),
+                (m * passed[codes] / sums.passed + ALPHA * above[1]) / (m + ALPHA),
+            )
+            weights = (m * sums.relevance[facts] + ALPHA * weights) / (m + ALPHA)
+        found = [Factor(f"{candidate.conclusion}", "prior", prior - float(moved.sum()))]
+        if ratios is not None:
+            spoken = (moved + weights * np.log(ratios[0] / ratios[1])).tolist()
+            found += [Factor(fact, value, weight) for (fact, value), weight in zip(given, spoken, strict=True)]
         before = sum(factor.weight for factor in found)
         after = before
+        row = np.zeros(len(ledger.facts), dtype=np.int64)
+        row[facts] = codes
         for sums in levels:
-            c, p = sums.patterns.get(pattern, (0.0, 0.0))
+            c, p = sums.patterns.get(row.tobytes(), (0.0, 0.0))
             o = 1 / (1 + math.exp(-max(min(after, 50.0), -50.0)))
             o = (c + KAPPA * o) / (c + p + KAPPA)
             if c + p:
                 after = math.log(max(o, 1e-9)) - math.log(max(1 - o, 1e-9))
-        c, p = levels[0].patterns.get(pattern, (0.0, 0.0))
+        c, p = levels[0].patterns.get(row.tobytes(), (0.0, 0.0))
         found.append(Factor(TOGETHER, f"chosen {c:g} of {c + p:g}", after - before))
-        return found + self._preferences(candidate, after, pattern)
+        return found + self._preferences(candidate, after, tuple(given))
 
     def _preferences(self, candidate: Candidate, odds: float, pattern: Pattern) -> list[Factor]:
         """Return how far the individuals themselves are preferred to others in their roles, on top of `odds`."""
@@ -281,29 +217,14 @@ class Judge:
             found = self._chains[conclusion] = tuple(dict.fromkeys(levels))
         return found
 
-    def _members(self, behavior: str, classes: tuple[str, ...]) -> Iterable[dict[Pattern, tuple[float, float]]]:
-        """Yield the patterns of each conclusion that passes through a class level."""
-        for conclusion, patterns in self.tallies[behavior].items():
-            if classes in self._chain(conclusion):
-                yield {k: (float(t.chosen), float(t.passed_over + t.failed)) for k, t in patterns.items()}
-
-    def _raw(self, behavior: str, classes: tuple[str, ...]) -> Sums:
-        sums = Sums()
-        for patterns in self._members(behavior, classes):
-            for pattern, (c, p) in patterns.items():
-                sums.add(pattern, c, p)
-        return sums
+    def _members(self, behavior: str, classes: tuple[str, ...]) -> set[Conclusion]:
+        """Return the conclusions that pass through a class level."""
+        return {conclusion for conclusion in self.conclusions[behavior] if classes in self._chain(conclusion)}
 
     def _level(self, behavior: str, classes: tuple[str, ...]) -> Sums:
-        """Return the counts of a class level, with patterns of the relevant facts only."""
+        """Return the counts of a class level."""
         key = behavior, classes
         found = self._sums.get(key)
         if found is None:
-            found = self._sums[key] = self._raw(behavior, classes)
-            looked = self.facts[behavior]
-            for patterns in self._members(behavior, classes):
-                for pattern, (c, p) in patterns.items():
-                    pair = found.patterns.setdefault(tuple(f for f in pattern if f[0] in looked), [0.0, 0.0])
-                    pair[0] += c
-                    pair[1] += p
+            found = self._sums[key] = self.ledgers[behavior].sums(self._members(behavior, classes))
         return found

@@ -17,7 +17,7 @@ from reasoner.files import write_whole
 from reasoner.graph import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, text
 from reasoner.links import Links
 from reasoner.names import Names
-from reasoner.remembering import LINE
+from reasoner.remembering import Lines, lines
 from reasoner.symbols import FALSE, TRUE, Symbol
 
 ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
@@ -33,7 +33,7 @@ SELECT ?behavior ?fact ?probability WHERE {
 } ORDER BY ?behavior ?fact"""
 
 
-def load_links(path: Path, names: Names) -> Links:
+def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     """Read the links of a memory file.
 
     Parameters
@@ -41,13 +41,15 @@ def load_links(path: Path, names: Names) -> Links:
     path : Path
     names : Names
         The scene's names; links about terms that it doesn't have are kept under their last part.
+    found : Lines, optional
+        What `memory_lines` found in the file, if it was read before.
 
     Raises
     ------
     KnowledgeError
         The file isn't Turtle, or a link lacks its behaviour or fact; the message says which.
     """
-    graph = _graph(path)
+    graph = _graph(path, found)
     nodes: dict[str, dict[str, str]] = {}
     for subject, predicate, value in graph.select(ASSERTED):
         nodes.setdefault(text(subject), {})[text(predicate).removeprefix(CORE)] = text(value)
@@ -64,15 +66,15 @@ def load_links(path: Path, names: Names) -> Links:
     return links
 
 
-def memory_names(path: Path) -> tuple[str, Names]:
-    """Return the scene that a memory file imports, and short names for the terms that it speaks of.
+def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
+    """Return the scene that a memory file imports, and short names for the terms that it speaks of; `found` as in `load_links`.
 
     Raises
     ------
     KnowledgeError
         The file is missing, isn't Turtle, or imports no scene.
     """
-    graph = _graph(path)
+    graph = _graph(path, found)
     scenes = [
         text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")
     ]
@@ -107,18 +109,33 @@ def links_text(links: Links, names: Names, scene: str) -> str:
     return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
 
 
-def _graph(path: Path) -> KnowledgeGraph:
+def memory_lines(path: Path) -> Lines:
+    """Read a memory file and take it apart.
+
+    Raises
+    ------
+    KnowledgeError
+        It is missing or can't be read as text.
+    """
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
-    graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
     try:
-        rest = LINE.sub("", path.read_text(encoding="utf-8"))  # without the links of the counts
-        triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
-        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
-    except (SyntaxError, UnicodeDecodeError) as error:
+        return lines(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
         raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     except OSError as error:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror or error}") from error
+
+
+def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
+    """Return all of a file but the counts as a graph."""
+    rest = (found or memory_lines(path)).rest
+    graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
+    try:
+        triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
+        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
+    except SyntaxError as error:
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     return graph
 
 

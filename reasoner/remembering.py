@@ -14,6 +14,7 @@ import hashlib
 import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.error import URLError
 from urllib.parse import quote, urlencode
@@ -45,12 +46,38 @@ LINK = (
     "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
     ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
 )
-LINE = re.compile(
-    r"^m:(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\1 ; "
-    r"owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:\2 ; "
-    r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n",
+COUNTS = re.compile(
+    r"^m:(?:(pattern_\w+) a owl:NamedIndividual, :Pattern ; :facts \"([^\"\\\n]*)\" \.\n|"
+    r"(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\3 ; "
+    r"owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:\4 ; "
+    r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
     re.MULTILINE,
 )
+"""Most of a file are such lines: facts of a pattern, or counts of a link. The rest, in any layout, is left to the Turtle parser."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A memory file taken apart: the facts of patterns, the links with their counts, and the rest as Turtle."""
+
+    facts: dict[str, str]
+    links: list[tuple[str, str, Tally]]
+    rest: str
+
+
+def lines(text: str) -> Lines:
+    """Take a memory file apart."""
+    facts, links, rest, at = {}, [], [], 0
+    for match in COUNTS.finditer(text):
+        if match.start() > at:
+            rest.append(text[at : match.start()])
+        at = match.end()
+        pattern, said, counter, about, *counts = match.groups()
+        if pattern is not None:
+            facts[SPACE + pattern] = said
+        else:
+            links.append((counter, about, Tally(*map(int, counts))))
+    return Lines(facts, links, "".join([*rest, text[at:]]))
 
 
 def new_replica() -> str:
@@ -158,22 +185,35 @@ def load(path: Path, names: Names | None = None) -> Experience:
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one") from None
     except (OSError, UnicodeDecodeError) as error:
         raise KnowledgeError(f"{path}: no memory: it can't be read as text ({error})") from error
-    return parse(text, str(path), names)
+    return parse(lines(text), str(path), names)
 
 
-def parse(text: str, source: str, names: Names | None = None) -> Experience:
-    """Read a memory from Turtle; `source` names it in messages."""
-    links = [(match[1], match[2], Tally(int(match[3]), int(match[4]), int(match[5]))) for match in LINE.finditer(text)]
+def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
+    """Read a memory; `source` names it in messages."""
     try:
-        triples = [q.triple for q in ox.parse(LINE.sub("", text), format=ox.RdfFormat.TURTLE, base_iri=SPACE)]
+        triples = [q.triple for q in ox.parse(found.rest, format=ox.RdfFormat.TURTLE, base_iri=SPACE)]
     except SyntaxError as error:
         raise KnowledgeError(f"{source}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
-    return _experience(triples, links, source, names)
+    return _experience(triples, found, source, names)
 
 
-def _experience(
-    triples: Iterable[ox.Triple], links: list[tuple[str, str, Tally]], source: str, names: Names | None
-) -> Experience:
+class Pairs(dict[str, tuple[str, str]]):
+    """Facts with their values, by the text of both; each is taken apart once."""
+
+    def __init__(self) -> None:
+        self.doubtful: set[str] = set()
+
+    def __missing__(self, part: str) -> tuple[str, str]:
+        """Take a text apart, and note whether that can be done in several ways."""
+        fact, _, value = part.rpartition(": ")
+        if part.count(": ") != 1:
+            self.doubtful.add(part)
+        self[part] = fact, value
+        return fact, value
+
+
+def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: Names | None) -> Experience:
+    links, facts = list(found.links), dict(found.facts)
     nodes: dict[str, dict[str, str]] = {}
     trusts: dict[str, set[str]] = {}
     for triple in triples:
@@ -202,7 +242,9 @@ def _experience(
                 )
                 links.append((counter, pattern, Tally(*(int(node.get(key, "0")) for key in TALLY))))
         counters = {key: _meaning(node, names) for key, node in nodes.items() if "epoch" in node}
-        patterns = {key: _facts(node["facts"], _local(key), source) for key, node in nodes.items() if "facts" in node}
+        facts |= {key: node["facts"] for key, node in nodes.items() if "facts" in node}
+        pairs = Pairs()
+        patterns = {key: _facts(text, _local(key), source, pairs) for key, text in facts.items()}
         for counter, pattern, tally in links:
             who, conclusion = counters[SPACE + counter]
             table = experience.counts.setdefault(who, {}).setdefault(conclusion, {})
@@ -221,11 +263,11 @@ def _meaning(node: Mapping[str, str], names: Names | None) -> tuple[tuple[str, i
     return (node["replica"], int(node["epoch"])), Conclusion(short(node["behavior"]), classes)
 
 
-def _facts(text: str, name: str, source: str) -> Pattern:
+def _facts(text: str, name: str, source: str, pairs: Pairs) -> Pattern:
     """Return the facts of a pattern; in the first files of this format they stood on lines of their own."""
     parts = [part for part in text.split("\n" if "\n" in text else BETWEEN) if part]
-    found = tuple((fact, value) for fact, _, value in (part.rpartition(": ") for part in parts))
-    if any(part.count(": ") != 1 for part in parts) and _pattern(found) != name:
+    found = tuple([pairs[part] for part in parts])
+    if pairs.doubtful and not pairs.doubtful.isdisjoint(parts) and _pattern(found) != name:
         raise KnowledgeError(
             f"{source}: broken memory: the facts of {name} can't be told apart: '{text[:60]}…'; wanted 'fact: value' joined "
             f"by '{BETWEEN}'; restore the file as Confab wrote it, or plan with --no-memory"
@@ -255,7 +297,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
     triples = [q.triple for q in ox.parse(answer, format=ox.RdfFormat.N_TRIPLES)]
     if not triples:
         return Experience(own)
-    found = _experience(triples, [], endpoint, names)
+    found = _experience(triples, Lines({}, [], ""), endpoint, names)
     found.replica = own
     return found
 
