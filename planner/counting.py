@@ -1,7 +1,8 @@
 """The counts of one behaviour as arrays: how often each value of each fact was seen with what was chosen, and with what wasn't.
 
 row      a conclusion and a pattern, with its counts
-code     a value of a fact, numbered through all facts; 0 where a pattern doesn't have the fact
+code     a value of a fact, numbered through all facts from 1 on; 0 where a pattern doesn't have the fact; the last ones stand for
+         a value that was never seen of each fact
 ledger   all rows of a behaviour; `Sums` are the counts of some of them
 """
 
@@ -70,15 +71,15 @@ class Ledger:
         return found
 
     @property
-    def unseen(self) -> int:
-        """The code of a value that was never seen."""
-        return len(self.code) + 1
+    def fact_of(self) -> Ints:
+        """The fact of each code but 0."""
+        return np.concatenate([self.of, np.arange(len(self.facts))])
 
-    def read(self, pattern: Pattern) -> tuple[list[tuple[str, str]], Ints, Ints]:
-        """Return the facts of a pattern that the ledger keeps, with their positions and codes."""
-        given = [pair for pair in pattern if pair[0] in self.facts]
-        facts = np.array([self.facts[fact] for fact, _ in given], dtype=np.int64)
-        return given, facts, np.array([self.code.get(pair, self.unseen) for pair in given], dtype=np.int64)
+    def read(self, pattern: Pattern) -> tuple[list[tuple[str, str]], list[int]]:
+        """Return the facts of a pattern that the ledger keeps, with their codes."""
+        facts, codes, seen = self.facts, self.code, len(self.code) + 1
+        given = [pair for pair in pattern if pair[0] in facts]
+        return given, [codes.get(pair) or seen + facts[pair[0]] for pair in given]
 
     def sums(self, classes: Collection[Conclusion] | None = None) -> Sums:
         """Return the counts of some conclusions, or of all."""
@@ -101,12 +102,12 @@ class Sums:
 
     @cached_property
     def values(self) -> tuple[Floats, Floats]:
-        """How often each code was chosen and passed over; the last one is that of an unseen value."""
+        """How often each code was chosen, and passed over."""
         codes, width = self.ledger.codes[self.rows].ravel(), self.ledger.codes.shape[1]
 
         def counted(counts: Floats) -> Floats:
             each: Floats = np.repeat(counts[self.rows], width)
-            return np.bincount(codes, each, self.ledger.unseen + 1).astype(np.float64)
+            return np.bincount(codes, each, 1 + len(self.ledger.fact_of)).astype(np.float64)
 
         return counted(self.ledger.chosen), counted(self.ledger.passed)
 
@@ -114,14 +115,13 @@ class Sums:
     def sizes(self) -> Ints:
         """How many values of each fact were seen."""
         chosen, passed = self.values
-        seen = self.ledger.of[(chosen + passed)[1:-1] > 0]
-        return np.bincount(seen, minlength=len(self.ledger.facts))
+        return np.bincount(self.ledger.fact_of[(chosen + passed)[1:] > 0], minlength=len(self.ledger.facts))
 
     @cached_property
     def relevance(self) -> Floats:
         """The relevance w of each fact, in [0, 1]."""
         chosen, passed = self.values
-        return relevances(chosen[1:-1], passed[1:-1], self.ledger.of, len(self.ledger.facts))
+        return relevances(chosen[1:], passed[1:], self.ledger.fact_of, len(self.ledger.facts))
 
     @cached_property
     def patterns(self) -> dict[bytes, tuple[float, float]]:
@@ -144,11 +144,12 @@ class Sums:
         names = list(self.ledger.facts)
         return max(np.flatnonzero(self.relevance > best - EQUAL).tolist(), key=names.__getitem__)
 
-    def part(self, codes: Mapping[int, int]) -> tuple[int, Sums] | None:
+    def part(self, codes: Collection[int]) -> tuple[int, Sums] | None:
         """Return the fact that discriminates most here and the counts of its value alone, if there are any."""
         if self.apart is None:
             return None
-        code = codes.get(self.apart, 0)
+        seen = self.ledger.of
+        code = next((code for code in codes if code <= len(seen) and seen[code - 1] == self.apart), 0)
         if code not in self._parts:
             rows = self.rows[self.ledger.codes[self.rows, self.apart] == code] if code else self.rows[:0]
             self._parts[code] = Sums(self.ledger, rows) if len(rows) else None

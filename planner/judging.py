@@ -90,6 +90,7 @@ class Judge:
         self.conclusions = {behavior: tuple(known) for behavior, known in tallies.items()}
         self._chains: dict[Conclusion, tuple[tuple[str, ...], ...]] = {}
         self._sums: dict[tuple[str, tuple[str, ...]], Sums] = {}
+        self._weights: dict[tuple[int, ...], tuple[float, Floats | None]] = {}
         self.facts: dict[str, frozenset[str]] = {}
         self.ledgers: dict[str, Ledger] = {}
         for behavior, known in tallies.items():
@@ -131,40 +132,17 @@ class Judge:
         ledger = self.ledgers.get(behavior)
         if ledger is None:
             return []
-        given, facts, codes = ledger.read(candidate.pattern)
-        by_fact = dict(zip(facts.tolist(), codes.tolist(), strict=True))
+        given, codes = ledger.read(candidate.pattern)
         levels = [self._level(behavior, classes) for classes in self._chain(candidate.conclusion)]
-        strata: list[tuple[int | None, Sums]] = [(None, sums) for sums in levels if sums.chosen + sums.passed]
-        strata = strata or [(None, levels[0])]
-        while (part := strata[-1][1].part(by_fact)) is not None:
-            strata.append(part)
-        prior = 0.0
-        moved, weights = np.zeros(len(given)), np.zeros(len(given))
-        ratios: tuple[Floats, Floats] | None = None
-        for apart, sums in strata:
-            total, before = sums.chosen + sums.passed, prior
-            here = math.log((sums.chosen + 0.5) / (sums.passed + 0.5))
-            prior = (total * here + ALPHA * prior) / (total + ALPHA)
-            if apart is not None:
-                moved[facts == apart] += prior - before
-            m = min(sums.chosen, sums.passed)
-            if not m:
-                continue
-            above = ratios or (1 / (sums.sizes[facts] + 1),) * 2
-            chosen, passed = sums.values
-            ratios = (
-                (m * chosen[codes] / sums.chosen + ALPHA * above[0]) / (m + ALPHA),
-                (m * passed[codes] / sums.passed + ALPHA * above[1]) / (m + ALPHA),
-            )
-            weights = (m * sums.relevance[facts] + ALPHA * weights) / (m + ALPHA)
-        found = [Factor(f"{candidate.conclusion}", "prior", prior - float(moved.sum()))]
-        if ratios is not None:
-            spoken = (moved + weights * np.log(ratios[0] / ratios[1])).tolist()
-            found += [Factor(fact, value, weight) for (fact, value), weight in zip(given, spoken, strict=True)]
+        prior, spoken = self._spoken(ledger, levels, codes)
+        found = [Factor(f"{candidate.conclusion}", "prior", prior)]
+        if spoken is not None:
+            weights = spoken[codes].tolist()
+            found += [Factor(fact, value, weight) for (fact, value), weight in zip(given, weights, strict=True)]
         before = sum(factor.weight for factor in found)
         after = before
         row = np.zeros(len(ledger.facts), dtype=np.int64)
-        row[facts] = codes
+        row[[ledger.facts[fact] for fact, _ in given]] = codes
         for sums in levels:
             c, p = sums.patterns.get(row.tobytes(), (0.0, 0.0))
             o = 1 / (1 + math.exp(-max(min(after, 50.0), -50.0)))
@@ -174,6 +152,42 @@ class Judge:
         c, p = levels[0].patterns.get(row.tobytes(), (0.0, 0.0))
         found.append(Factor(TOGETHER, f"chosen {c:g} of {c + p:g}", after - before))
         return found + self._preferences(candidate, after, tuple(given))
+
+    def _spoken(self, ledger: Ledger, levels: Sequence[Sums], codes: Sequence[int]) -> tuple[float, Floats | None]:
+        """Return the prior, and by code what each fact speaks; None where nothing was both chosen and passed over.
+
+        From the parameters' types down, then within the value of what discriminates most, and so on.
+        """
+        strata: list[tuple[int | None, Sums]] = [(None, sums) for sums in levels if sums.chosen + sums.passed]
+        strata = strata or [(None, levels[0])]
+        while (part := strata[-1][1].part(codes)) is not None:
+            strata.append(part)
+        key = tuple(id(sums) for _, sums in strata)
+        if key not in self._weights:
+            fact_of, prior = ledger.fact_of, 0.0
+            moved, weights = np.zeros(len(ledger.facts)), np.zeros(len(ledger.facts))
+            ratios: tuple[Floats, Floats] | None = None
+            for apart, sums in strata:
+                total, before = sums.chosen + sums.passed, prior
+                here = math.log((sums.chosen + 0.5) / (sums.passed + 0.5))
+                prior = (total * here + ALPHA * prior) / (total + ALPHA)
+                if apart is not None:
+                    moved[apart] += prior - before
+                m = min(sums.chosen, sums.passed)
+                if not m:
+                    continue
+                above = ratios or (1 / (sums.sizes[fact_of] + 1),) * 2
+                chosen, passed = sums.values
+                ratios = (
+                    (m * chosen[1:] / sums.chosen + ALPHA * above[0]) / (m + ALPHA),
+                    (m * passed[1:] / sums.passed + ALPHA * above[1]) / (m + ALPHA),
+                )
+                weights = (m * sums.relevance + ALPHA * weights) / (m + ALPHA)
+            spoken = None
+            if ratios is not None:
+                spoken = np.concatenate([[0.0], moved[fact_of] + weights[fact_of] * np.log(ratios[0] / ratios[1])])
+            self._weights[key] = prior - float(moved.sum()), spoken
+        return self._weights[key]
 
     def _preferences(self, candidate: Candidate, odds: float, pattern: Pattern) -> list[Factor]:
         """Return how far the individuals themselves are preferred to others in their roles, on top of `odds`."""

@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TypeAlias
 
-from planner.compiling import Program
+from planner.compiling import Achiever, Program
 from planner.plan import Counts
 from planner.table import Cell, Key, Table, arguments_of
-from planner.wants import Want, Wants
+from planner.wants import Env, Want, Wants
 from reasoner.symbols import FALSE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
@@ -304,10 +304,18 @@ class Segments:
         """
         asked: set[tuple[str, Key, str]] = set()
         wants: Iterable[Want] = [(*cell, (value,))]
+        blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
         length = 0
-        while wants and len(asked) < questions:
+        while (blocked or not length) and len(asked) < questions:
             length += 1
             yield length, None
+            if blocked:  # worked out only now: who wants no longer chains has gone
+                wants = [
+                    want
+                    for achiever, unmet, env in blocked
+                    for number in unmet
+                    for want in self.wants.towards(achiever, number, env, level)
+                ]
             blocked = []
             for situation, key, values in wants:
                 for wanted in values:
@@ -322,12 +330,6 @@ class Segments:
                                 blocked.append((achiever, unmet, env))
                             else:
                                 yield length, (achiever.behavior, arguments)
-            wants = [
-                want
-                for achiever, unmet, env in blocked
-                for number in unmet
-                for want in self.wants.towards(achiever, number, env, level)
-            ]
 
     def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
         """Return the symbols whose change could make a value attainable in one step."""
