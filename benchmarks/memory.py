@@ -143,7 +143,7 @@ def transfer(levels: Sequence[int] = (1,), seeds: int = 10) -> None:
 
 def flat() -> None:
     """Print the same for problems that begin on level 2."""
-    transfer((2,), 3)
+    transfer((2,), 10)
 
 
 def time() -> None:

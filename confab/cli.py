@@ -268,23 +268,29 @@ def learn(
         Path, typer.Option("--memory", metavar="FILE", help="Memory file to learn into; made if missing.")
     ],
     demonstration: Annotated[
-        Path | None, typer.Option("--plan", metavar="PLAN.json", help="Learn from this plan instead of an own one.")
+        Path | None, typer.Option("--plan", metavar="PLAN.json", help="Learn from this plan instead.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn from own plans or from a demonstration."""
+    """Learn how scenes are best solved, or from a demonstration."""
     from confab.interchange import read_plan
-    from confab.memory import Memory
+    from confab.memory import MOST_LINKS, Memory
 
     remembered: Memory | None = None
     for name in scenes:
         loaded = _load(name)
         if remembered is None:
             remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+        links = remembered.links
         if demonstration:
             remembered.learn(loaded, read_plan(demonstration, loaded.problem))
         else:
             remembered.teach(loaded, loaded.plan(memory=remembered).plan)
+        if remembered.links is links:
+            print(
+                f"{name}: too large for the paper's links (over {MOST_LINKS:,}); only counts were learned",
+                file=sys.stderr,
+            )
     assert remembered is not None
     remembered.save(memory)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}

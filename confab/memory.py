@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from reasoner.symbols import Problem
 
 
+MOST_LINKS = 100_000
+"""A scene of which the paper's memory would need more links isn't learned for the paper's mode, which couldn't plan it, either."""
+
+
 @dataclass
 class Memory:
     """A confabulation memory.
@@ -114,7 +118,7 @@ class Memory:
         try:
             lived = decisions_of(scene.problem, plan, failed)
             if failed is None:
-                self.links = learn_plan(scene.problem, plan, self.links)
+                self.links = self._linked(scene, plan)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         self.experience.learn(lived)
@@ -139,7 +143,7 @@ class Memory:
 
         try:
             lived = decisions_of(scene.problem, plan)
-            links = learn_plan(scene.problem, plan, self.links)
+            links = self._linked(scene, plan)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         level = scene.problem.domain.levels[0]
@@ -150,6 +154,11 @@ class Memory:
             lived = decisions(Program(within), within, level, steps) + below
         self.links = links
         self.experience.learn(lived)
+
+    def _linked(self, scene: Scene, plan: Plan) -> Links:
+        """Return the paper's links with a plan learned, or as they are where that would be too many."""
+        learned = learn_plan(scene.problem, plan, self.links)
+        return learned if len(learned) <= MOST_LINKS else self.links
 
     def merge(self, other: Memory, trust: bool = False) -> None:
         """Take in another memory's counts; with `trust`, they may lead. The paper's links can't be merged and stay as they are."""

@@ -16,6 +16,7 @@ from planner.table import Cell
 from reasoner.symbols import Problem
 
 MOST = 1000  # expansions in search of a shortest plan
+SMALL = 20  # open goals; of more, that many expansions find none, and take a minute
 
 
 def lesson(problem: Problem, level: int) -> list[Ground]:
@@ -64,11 +65,14 @@ def shortened(program: Program, problem: Problem, level: int, steps: Sequence[Gr
 
 
 def shortest(program: Program, problem: Problem, level: int, most: int = MOST) -> list[Ground] | None:
-    """Return a shortest plan of one level, of what works towards its goals; None if `most` expansions don't find one.
+    """Return a shortest plan of one level, of what works towards its goals: a teacher for small problems.
 
-    A* with the number of goals that are open, over the most that one step changes: a teacher for small problems.
+    A* with the number of goals that are open, over the most that one step changes. None if `most` expansions don't find one;
+    with more than `SMALL` goals open none is looked for.
     """
     field = Field(program, problem, level)
+    if len(field.unmet()) > SMALL:
+        return None
     table, widest = field.table, field.segments.widest[level]
     start = len(table.trail)
     queue: list[tuple[int, int, int, frozenset[tuple[Cell, str]], tuple[Ground, ...]]] = [(0, 0, 0, frozenset(), ())]

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 import rdflib
+from typer.testing import CliRunner
 
 import confab
+from confab.cli import app
 from planner.episode import Failure
 from planner.teaching import lesson
 from reasoner.experience import Candidate, Conclusion, Decision, Experience
@@ -54,6 +56,18 @@ def test_teaching_shows_the_fewest_steps_of_the_first_level_and_the_plan_below(s
     assert len(memory.links)
     with pytest.raises(KnowledgeError):
         memory.teach(confab.load("moved-serving"), plan)
+
+
+def test_a_scene_too_large_for_the_papers_links_teaches_counts_alone(
+    scene: confab.Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("confab.memory.MOST_LINKS", 10)
+    told = CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", str(tmp_path / "memory.ttl")])
+    assert told.exit_code == 0, told.output
+    assert "only counts were learned" in told.stderr
+    memory = confab.Memory.load(tmp_path / "memory.ttl", scene)
+    assert not len(memory.links)
+    assert len(memory.experience)
 
 
 def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:
