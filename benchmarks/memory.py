@@ -407,13 +407,13 @@ def teach_grounded(experience: Experience, lesson: Problem) -> None:
 
 
 def curve(most: int = 36) -> None:
-    """Expansions for each step, and time, over episodes: level 1 of held-out scenes, unshortened, and without memory."""
+    """Over episodes: expansions for each step of plans not yet shortened, and time of a whole call; level 1 of held-out scenes."""
     checks = (0, 1, 2, 4, 6, 12, 18, 24, most)
     tests = [problem(family, 20, HELD_OUT) for family in FAMILIES]
     small = [replace_levels(problem(family, 4, HELD_OUT)) for family in ("served", "swap", "handover")]
-    prepared = [(within, fast.compiled(within)) for within in tests]
-    alone = [cpu(partial(fast.plan, within, using=using, improve=0)) for within, using in prepared]
-    base = mean(r for r in (ratio(found, 1) for _, found in alone) if r is not None), mean(t for t, _ in alone) * 1e3
+    base = measured(
+        tests, lambda within, improve: partial(fast.plan, within, using=fast.compiled(within), improve=improve)
+    )
     lifted, counts, links = Experience("lifted"), Experience("counts"), Links()
     points: list[tuple[float, ...]] = []
     todo = list(lessons(FAMILIES))[:most]
@@ -425,14 +425,12 @@ def curve(most: int = 36) -> None:
         if episode in checks:
             row: list[float] = [episode]
             for memory in (Memory(lifted), Grounded(counts)):
-                spent, ratios = 0.0, []
-                for within in tests:
+
+                def led(within: Problem, improve: int, memory: Memory = memory) -> Callable[[], Outcome]:
                     using = fast.compiled(within)
-                    call = partial(guided.plan, within, memory, "leading", using=using, improve=0)
-                    seconds, found = cpu(call)
-                    spent += seconds * 1e3 / len(tests)
-                    ratios.append(ratio(found, 1) or 10.0)
-                row += [mean(ratios), spent]
+                    return partial(guided.plan, within, memory, "leading", using=using, improve=improve)
+
+                row += measured(tests, led)
             row += base
             spent, ratios = 0.0, []
             for within in small:
@@ -457,6 +455,12 @@ def curve(most: int = 36) -> None:
     draw(points)
 
 
+def measured(tests: Sequence[Problem], calls: Callable[[Problem, int], Callable[[], Outcome]]) -> tuple[float, float]:
+    """Return means: expansions for each step of a plan that isn't shortened, and CPU ms of a call that shortens it."""
+    ratios = [ratio(calls(within, 0)(), 1) or 10.0 for within in tests]
+    return mean(ratios), 1e3 * mean(cpu(calls(within, fast.IMPROVEMENTS))[0] for within in tests)
+
+
 def replace_levels(within: Problem) -> Problem:
     """Return a problem with the behaviours of its first level alone."""
     top = {name: b for name, b in within.domain.behaviors.items() if b.level == 1}
@@ -476,10 +480,11 @@ def draw(points: Sequence[tuple[float, ...]]) -> None:
             axes.plot(
                 [p[0] for p in points], [p[1 + 2 * line + column] for p in points], style, color=color, label=name
             )
+        if not column:
+            axes.legend(fontsize=8, loc="center right")
         axes.set_yscale("log")
         axes.set_ylabel(label)
         axes.set_xlabel("episodes (scenes of 4 to 8 objects)")
-    axes.legend(fontsize=8)
     PICTURE.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURE, dpi=120)
 
