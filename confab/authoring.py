@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from planner.behaviors import ground
 from reasoner.files import write_whole
 from reasoner.graph import CORE, FORMATS, KnowledgeError, KnowledgeGraph
 from reasoner.names import local_name, nearest
+from reasoner.remembering import SPACE, Lines
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -25,8 +27,8 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 {entries}
 </catalog>
 """
-SPOKEN_OF = [CORE + name for name in ("behavior", "situationType", "value", "relation", "about")]
-SPOKEN_OF += [f"{CORE}argument{place}" for place in range(2, 10)]
+TERMS = [CORE + name for name in ("behavior", "situationType", "relation")]
+ROLES = [CORE + "about", *(f"{CORE}argument{place}" for place in range(2, 10))]
 
 
 def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
@@ -139,14 +141,22 @@ def _steps(steps: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 # ------------------------------------------------------------------------------------------------------- memory and renames
 
 
-def unknown_terms(memory: Path, graph: KnowledgeGraph) -> list[str]:
-    """Return what a memory file speaks of and a scene doesn't know, with the nearest known name."""
+def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
+    """Return the terms of a domain that a memory speaks of and a scene doesn't know, with the nearest known name.
+
+    Not the individuals of other scenes, which the paper's links speak of.
+    """
     known = {quad.subject.value for quad in graph.store if isinstance(quad.subject, ox.NamedNode)}
-    spoken = {
-        quad.object.value
-        for quad in _parse(memory)
-        if quad.predicate.value in SPOKEN_OF and isinstance(quad.object, ox.NamedNode)
-    }
+    spoken: set[str] = set()
+    with suppress(SyntaxError):  # of which reading the memory tells
+        quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=SPACE))
+        counters = {q.subject for q in quads if q.predicate.value == CORE + "epoch"}
+        spoken = {
+            q.object.value
+            for q in quads
+            if isinstance(q.object, ox.NamedNode)
+            and (q.predicate.value in TERMS or (q.subject in counters and q.predicate.value in ROLES))
+        }
     names = [local_name(iri) for iri in known]
     return [f"{local_name(iri)}{nearest(local_name(iri), names)}" for iri in sorted(spoken - known)]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -185,6 +186,7 @@ def execute(
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
     from confab.live import spectator
+    from confab.memory import Memory, undisturbed
 
     loaded = _load(scene, iri)
     remembered = _memory(memory, no_memory, loaded)
@@ -205,9 +207,11 @@ def execute(
         )
     if save is not None:
         execution.save(save)
-    if learn and memory is not None and remembered is not None:
-        remembered.live(loaded.problem, execution.episode)
-        remembered.save(memory)
+    if learn and memory is not None:
+        with undisturbed(memory):  # others may have learned meanwhile
+            newest = Memory.load(memory, loaded)
+            newest.live(loaded.problem, execution.episode)
+            newest.save(memory)
     _print(execution.json() if as_json else execution)
     raise typer.Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
@@ -274,27 +278,37 @@ def learn(
 ) -> None:
     """Learn how scenes are best solved, or from a demonstration."""
     from confab.interchange import read_plan
-    from confab.memory import MOST_LINKS, Memory
+    from confab.memory import MOST_LINKS, Memory, undisturbed
 
     remembered: Memory | None = None
-    for name in scenes:
-        loaded = _load(name)
-        if remembered is None:
-            remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
-        links = remembered.links
-        if demonstration:
-            remembered.learn(loaded, read_plan(demonstration, loaded.problem))
-        else:
-            remembered.teach(loaded, loaded.plan(memory=remembered).plan)
-        if remembered.links is links:
-            print(
-                f"{name}: too large for the paper's links (over {MOST_LINKS:,}); only counts were learned",
-                file=sys.stderr,
-            )
-    assert remembered is not None
-    remembered.save(memory)
+    status = YES
+    with undisturbed(memory):
+        for name in scenes:
+            loaded = _load(name)
+            if remembered is None:
+                remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+            links = remembered.links
+            if demonstration:
+                remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+            else:
+                result = loaded.plan()
+                if not result.solved:
+                    status = EXIT[result.outcome.status.value]
+                    why = result.outcome.reason.text if result.outcome.reason else ""
+                    print(f"{name}: nothing to learn, {result.outcome.status.value}: {why}", file=sys.stderr)
+                    continue
+                remembered.teach(loaded, result.plan)
+            if remembered.links is links:
+                print(
+                    f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned",
+                    file=sys.stderr,
+                )
+        assert remembered is not None
+        if remembered.experience.episodes:
+            remembered.save(memory)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
     _print(data if as_json else f"{memory}: {remembered!r}")
+    raise typer.Exit(status)
 
 
 @app.command()
@@ -417,6 +431,10 @@ def explain(
         raise KnowledgeError(f"{plot}: can't draw into '{plot.suffix}'; wanted .png, .svg or .pdf")
     other = ground_named(result.problem, against) if against else None
     found = explain_step(result.problem, remembered, steps, step, other)
+    if not found.note and not any(counts.evaluated for counts in result.outcome.search.values()):
+        found = replace(
+            found, note="the fast planner found this plan before memory was asked: so memory sees its choices"
+        )
     if plot is not None:
         found.plot(plot)
     _print(found.json() if as_json else str(found))
@@ -448,12 +466,13 @@ def merge(
     ] = False,
 ) -> None:
     """Merge memories: the counts of each replica, in any order, once or many times."""
-    from confab.memory import Memory
+    from confab.memory import Memory, undisturbed
 
-    merged = Memory.load(memories[0])
-    for source in memories[1:]:
-        merged.merge(Memory.load(source), trust)
-    merged.save(out)
+    with undisturbed(out):
+        merged = Memory.load(memories[0])
+        for source in memories[1:]:
+            merged.merge(Memory.load(source), trust)
+        merged.save(out)
     _print(f"{out}: {merged!r}")
 
 
@@ -463,11 +482,12 @@ def trust_(
     replicas: Annotated[list[str], typer.Argument(metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")],
 ) -> None:
     """Let what other replicas have counted lead the search, too."""
-    from confab.memory import Memory
+    from confab.memory import Memory, undisturbed
 
-    loaded = Memory.load(memory)
-    loaded.trust(sorted(loaded.experience.episodes) if replicas == ["all"] else replicas)
-    loaded.save(memory)
+    with undisturbed(memory):
+        loaded = Memory.load(memory)
+        loaded.trust(sorted(loaded.experience.episodes) if replicas == ["all"] else replicas)
+        loaded.save(memory)
     _print(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
 
 
@@ -538,9 +558,10 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     try:
         if path.is_file():
             from confab.authoring import unknown_terms
+            from reasoner.memory import memory_lines
 
-            for term in unknown_terms(path, scene.knowledge):
-                print(f"confab: {path} speaks of {term}, which this scene doesn't know", file=sys.stderr)
+            if unknown := unknown_terms(memory_lines(path), scene.knowledge):
+                print(f"confab: {path} counts what this scene doesn't know: {'; '.join(unknown)}", file=sys.stderr)
         return Memory.load(path, scene)
     except KnowledgeError as error:
         if not path.is_file():

@@ -44,12 +44,16 @@ class Why:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why `chosen` was preferred to `other`; weights are differences of ln odds, `lead` is their sum."""
+    """Why `chosen` was preferred to `other`; weights are differences of ln odds, `lead` is their sum.
+
+    `note` says where memory wasn't asked, or has nothing to say.
+    """
 
     chosen: str
     other: str
     lead: float
     reasons: tuple[Why, ...]
+    note: str = ""
 
     def json(self) -> dict[str, Any]:
         """Return the explanation as JSON data."""
@@ -73,7 +77,7 @@ class Explanation:
             )
             drop = "" if why.drop is None else f"; without it the lead is {self.lead - why.drop:+.2f}"
             lines.append(f"  {why.weight:+6.2f}  {why.fact}: {why.chosen}, there {why.other}{also}{drop}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *([f"({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw what spoke for the choice (right) and against it (left), and save the picture if a file is given."""
@@ -140,10 +144,12 @@ def explain(
         raise KnowledgeError(f"{_words(against)} could not be done there, so memory had no choice")
     reasons = differences(judge, chosen, other)
     lead = sum(why.weight for why in reasons)
+    behavior = chosen.conclusion.behavior
+    note = "" if judge.knows([behavior]) else f"memory has never seen {behavior} chosen or passed over"
     first = _decisive(reasons, lambda facts: _lead(_judge(memory, field, facts), chosen, other), lead)
     named = {first.fact, *first.also} if first else set()
     rest = tuple(why for why in reasons if why.fact not in named)
-    return Explanation(_words(steps[number]), _words(against), lead, (first, *rest) if first else rest)
+    return Explanation(_words(steps[number]), _words(against), lead, (first, *rest) if first else rest, note)
 
 
 def _decisive(reasons: Sequence[Why], lead_without: Callable[[frozenset[str]], float], lead: float) -> Why | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from planner.learning import LearningError
 from planner.learning import learn as learn_plan
 from planner.plan import Plan, Step
 from reasoner.experience import Decision, Experience, Tallies
-from reasoner.files import write_whole
+from reasoner.files import alone, write_whole
 from reasoner.graph import KnowledgeError
 from reasoner.links import Links
 from reasoner.memory import links_text, load_links, memory_lines, memory_names
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from reasoner.symbols import Problem
 
 
-MOST_LINKS = 100_000
-"""A scene of which the paper's memory would need more links isn't learned for the paper's mode, which couldn't plan it, either."""
+MOST_LINKS = 20_000
+"""What would give the paper's memory more links isn't learned for the paper's mode, which plans small scenes alone."""
 
 
 @dataclass
@@ -124,13 +124,13 @@ class Memory:
         self.experience.learn(lived)
 
     def teach(self, scene: Scene, plan: Plan) -> None:
-        """Learn how a scene is best solved: of each level shortest steps where they are found soon, else those of a plan.
+        """Learn how a scene is best solved, on its first two levels: see `planner.teaching`.
 
         Parameters
         ----------
         scene : Scene
         plan : Plan
-            For what isn't found, and for the paper's links.
+            For the paper's links.
 
         Raises
         ------
@@ -139,19 +139,16 @@ class Memory:
         """
         from planner.compiling import Program
         from planner.deciding import decisions, single_level
-        from planner.teaching import lesson
+        from planner.teaching import example
 
         try:
-            lived = decisions_of(scene.problem, plan)
             links = self._linked(scene, plan)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
-        level = scene.problem.domain.levels[0]
-        steps = lesson(scene.problem, level)
-        if steps:
+        lived: list[Decision] = []
+        for level in scene.problem.domain.levels[:2]:
             within = single_level(scene.problem, level)
-            below = [d for d in lived if scene.problem.domain.behaviors[d.chosen.conclusion.behavior].level != level]
-            lived = decisions(Program(within), within, level, steps) + below
+            lived += decisions(Program(within), within, level, example(scene.problem, level))
         self.links = links
         self.experience.learn(lived)
 
@@ -279,6 +276,11 @@ def endpoint(source: str | Path) -> str | None:
     """
     match = re.match(r"(https?):/+(.*)", str(source))
     return f"{match[1]}://{match[2]}" if match else None
+
+
+def undisturbed(target: str | Path) -> AbstractContextManager[None]:
+    """Let nobody else rewrite a memory file until this is done; at an endpoint every replica has its own graph anyway."""
+    return nullcontext() if endpoint(target) else alone(Path(target))
 
 
 def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = None) -> list[Decision]:

@@ -201,24 +201,26 @@ def plan(
         patience = 0 if eager or strict else patience_for(problem)
     race = Race(begin, first, strict, patience, stretch_for(problem), deadline)
     outcome: Outcome | None = None
+    lost: dict[int, int] = {}  # what the base spent before the stream found what couldn't be refined
     while outcome is None:
+        lost = dict(race.spent)
         if race.begun is None or race.begun.solution is None:
             with suppress(ArrivedError):
                 outcome = fast.plan(problem, limits=limits, improve=improve, using=using, watch=race.watch)
         if race.begun is not None and race.begun.solution is not None:
-            outcome = refined(problem, using, race.begun, deadline, improve)
+            outcome = refined(problem, using, race.begun, deadline, limits.expansions, improve)
     if outcome.status is Status.GAVE_UP and not race.strict:
         stream = race.stream
         while outcome.plan is None and stream.expanded < limits.expansions and not stream.exhausted:
             if deadline is not None and perf_counter() > deadline:
                 break
             if stream.expand():
-                outcome = refined(problem, using, stream, deadline, improve) or outcome
+                outcome = refined(problem, using, stream, deadline, limits.expansions, improve) or outcome
     if race.begun is None:
         return replace(outcome, seconds=perf_counter() - began)
     stream = race.begun
     search = {level: Counts(c.generated, c.evaluated, c.expanded) for level, c in outcome.search.items()}
-    for level, expanded in race.spent.items() if stream.solution is not None else ():
+    for level, expanded in (race.spent if stream.solution is not None else lost).items():
         search.setdefault(level, Counts()).expanded += expanded
     search.setdefault(first, Counts()).add(Counts(stream.generated, stream.evaluated, stream.expanded))
     return replace(outcome, search=search, seconds=perf_counter() - began)
@@ -230,11 +232,11 @@ def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], O
 
 
 def refined(
-    problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None, improve: int
+    problem: Problem, using: fast.Compiled, stream: Stream, deadline: float | None, most: int, improve: int
 ) -> Outcome | None:
     """Refine the stream's solution down to primitives and shorten it; None if a step can't be, which is then forbidden there."""
     assert stream.solution is not None
-    call = fast.Call(problem, using, deadline, None, Limits().expansions)
+    call = fast.Call(problem, using, deadline, None, most)
     first = problem.domain.levels[0]
     for position, (name, arguments) in enumerate(stream.solution):
         step = call.refiner.do(first, name, arguments)

@@ -1,7 +1,7 @@
 """Search that experience leads: best-first by how often the path departed from the most cogent choice.
 
-d          rank discrepancies along the path: 0 while always the most cogent candidate was done; the least d is expanded next,
-           of equals the deepest
+d          rank discrepancies along the path: 0 while always the most cogent candidate was done; expanded next is the node with
+           the least sum of `WEIGHT` d and open goals, of equals the deepest
 focus      for each open goal, the most cogent candidate that works towards it; kept until something near it changes
 
 Every node that isn't exhausted stays on the heap, so that all relevant behaviours are tried in the end. Nothing is shared with

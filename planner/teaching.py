@@ -16,7 +16,7 @@ from planner.table import Cell
 from reasoner.symbols import Problem
 
 MOST = 1000  # expansions in search of a shortest plan
-SMALL = 20  # open goals; of more, that many expansions find none, and take a minute
+SMALL = 12  # open goals; of more, that many expansions hardly find any, and take long
 
 
 def lesson(problem: Problem, level: int) -> list[Ground]:
@@ -41,6 +41,22 @@ def lesson(problem: Problem, level: int) -> list[Ground]:
         made = [(step.behavior, step.arguments) for step in found.at_level(level)]
         steps = shortened(program, within, level, made)
     return steps
+
+
+def example(problem: Problem, level: int) -> list[Ground]:
+    """Return a lesson, or where there is none the first plan's steps of a level, as far as the goal needs them.
+
+    Empty where there is no plan, or it does without the level.
+    """
+    good = lesson(problem, level)
+    if good:
+        return good
+    found = fast.plan(problem, improve=0).plan
+    if found is None or any(step.level > level for step in found.steps):
+        return []
+    within = single_level(problem, level)
+    made = [(step.behavior, step.arguments) for step in found.at_level(level)]
+    return shortened(Program(within), within, level, made)
 
 
 def shortened(program: Program, problem: Problem, level: int, steps: Sequence[Ground]) -> list[Ground]:

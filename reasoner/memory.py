@@ -120,7 +120,7 @@ def memory_lines(path: Path) -> Lines:
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
     try:
-        return lines(path.read_text(encoding="utf-8"))
+        return lines(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     except OSError as error:

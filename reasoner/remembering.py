@@ -14,7 +14,7 @@ import hashlib
 import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from urllib.error import URLError
 from urllib.parse import quote, urlencode
@@ -46,6 +46,7 @@ LINK = (
     "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
     ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
 )
+MOST = 2**53  # so far counts are exact as floating-point numbers
 COUNTS = re.compile(
     r"^m:(?:(pattern_\w+) a owl:NamedIndividual, :Pattern ; :facts \"([^\"\\\n]*)\" \.\n|"
     r"(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\3 ; "
@@ -180,7 +181,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
         The file is missing, broken, of a newer format or no memory of this kind; the message says which, and what to do.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -231,6 +232,8 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             f"{source}: memory of format {head['memoryFormat']}, wanted {FORMAT}: this version doesn't read it; "
             "learn anew, or use the version of Confab that wrote it"
         )
+    if "learnsAs" not in head:
+        raise KnowledgeError(f"{source}: broken memory: it doesn't say who learns into it (:learnsAs); restore a copy")
     experience = Experience(head["learnsAs"], trusts=trusts.get(f"urn:uuid:{head['learnsAs']}", set()))
     try:
         for node in nodes.values():
@@ -249,7 +252,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             who, conclusion = counters[SPACE + counter]
             table = experience.counts.setdefault(who, {}).setdefault(conclusion, {})
             key = patterns[SPACE + pattern]
+            if not 0 <= min(tally.chosen, tally.passed_over, tally.failed) <= sum(astuple(tally)) < MOST:
+                raise ValueError(f"{counter} counts {tally}; wanted numbers from 0 to {MOST}")
             table[key] = table[key] | tally if key in table else tally
+    except KnowledgeError:
+        raise
     except (KeyError, ValueError) as error:
         raise KnowledgeError(f"{source}: broken memory: a link or counter lacks a part ({error})") from error
     return experience

@@ -9,6 +9,7 @@ import confab
 from confab.authoring import difference, migrate, new_domain, unknown_terms
 from confab.reaching import with_current_reach
 from reasoner.graph import KnowledgeError
+from reasoner.memory import memory_lines
 from reasoner.validate import validate
 
 
@@ -83,9 +84,9 @@ def test_a_renamed_term_takes_its_memory_along(tmp_path: Path) -> None:
     memory = tmp_path / "memory.ttl"
     memory.write_text(MEMORY)
     graph = confab.load(tmp_path / "tearoom-scene.ttl").knowledge
-    assert unknown_terms(memory, graph) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
+    assert unknown_terms(memory_lines(memory), graph) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
     assert migrate(memory, ["CLEANLINES=CLEANLINESS"]) == 1
-    assert unknown_terms(memory, graph) == []
+    assert unknown_terms(memory_lines(memory), graph) == []
 
 
 def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(tmp_path: Path) -> None:

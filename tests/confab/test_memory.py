@@ -1,5 +1,7 @@
 """Memory at the front desk: who may lead, and what is learned from what was carried out."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +11,11 @@ from typer.testing import CliRunner
 
 import confab
 from confab.cli import app
+from confab.explaining import explain
 from planner.episode import Failure
 from planner.teaching import lesson
 from reasoner.experience import Candidate, Conclusion, Decision, Experience
+from reasoner.generate import write_scene
 from reasoner.graph import KnowledgeError
 
 
@@ -46,13 +50,14 @@ def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -
     assert one.experience.totals() == other.experience.totals() != {}
 
 
-def test_teaching_shows_the_fewest_steps_of_the_first_level_and_the_plan_below(scene: confab.Scene) -> None:
+def test_teaching_shows_good_examples_of_two_levels(scene: confab.Scene) -> None:
     memory, plan = confab.Memory.of(scene), scene.plan().plan
     memory.teach(scene, plan)
     chosen = [(c.behavior, t.chosen) for c, table in memory.experience.totals().items() for t in table.values()]
-    first = [count for behavior, count in chosen if behavior.startswith("B1_")]
-    assert sum(first) == len(lesson(scene.problem, 1)) <= len(plan.at_level(1))
-    assert sum(count for behavior, count in chosen if behavior.startswith("B2_")) == len(plan.at_level(2))
+    for level in (1, 2):
+        steps = lesson(scene.problem, level)
+        assert sum(count for behavior, count in chosen if behavior.startswith(f"B{level}_")) == len(steps)
+        assert 0 < len(steps) <= len(plan.at_level(level))
     assert len(memory.links)
     with pytest.raises(KnowledgeError):
         memory.teach(confab.load("moved-serving"), plan)
@@ -68,6 +73,49 @@ def test_a_scene_too_large_for_the_papers_links_teaches_counts_alone(
     memory = confab.Memory.load(tmp_path / "memory.ttl", scene)
     assert not len(memory.links)
     assert len(memory.experience)
+
+
+def test_every_level_is_learned_where_no_shortest_plan_is_found(tmp_path: Path) -> None:
+    write_scene(tmp_path / "full.ttl", "full", 12, seed=1)
+    made = confab.load(tmp_path / "full.ttl")
+    memory = confab.Memory.of(made)
+    assert lesson(made.problem, 1) == []
+    memory.teach(made, made.plan().plan)
+    assert {c.behavior[:3] for c in memory.experience.totals()} == {"B1_", "B2_"}
+
+
+def test_a_scene_without_plan_is_named_and_the_others_are_learned(tmp_path: Path) -> None:
+    write_scene(tmp_path / "no.ttl", "unsolvable", 4)
+    memory = tmp_path / "memory.ttl"
+    told = CliRunner().invoke(app, ["learn", "beverage-serving", str(tmp_path / "no.ttl"), "--memory", str(memory)])
+    assert told.exit_code == 1, told.output
+    assert "no.ttl: nothing to learn, unsolvable: " in told.stderr
+    assert confab.Memory.load(memory).experience.episodes
+    alone = CliRunner().invoke(app, ["learn", str(tmp_path / "no.ttl"), "--memory", str(tmp_path / "none.ttl")])
+    assert alone.exit_code == 1
+    assert not (tmp_path / "none.ttl").exists()
+
+
+def test_learners_at_the_same_file_lose_nothing(tmp_path: Path) -> None:
+    run = "from confab.cli import main; main()"
+    command = [sys.executable, "-c", run, "learn", "beverage-serving", "--memory", str(tmp_path / "memory.ttl")]
+    learners = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for _ in range(3)]
+    assert [learner.wait(120) for learner in learners] == [0, 0, 0]
+    assert sum(confab.Memory.load(tmp_path / "memory.ttl").experience.episodes.values()) == 3
+
+
+def test_an_explanation_says_when_memory_had_no_part_and_when_it_knows_nothing(
+    tmp_path: Path, scene: confab.Scene
+) -> None:
+    memory = str(tmp_path / "memory.ttl")
+    assert CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", memory]).exit_code == 0
+    told = CliRunner().invoke(app, ["explain", "beverage-serving", "--memory", memory])
+    assert "before memory was asked" in told.output
+    steps = [(step.behavior, step.arguments) for step in scene.plan().plan.at_level(1)]
+    assert (
+        explain(scene.problem, confab.Memory.of(scene), steps).note
+        == f"memory has never seen {steps[0][0]} chosen or passed over"
+    )
 
 
 def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:

@@ -1,6 +1,7 @@
 """Experience outlives its process: files in any layout, crashes, other robots at the same endpoint; and broken files say so."""
 
 import contextlib
+import re
 import shutil
 import signal
 import socket
@@ -79,6 +80,33 @@ def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content
     (tmp_path / "memory.ttl").write_text(content)
     with pytest.raises(KnowledgeError, match=message):
         load(tmp_path / "memory.ttl")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (r":chosen \d+ ", ":chosen -1 ", "wanted numbers from 0"),
+        (r":chosen \d+ ", ":chosen 1" + 400 * "0" + " ", "wanted numbers from 0"),
+        (r":learnsAs \S+", ":label 1", "doesn't say who learns into it"),
+    ],
+)
+def test_counts_that_cant_be_and_nobody_who_learns_are_clear_errors(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = tmp_path / "memory.ttl"
+    save(path, lived("robot", 2), NAMES, DOMAIN)
+    text, count = re.subn(old, new, path.read_text())
+    assert count
+    path.write_text(text)
+    with pytest.raises(KnowledgeError, match=message):
+        load(path, NAMES)
+
+
+def test_a_byte_order_mark_is_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "memory.ttl"
+    save(path, lived("robot", 2), NAMES, DOMAIN)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert len(load(path, NAMES)) == len(lived("robot", 2))
 
 
 def test_a_file_cut_off_anywhere_is_an_error_or_whole(tmp_path: Path) -> None:
