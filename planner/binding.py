@@ -15,7 +15,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from planner.behaviors import mentions
-from planner.schemas import substituted
 from reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -27,6 +26,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
 
 

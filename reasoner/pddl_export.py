@@ -37,6 +37,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
 
 WORLD = "World"  # its one individual is what a predicate without arguments is about
@@ -258,7 +259,7 @@ class _Export:
                 if kind not in self.type_of:
                     where.append(self.is_a(inner, kind))
                 for c in conditions:
-                    self.condition(_put(c, {variable: inner}), action, where)
+                    self.condition(substituted(c, {variable: inner}), action, where)
             case Witness(_, kind, (ValueCondition(situation, (_,), value, False),), True) if _absent(one):
                 self.absence(kind, situation, value, action, where)
             case _:
@@ -663,25 +664,3 @@ def _terms(condition: Condition) -> set[str]:
         case AnyOf():
             found = set()
     return {t for t in found if t.startswith("?")}
-
-
-def _put(condition: Condition, terms: Mapping[str, str]) -> Condition:
-    """Return a condition with other terms put in for some."""
-
-    def put(names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(terms.get(name, name) for name in names)
-
-    match condition:
-        case ValueCondition(situation, arguments, value, negated):
-            return ValueCondition(situation, put(arguments), terms.get(value, value), negated)
-        case RelationCondition(relation, arguments, negated):
-            return RelationCondition(relation, put(arguments), negated)
-        case ClassCondition(term, kind, negated):
-            return ClassCondition(terms.get(term, term), kind, negated)
-        case EqualityCondition(left, right, negated):
-            return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
-        case Witness(variable, kind, conditions, negated):
-            inner = {name: term for name, term in terms.items() if name != variable}
-            return Witness(variable, kind, tuple(_put(c, inner) for c in conditions), negated)
-        case AnyOf(alternatives, negated):
-            return AnyOf(tuple(tuple(_put(c, terms) for c in group) for group in alternatives), negated)

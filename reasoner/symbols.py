@@ -17,7 +17,7 @@ quantified behaviour          ground action                              `Ground
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -263,3 +263,26 @@ class Problem:
                 return number + rank
             number += size
         raise KeyError(behavior)
+
+
+def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
+    """Return a condition with other terms put in for some."""
+
+    def put(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(terms.get(name, name) for name in names)
+
+    match condition:
+        case ValueCondition(situation, arguments, value, negated):
+            return ValueCondition(situation, put(arguments), terms.get(value, value), negated)
+        case RelationCondition(relation, arguments, negated):
+            return RelationCondition(relation, put(arguments), negated)
+        case ClassCondition(term, kind, negated):
+            return ClassCondition(terms.get(term, term), kind, negated)
+        case EqualityCondition(left, right, negated):
+            return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
+        case Witness(variable, kind, conditions, negated):
+            own = f"{variable}_inside" if variable in terms.values() else variable  # else it would capture that term
+            inner = {**terms, variable: own}
+            return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
+        case AnyOf(alternatives, negated):
+            return AnyOf(tuple(tuple(substituted(c, terms) for c in group) for group in alternatives), negated)
