@@ -1,7 +1,7 @@
 """What experience is worth: transfer, unseen classes, changed preferences, harm, clutter, files, and the learning curve.
 
     python -m benchmarks memory
-    CONFAB_MEMORY=transfer,harm …    some of: transfer, flat, time, classes, flip, harm, clutter, files, curve
+    CONFAB_MEMORY=transfer,harm …    some of: transfer, flat, time, start, classes, flip, harm, clutter, files, curve
 
 Training: scenes of 4, 6 and 8 objects, seeds 100 to 104, and more of the family full, seeds from 200 on; shortest plans of level 1,
 on level 2 those of the fast planner without needless steps. Reported: seeds from 5000 on, which neither training nor development
@@ -27,6 +27,7 @@ from time import perf_counter, process_time, sleep
 from planner import fast, guided
 from planner.compiling import Program
 from planner.deciding import BROAD, Field, Ground, single_level
+from planner.describing import Schema
 from planner.guided import Memory
 from planner.judging import Judge
 from planner.learning import learn
@@ -59,6 +60,7 @@ def main() -> None:
         "transfer": transfer,
         "flat": flat,
         "time": time,
+        "start": start,
         "classes": classes,
         "flip": flip,
         "harm": harm,
@@ -157,14 +159,14 @@ def time() -> None:
                 for seed in range(HELD_OUT, HELD_OUT + {"full": 3, "random": 12}.get(family, 1)):
                     within = single_level(problem(family, objects, seed), level)
                     calls = (
-                        lambda using: fast.plan(within, using=using),  # noqa: B023 - called at once
-                        lambda using: guided.plan(within, trained(level), using=using),  # noqa: B023
-                        lambda using: guided.plan(within, trained(level), "leading", using=using),  # noqa: B023
+                        partial(fast.plan, within),
+                        partial(guided.plan, within, trained(level)),
+                        partial(guided.plan, within, trained(level), "leading"),
                     )
                     spent: list[list[float]] = [[], [], []]
                     for _ in range(5):
                         for row, call in zip(spent, calls, strict=True):
-                            seconds, found = cpu(partial(call, fast.compiled(within)))
+                            seconds, found = cpu(partial(call, using=fast.compiled(within)))
                             row.append(seconds)
                     figures = [min(row) * 1e3 for row in spent]
                     print(f"{level:<6}{family:<10}{objects:<4}{seed:<6}{figures[0]:>8.1f}{figures[1]:>9.1f}", end="")
@@ -177,6 +179,29 @@ def cpu(call: Callable[[], Outcome]) -> tuple[float, Outcome]:
     began = process_time()
     found = call()
     return process_time() - began, found
+
+
+def start() -> None:
+    """Measure what reading a memory costs a process, and forming its judge: CPU seconds, the least of five."""
+    within = problem("full", 40, HELD_OUT)
+    schema = Schema(Program(within))
+    names = Names(f"https://w3id.org/confab/tabletop#{name}" for name in (*within.domain.behaviors, *within.classes))
+    for level in (1, 2):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "memory.ttl"
+            save(path, trained(level).experience, names, "https://w3id.org/confab/tabletop")
+            reading, judging = [], []
+            for _ in range(5):
+                gc.collect()
+                began = process_time()
+                found = load(path, names)
+                reading.append(process_time() - began)
+                Memory(found).judge(schema)
+                judging.append(process_time() - began - reading[-1])
+            print(
+                f"lessons of level {level}: {len(found)} links, {path.stat().st_size / 1e6:.1f} MB, read in {min(reading):.2f} s, "
+                f"judge in {min(judging):.2f} s"
+            )
 
 
 def classes() -> None:

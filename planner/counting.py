@@ -81,11 +81,11 @@ class Ledger:
         given = [pair for pair in pattern if pair[0] in facts]
         return given, [codes.get(pair) or seen + facts[pair[0]] for pair in given]
 
-    def sums(self, classes: Collection[Conclusion] | None = None) -> Sums:
+    def sums(self, conclusions: Collection[Conclusion] | None = None) -> Sums:
         """Return the counts of some conclusions, or of all."""
-        if classes is None:
+        if conclusions is None:
             return Sums(self, np.arange(len(self.codes)))
-        return Sums(self, np.array([i for i, c in enumerate(self.conclusions) if c in classes], dtype=np.int64))
+        return Sums(self, np.array([i for i, c in enumerate(self.conclusions) if c in conclusions], dtype=np.int64))
 
 
 @dataclass

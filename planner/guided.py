@@ -5,8 +5,9 @@ stream     the search that experience leads (`planner.stream`), one expansion at
 strict     the stream gets one expansion for every `DEBT` of the base on its level: never more than 1.05 times the base alone
 leading    the stream leads as long as it gets on; after a stretch (`stretch_for`) of expansions without a new least number of
            open goals it owes the base `DEBT` expansions for each of them
-guarded    the same, but only once the base has searched longer than such a task usually takes it (`patience_for`), or has tried
-           its first level in vain: in what it solves before, memory has no part. A clear preference is obeyed from the first on
+guarded    the same, but only once the base has searched longer than such a task usually takes it (`patience_for`), needs detours
+           for several goals, or has tried its first level in vain: in what it solves before, memory has no part. A clear
+           preference is obeyed from the first on
 
 Whichever arrives first has solved the problem; that there is no plan is for the base to prove. Memory that isn't trusted runs in
 strict mode whatever was asked for, and one that knows none of the level's behaviours isn't asked at all.

@@ -30,17 +30,12 @@ def lesson(problem: Problem, level: int) -> list[Ground]:
     level : int
         Its first level, or a lower one, which is then learned as a problem of its own.
     """
-    within = single_level(problem, level)
-    program = Program(within)
-    first = level == problem.domain.levels[0]
-    steps = shortest(program, within, level) if first else None
-    if steps is None:
-        found = fast.plan(problem).plan
-        if found is None or any(step.level > level for step in found.steps):
-            return []
-        made = [(step.behavior, step.arguments) for step in found.at_level(level)]
-        steps = shortened(program, within, level, made)
-    return steps
+    if level == problem.domain.levels[0]:
+        within = single_level(problem, level)
+        steps = shortest(Program(within), within, level)
+        if steps is not None:
+            return steps
+    return _planned(problem, level, fast.IMPROVEMENTS)
 
 
 def example(problem: Problem, level: int) -> list[Ground]:
@@ -48,10 +43,12 @@ def example(problem: Problem, level: int) -> list[Ground]:
 
     Empty where there is no plan, or it does without the level.
     """
-    good = lesson(problem, level)
-    if good:
-        return good
-    found = fast.plan(problem, improve=0).plan
+    return lesson(problem, level) or _planned(problem, level, 0)
+
+
+def _planned(problem: Problem, level: int, improve: int) -> list[Ground]:
+    """Return the steps of a level that the goal needs in the fast planner's plan, none if part of that is below the level."""
+    found = fast.plan(problem, improve=improve).plan
     if found is None or any(step.level > level for step in found.steps):
         return []
     within = single_level(problem, level)

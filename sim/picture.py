@@ -255,16 +255,28 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
     depth[window][seen] = distance[seen]
 
 
-def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Draw a vessel of clay or tin where nothing is before it: the wall that a ray meets first, or the bottom inside."""
+def _look(
+    camera: Camera, rotation: Array, base: Array, shape: Shape
+) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
+    """Return the part of a picture where a vessel is, the rays through it and the eye as seen from the vessel, and its profile.
+
+    None where it is out of the picture. The profile is that of the outer wall: heights and radii.
+    """
     heights, radii = np.array(shape.profile).T
     radii = radii + wall(shape)
     reach = float(np.hypot(heights[-1] / 2, radii.max()))
     window = camera.window(base + rotation[:, 2] * heights[-1] / 2, reach)
     if window is None:
+        return None
+    return window, camera.rays[window] @ rotation, (np.array(camera.eye) - base) @ rotation, heights, radii
+
+
+def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
+    """Draw a vessel of clay or tin where nothing is before it: the wall that a ray meets first, or the bottom inside."""
+    look = _look(camera, rotation, base, shape)
+    if look is None:
         return
-    rays = camera.rays[window] @ rotation
-    origin = (np.array(camera.eye) - base) @ rotation
+    window, rays, origin, heights, radii = look
     distance, _ = _walls(origin, rays, heights, radii)
     with np.errstate(divide="ignore", invalid="ignore"):
         floor = (heights[0] - origin[2]) / rays[..., 2]
@@ -284,14 +296,10 @@ def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, ba
 
 def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
     """Blend a vessel's far and near walls over the picture: clearer where one looks straight at them."""
-    heights, radii = np.array(shape.profile).T
-    radii = radii + wall(shape)
-    reach = float(np.hypot(heights[-1] / 2, radii.max()))
-    window = camera.window(base + rotation[:, 2] * heights[-1] / 2, reach)
-    if window is None:
+    look = _look(camera, rotation, base, shape)
+    if look is None:
         return
-    rays = camera.rays[window] @ rotation
-    origin = (np.array(camera.eye) - base) @ rotation
+    window, rays, origin, heights, radii = look
     near, far = _walls(origin, rays, heights, radii)
     tint, opacity = np.array(shape.color[:3]) * 255, shape.color[3]
     toward = SUN @ rotation
