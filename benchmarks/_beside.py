@@ -11,12 +11,12 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.pddl import Run, planners, run
-from planner import optimal
+from planner.hierarchical import bounds as optimal
 from planner.plan import Limits
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.pddl_export import to_pddl
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.pddl.exporting import to_pddl
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem
 
 HERE = Path(__file__).parent

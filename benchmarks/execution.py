@@ -21,19 +21,19 @@ import confab
 from confab.execution import execute
 from confab.gantt import save_gantt
 from confab.scene import Scene
-from planner.acting import Patience, act
-from planner.caution import Caution
-from planner.episode import Change, End, Episode, Intervention
-from planner.fast import compiled
-from planner.fast import plan as fast_plan
+from planner.acting.episode import Change, End, Episode, Intervention
+from planner.acting.executive import Patience, act
+from planner.acting.failure_memory import Caution
+from planner.acting.repair import cost, difference, mend, replan
+from planner.acting.symbolic_world import Said, SymbolicWorld, disturbed, with_individual
+from planner.hierarchical.planner import compiled
+from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Plan, Step
-from planner.repair import cost, difference, mend, replan
-from planner.symbolic import Said, SymbolicWorld, disturbed, with_individual
 from planner.validation import successor
 from reasoner.files import write_whole
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")

@@ -24,22 +24,23 @@ from random import Random
 from statistics import mean, median
 from time import perf_counter, process_time, sleep
 
-from planner import fast, guided
-from planner.compiling import Program
-from planner.deciding import BROAD, Field, Ground, single_level
-from planner.describing import Schema
-from planner.guided import Memory
-from planner.judging import Judge
-from planner.learning import learn
+from planner.experience import portfolio as guided
+from planner.experience.choice_points import BROAD, Field, Ground, single_level
+from planner.experience.demonstrations import shortest
+from planner.experience.discrepancy_search import Stream
+from planner.experience.features import Schema
+from planner.experience.portfolio import Memory
+from planner.experience.scoring import Judge
+from planner.hierarchical import planner as fast
+from planner.hierarchical.operators import Program
+from planner.paper.hierarchy import plan as paper_plan
+from planner.paper.learning import learn
 from planner.plan import Limits, Outcome
-from planner.refinement import plan as paper_plan
-from planner.stream import Stream
-from planner.teaching import shortest
 from planner.validation import validate
-from reasoner.experience import Candidate, Conclusion, Decision, Experience, Tally
-from reasoner.links import Links
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience, Tally
+from reasoner.memory.counts_file import load, save
+from reasoner.memory.links import Links
 from reasoner.names import Names
-from reasoner.remembering import load, save
 from reasoner.symbols import Problem
 from tests.planner.lessons import problem, recognised, teach
 

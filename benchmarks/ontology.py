@@ -15,11 +15,11 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from reasoner import hermit
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.inference import infer
-from reasoner.validate import validate
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import load
+from reasoner.validation import hermit
+from reasoner.validation.validate import validate
 
 REPEATS = 3
 AXIOM = """

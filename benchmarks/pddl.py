@@ -262,10 +262,10 @@ def trucks(size: int) -> str:
 
 def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
     """Print the time to ground, from the text on, beside that of Fast Downward's translator."""
-    from planner.grounding import ground
-    from planner.task import Task
-    from reasoner.pddl_import import imported
-    from reasoner.pddl_syntax import parse_files
+    from planner.grounded.grounding import ground
+    from planner.grounded.task import Task
+    from reasoner.pddl.importing import imported
+    from reasoner.pddl.syntax import parse_files
 
     translate = planners(python)["translate"]
     with tempfile.TemporaryDirectory() as folder:
@@ -322,13 +322,13 @@ def read_back(python: str) -> None:
 def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
     """Solve one problem with the flat core and write its plan (what a benchmarked process does)."""
     gc.disable()
-    from planner.flat import search
-    from planner.grounding import ground
+    from planner.grounded.best_first import search
+    from planner.grounded.grounding import ground
+    from planner.grounded.hff import heuristic
+    from planner.grounded.task import Task
     from planner.plan import Limits, Status
-    from planner.relaxed import heuristic
-    from planner.task import Task
-    from reasoner.pddl_import import imported
-    from reasoner.pddl_syntax import parse_files
+    from reasoner.pddl.importing import imported
+    from reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
     task = ground(scene.problem)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import confab
-from reasoner.embodiment import Embodiment
+from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import Symbol
 from sim.bodies import outer_radius
 from sim.faults import displaced, lying

@@ -106,9 +106,9 @@ def grounding(folder: Path) -> None:
 
 def ground(path: Path) -> dict[str, float]:
     """Measure the quantification of one behaviour in a scene."""
-    from reasoner.graph import load
-    from reasoner.quantify import by_join, by_query
-    from reasoner.reading import read
+    from reasoner.graph.knowledge import load
+    from reasoner.reading.problem import read
+    from reasoner.reading.quantification import by_join, by_query
 
     graph = load(path)
     reading = read(graph)
@@ -164,11 +164,11 @@ def worlds(folder: Path) -> None:
 
 def plan(source: str) -> dict[str, float | str]:
     """Measure loading, task recognition and planning, in a file or behind an endpoint."""
-    from planner.fast import plan as fast
-    from planner.refinement import plan as paper
-    from reasoner.graph import load
-    from reasoner.recognition import recognise
-    from reasoner.stores import connect
+    from planner.hierarchical.planner import plan as fast
+    from planner.paper.hierarchy import plan as paper
+    from reasoner.graph.knowledge import load
+    from reasoner.graph.stores import connect
+    from reasoner.reading.relevance import recognise
 
     begin = perf_counter()
     graph = connect(source) if "://" in source else load(source)
@@ -188,7 +188,7 @@ def oxigraph(path: Path) -> Iterator[str]:
     """Run the Oxigraph server on loopback with a scene and what it imports, and yield its address."""
     import urllib3
 
-    from reasoner.graph import load
+    from reasoner.graph.knowledge import load
 
     bare = load(scene(path.parent))
     files = [file for iri, file in bare.files.items() if iri != bare.scene] + [path]
@@ -226,9 +226,9 @@ def rdflib_engine(folder: Path) -> None:
     """Print how long rdflib's own SPARQL engine takes for the same query."""
     import rdflib
 
-    from reasoner.graph import load
-    from reasoner.quantify import by_query, query_for
-    from reasoner.reading import read
+    from reasoner.graph.knowledge import load
+    from reasoner.reading.problem import read
+    from reasoner.reading.quantification import by_query, query_for
 
     rows: list[list[Any]] = []
     for objects in RDFLIB_OBJECTS:
@@ -254,10 +254,10 @@ def rdflib_engine(folder: Path) -> None:
 def translator(folder: Path) -> None:
     """Print how long Fast Downward's translator takes to ground the exported problem, beside ours."""
     from benchmarks.pddl import peers, planners
-    from reasoner.graph import load
-    from reasoner.pddl_export import to_pddl
-    from reasoner.quantify import by_join
-    from reasoner.recognition import recognise
+    from reasoner.graph.knowledge import load
+    from reasoner.pddl.exporting import to_pddl
+    from reasoner.reading.quantification import by_join
+    from reasoner.reading.relevance import recognise
 
     try:
         command = planners(peers())["translate"]

@@ -36,17 +36,18 @@ from typing import Any
 from benchmarks._beside import beside_peers, optimal_costs
 from benchmarks.pddl import peers
 from benchmarks.truth import TooManyError, World
-from planner import guided, serialise
-from planner.fast import Compiled, compiled, plan
-from planner.flat import plan_level
-from planner.guided import Memory
+from planner.experience import portfolio as guided
+from planner.experience.portfolio import Memory
+from planner.grounded.best_first import plan_level
+from planner.hierarchical import serialization as serialise
+from planner.hierarchical.planner import Compiled, compiled, plan
+from planner.hierarchical.subplans import Ground, LimitError, Segments
 from planner.plan import Limits, Outcome, Reason, Status
-from planner.segments import Ground, LimitError, Segments
 from planner.validation import validate
-from reasoner.experience import Experience
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.memory.counts import Experience
+from reasoner.reading.problem import read
 from reasoner.symbols import Domain, Problem
 from tests.planner.families import family as packed
 from tests.planner.families import random_table
@@ -344,7 +345,7 @@ class Everything(Segments):
 
     def relevant(self, level: int, off: Any, depth: int) -> Iterator[Ground]:
         """Yield every applicable behaviour."""
-        from planner.behaviors import ground
+        from planner.paper.transitions import ground
 
         cache = self.__dict__.setdefault("grounds", {})
         if level not in cache:

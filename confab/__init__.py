@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.scene import Result, Scene, load
-    from reasoner.graph import KnowledgeError
+    from reasoner.graph.knowledge import KnowledgeError
 
 __version__ = "0.1.0"
 __all__ = ["KnowledgeError", "Memory", "Result", "Scene", "load"]
 
 _HOMES = {
-    "KnowledgeError": "reasoner.graph",
+    "KnowledgeError": "reasoner.graph.knowledge",
     "Memory": "confab.memory",
     "Result": "confab.scene",
     "Scene": "confab.scene",

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 import ontology
-from planner.behaviors import ground
+from planner.paper.transitions import ground
 from reasoner.files import write_whole
-from reasoner.graph import CORE, FORMATS, KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import CORE, FORMATS, KnowledgeError, KnowledgeGraph
+from reasoner.memory.counts_file import SPACE, Lines
 from reasoner.names import local_name, nearest
-from reasoner.remembering import SPACE, Lines
 
 if TYPE_CHECKING:
     from confab.scene import Scene

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     from confab.memory import Memory
@@ -243,7 +243,7 @@ def query(
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
     loaded = _load(scene, iri)
     if show is not None:
-        from reasoner.quantify import behavior_named, query_for
+        from reasoner.reading.quantification import behavior_named, query_for
 
         behavior = behavior_named(loaded.reading, show)
         print(loaded.applicable_query(show) if applicable else query_for(loaded.reading, behavior))
@@ -336,7 +336,7 @@ def fetch(
     folder: Annotated[Path, typer.Option("--into", metavar="DIR", help="Beside the file that imports it.")] = Path(),
 ) -> None:
     """Fetch an ontology that is imported by URL."""
-    from reasoner.fetching import fetch as fetch_ontology
+    from reasoner.graph.fetching import fetch as fetch_ontology
 
     fetched = fetch_ontology(url, folder)
     _print(
@@ -383,7 +383,7 @@ def validate(
     as_json: AsJson = False,
 ) -> None:
     """Check ontologies: what is wrong where, why, and what to do."""
-    from reasoner.validate import validate as check
+    from reasoner.validation.validate import validate as check
 
     findings = check(files, deep=deep)
     errors = sum(finding.serious for finding in findings)
@@ -558,7 +558,7 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     try:
         if path.is_file():
             from confab.authoring import unknown_terms
-            from reasoner.memory import memory_lines
+            from reasoner.memory.links_file import memory_lines
 
             if unknown := unknown_terms(memory_lines(path), scene.knowledge):
                 print(f"confab: {path} counts what this scene doesn't know: {'; '.join(unknown)}", file=sys.stderr)
@@ -619,8 +619,8 @@ def _print(what: Any) -> None:
 
 def main() -> NoReturn:
     """Run the command line; turn errors into one clear line and an exit code."""
-    from planner.behaviors import DomainError
-    from reasoner.embody import EmbodimentError
+    from planner.paper.transitions import DomainError
+    from reasoner.embodiment.reading import EmbodimentError
 
     try:
         code = app(prog_name="confab", standalone_mode=False)

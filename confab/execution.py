@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from confab.interchange import step_json
-from planner.acting import Moment, Patience, act
-from planner.caution import Caution
-from planner.episode import Change, End, Episode, Intervention, World
+from planner.acting.episode import Change, End, Episode, Intervention, World
+from planner.acting.executive import Moment, Patience, act
+from planner.acting.failure_memory import Caution
+from planner.acting.repair import Planner, renumbered
+from planner.acting.symbolic_world import SymbolicWorld
 from planner.plan import Plan, Step
-from planner.repair import Planner, renumbered
-from planner.symbolic import SymbolicWorld
-from reasoner.graph import KnowledgeError
-from reasoner.links import Links
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.links import Links
 from reasoner.names import nearest
-from reasoner.reading import parse_fact
+from reasoner.reading.problem import parse_fact
 from reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def _known(problem: Problem, individual: str, text: str) -> str:
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
     """Read ``KIND NAME`` and facts about it without its name: ``LOCATION location5 BEVERAGE no_beverage``."""
-    from planner.symbolic import with_individual
+    from planner.acting.symbolic_world import with_individual
 
     if len(words) < 4 or len(words) % 2:
         raise KnowledgeError(f"'{text}': wanted 'add CLASS NAME SITUATION value …'")
@@ -254,14 +254,14 @@ class Execution:
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of what was done: an edge from each primitive to those that need it done before."""
-        from planner.schedule import partial_order
+        from planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
         """Write the episode as Turtle (PROV-O), whole or not at all, and return where."""
-        from reasoner.episodes import save_episode
+        from reasoner.memory.episodes import save_episode
 
         save_episode(Path(path), self.json(), self.scene.names)
         return Path(path)
@@ -296,7 +296,7 @@ def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
         raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
     if mode != "paper":
         return None
-    from planner.refinement import plan as paper_plan
+    from planner.paper.hierarchy import plan as paper_plan
 
     return lambda problem: paper_plan(problem, memory)
 
@@ -391,8 +391,8 @@ def _with_both_hands(
     caution: Caution | None,
 ) -> Episode:
     """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
-    from planner.episode import Event, Failure
-    from planner.fast import plan as fast_plan
+    from planner.acting.episode import Event, Failure
+    from planner.hierarchical.planner import plan as fast_plan
     from sim.together import perform
 
     if plan is None:

@@ -13,11 +13,11 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from planner.compiling import Program
-from planner.deciding import Field, Ground, single_level
-from planner.judging import TOGETHER, Judge
-from reasoner.experience import Candidate
-from reasoner.graph import KnowledgeError
+from planner.experience.choice_points import Field, Ground, single_level
+from planner.experience.scoring import TOGETHER, Judge
+from planner.hierarchical.operators import Program
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.counts import Candidate
 from reasoner.symbols import Problem
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from planner.schedule import Slot
+from planner.acting.schedule import Slot
 
 
 def save_gantt(slots: Sequence[Slot], path: str | Path, serial: float | None = None) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from planner.plan import Outcome, Plan, Status, Step
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
 from reasoner.symbols import Behavior, Problem
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from planner.acting import Moment
+from planner.acting.executive import Moment
 
 if TYPE_CHECKING:
     from rich.console import Group

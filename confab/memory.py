@@ -1,7 +1,7 @@
 """The memory at the front desk: load it, learn into it, save it, merge it, look at it.
 
-One file holds both kinds of experience: the counts of lifted facts, from which the planner plans (`reasoner.experience`), and the
-paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.links`).
+One file holds both kinds of experience: the counts of lifted facts, from which the planner plans (`reasoner.memory.counts`),
+and the paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.memory.links`).
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.table import Table
-from planner.learning import LearningError
-from planner.learning import learn as learn_plan
+from planner.paper.learning import LearningError
+from planner.paper.learning import learn as learn_plan
 from planner.plan import Plan, Step
-from reasoner.experience import Decision, Experience, Tallies
 from reasoner.files import alone, write_whole
-from reasoner.graph import KnowledgeError
-from reasoner.links import Links
-from reasoner.memory import links_text, load_links, memory_lines, memory_names
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.counts import Decision, Experience, Tallies
+from reasoner.memory.counts_file import FORMAT, new_replica, parse, probability, pull, push, turtle
+from reasoner.memory.links import Links
+from reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
 from reasoner.names import Names
-from reasoner.remembering import FORMAT, new_replica, parse, probability, pull, push, turtle
 
 if TYPE_CHECKING:
     from confab.scene import Scene
-    from planner.episode import Episode
-    from planner.guided import Memory as Advisor
+    from planner.acting.episode import Episode
+    from planner.experience.portfolio import Memory as Advisor
     from reasoner.symbols import Problem
 
 
@@ -124,7 +124,7 @@ class Memory:
         self.experience.learn(lived)
 
     def teach(self, scene: Scene, plan: Plan) -> None:
-        """Learn how a scene is best solved, on its first two levels: see `planner.teaching`.
+        """Learn how a scene is best solved, on its first two levels: see `planner.experience.demonstrations`.
 
         Parameters
         ----------
@@ -137,9 +137,9 @@ class Memory:
         KnowledgeError
             The plan can't be done in the scene's situation; nothing is learned then.
         """
-        from planner.compiling import Program
-        from planner.deciding import decisions, single_level
-        from planner.teaching import example
+        from planner.experience.choice_points import decisions, single_level
+        from planner.experience.demonstrations import example
+        from planner.hierarchical.operators import Program
 
         try:
             links = self._linked(scene, plan)
@@ -209,7 +209,7 @@ class Memory:
     @property
     def advisor(self) -> Advisor:
         """The memory as the fast planner takes it."""
-        from planner.guided import Memory as Advisor
+        from planner.experience.portfolio import Memory as Advisor
 
         mine = {self.experience.replica, *self.trusted}
         return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
@@ -227,7 +227,7 @@ class Memory:
 
     def counts(self, most: int | None = None) -> Table:
         """Return what was counted of single facts, what tells chosen from passed over first."""
-        from planner.counting import Ledger
+        from planner.experience.counts import Ledger
 
         behaviors: dict[str, Tallies] = {}
         for conclusion, patterns in self.experience.totals().items():
@@ -291,8 +291,8 @@ def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = 
     LearningError
         A step's preconditions don't hold where it is done.
     """
-    from planner.compiling import Program
-    from planner.deciding import Ground, decisions, single_level
+    from planner.experience.choice_points import Ground, decisions, single_level
+    from planner.hierarchical.operators import Program
 
     found: list[Decision] = []
     tops: Sequence[Step] = plan.steps
@@ -312,8 +312,8 @@ def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = 
 
 def vain(problem: Problem, episode: Episode) -> list[Decision]:
     """Return the behaviours of the upper levels that were begun in an episode and failed, where they can still be described."""
-    from planner.compiling import Program
-    from planner.deciding import Field, single_level
+    from planner.experience.choice_points import Field, single_level
+    from planner.hierarchical.operators import Program
 
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     found: list[Decision] = []

@@ -6,17 +6,17 @@ from collections import defaultdict
 from pathlib import Path
 from typing import TypeAlias
 
-from planner.behaviors import Model, Values
-from planner.grounding import ground
+from planner.grounded.grounding import ground
+from planner.grounded.plan_windows import regrouped
+from planner.grounded.task import Task
+from planner.paper.transitions import Model, Values
 from planner.plan import Plan, Step
-from planner.task import Task
-from planner.windows import regrouped
-from reasoner.graph import KnowledgeError
-from reasoner.pddl_export import plan_of, to_pddl
-from reasoner.pddl_import import imported
-from reasoner.pddl_syntax import PddlError, parse_files
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.pddl.exporting import plan_of, to_pddl
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import PddlError, parse_files
+from reasoner.pddl.turtle import turtle
 from reasoner.symbols import GroundBehavior, Problem
-from reasoner.turtle import turtle
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
 """A behaviour with its arguments."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planner.plan import Plan
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Fact, State
 from sim.rollouts import Done, Trial, wilson
 from sim.rollouts import rollouts as roll_out

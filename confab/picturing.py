@@ -6,10 +6,10 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from reasoner.graph import KnowledgeError, text
+from reasoner.embodiment.reach import reach_relation
+from reasoner.graph.knowledge import KnowledgeError, text
 from reasoner.names import local_name
-from reasoner.quantify import behavior_named
-from reasoner.reach import reach_relation
+from reasoner.reading.quantification import behavior_named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

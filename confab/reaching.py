@@ -9,9 +9,9 @@ import pyoxigraph as ox
 
 import ontology
 from confab.scene import Scene
-from reasoner.embody import EmbodimentError
-from reasoner.graph import BASE, KnowledgeError
-from reasoner.reach import reach_hash, reach_relation, save_reach
+from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
+from reasoner.embodiment.reading import EmbodimentError
+from reasoner.graph.knowledge import BASE, KnowledgeError
 
 log = logging.getLogger(__name__)
 ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>

@@ -13,8 +13,8 @@ from confab.scene import Result, Scene, load
 from confab.show import show
 from planner.plan import Status
 from reasoner.files import write_whole
-from reasoner.observed import assert_observed, save_observed
-from reasoner.validate import validate
+from reasoner.reading.observed import assert_observed, save_observed
+from reasoner.validation.validate import validate
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8

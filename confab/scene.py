@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 from confab.interchange import outcome_json
 from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
-from reasoner.graph import KnowledgeError, KnowledgeGraph
-from reasoner.graph import load as load_graph
-from reasoner.inference import infer
-from reasoner.links import Links
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import load as load_graph
+from reasoner.memory.links import Links
 from reasoner.names import Names, nearest
-from reasoner.reading import Reading, read, with_goals
-from reasoner.recognition import recognise
+from reasoner.reading.problem import Reading, read, with_goals
+from reasoner.reading.relevance import recognise
 from reasoner.symbols import FALSE, TRUE, Fact, Problem
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
-    from planner.acting import Moment
-    from planner.episode import World
-    from reasoner.embodiment import Embodiment
-    from reasoner.mirror import Mirror
+    from planner.acting.episode import World
+    from planner.acting.executive import Moment
+    from reasoner.embodiment.values import Embodiment
+    from reasoner.graph.mirror import Mirror
 
 MODES = ("guarded", "leading", "strict", "paper")
 DEFAULT_MODE = MODES[0]
@@ -102,7 +102,7 @@ class Scene:
         EmbodimentError
             Something that physics needs isn't said; the message names it.
         """
-        from reasoner.embody import read_embodiment
+        from reasoner.embodiment.reading import read_embodiment
 
         if self.knowledge.select("SELECT ?why WHERE { ?ontology :symbolicOnly ?why }"):
             raise KnowledgeError(
@@ -118,7 +118,7 @@ class Scene:
 
     @cached_property
     def _mirror(self) -> Mirror:
-        from reasoner.mirror import Mirror
+        from reasoner.graph.mirror import Mirror
 
         return Mirror(self.knowledge)
 
@@ -142,7 +142,7 @@ class Scene:
         KnowledgeError
             The query isn't SPARQL, or has no rows as its answer.
         """
-        from reasoner.affordance import SITUATION, write_situation
+        from reasoner.reading.affordance import SITUATION, write_situation
 
         self._pull()
         if SITUATION in sparql:
@@ -158,15 +158,15 @@ class Scene:
         KnowledgeError
             The query isn't SPARQL, or gives no triples but rows.
         """
-        from reasoner.construct import write_construct
+        from reasoner.graph.construct import write_construct
 
         self._pull()
         return write_construct(self.knowledge, sparql, Path(path))
 
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
-        from reasoner.affordance import applicable_query
-        from reasoner.quantify import behavior_named
+        from reasoner.reading.affordance import applicable_query
+        from reasoner.reading.quantification import behavior_named
 
         return applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
 
@@ -178,7 +178,7 @@ class Scene:
         KnowledgeError
             There is no object of that name; ``all`` and None stand for every object.
         """
-        from reasoner.affordance import affordances
+        from reasoner.reading.affordance import affordances
 
         known = {name for members in self.problem.classes.values() for name in members}
         if of not in (None, "all", *known):
@@ -240,8 +240,8 @@ class Scene:
         limits = Limits(seconds=OPTIMAL_SECONDS if optimal and time_limit is None else time_limit)
         begin, asked, goals = perf_counter(), self.knowledge.round_trips, list(goals)
         if mode == "paper":
-            from planner.refinement import plan as paper_plan
-            from reasoner.quantify import quantify
+            from planner.paper.hierarchy import plan as paper_plan
+            from reasoner.reading.quantification import quantify
 
             problem = with_goals(self._seen(self.reading, observed), goals)
             grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
@@ -250,9 +250,9 @@ class Scene:
             links = memory if isinstance(memory, Links) or memory is None else memory.links
             outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
         else:
-            from planner.fast import compiled
-            from planner.guided import plan as guided_plan
-            from planner.optimal import plan as optimal_plan
+            from planner.experience.portfolio import plan as guided_plan
+            from planner.hierarchical.bounds import plan as optimal_plan
+            from planner.hierarchical.planner import compiled
 
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
 
@@ -286,7 +286,7 @@ class Scene:
                 )
 
     def _seen(self, reading: Reading, observed: str | Path | None) -> Reading:
-        from reasoner.observed import load_observed
+        from reasoner.reading.observed import load_observed
 
         return reading if observed is None else load_observed(Path(observed), reading)
 
@@ -317,7 +317,7 @@ class Scene:
             plan = read_plan(Path(plan), problem)
         planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
         if planner is None and memory is not None and not isinstance(memory, Links):
-            from planner.guided import planner_with
+            from planner.experience.portfolio import planner_with
 
             planner = planner_with(memory.advisor, mode)
         return execute(self, problem, plan, interventions, world, planner, seed, tell, **options)
@@ -429,7 +429,7 @@ def load(source: str | Path, scene: str | None = None) -> Scene:
     """
     begin = perf_counter()
     if str(source).startswith(("http://", "https://")):
-        from reasoner.stores import connect
+        from reasoner.graph.stores import connect
 
         return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
     graph = load_graph(source)

@@ -31,7 +31,7 @@ from urllib.parse import quote
 
 import ontology
 from reasoner.files import write_whole
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
 
 FOLDER = ontology.ROOT / "families"

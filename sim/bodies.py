@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
-from reasoner.embodiment import Shape
+from reasoner.embodiment.values import Shape
 from sim.urdf import Array
 
 PLANKS = 12

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from reasoner.embodiment import Fixture
+from reasoner.embodiment.values import Fixture
 from sim.kinematics import Arm, link_transforms, turn
 from sim.urdf import Array, Model, Spheres
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 import numpy as np
 import pybullet
 
-from reasoner.embodiment import Shape
+from reasoner.embodiment.values import Shape
 from sim.bodies import KINDS, center_height
 from sim.kinematics import inverse
 from sim.motion import SWIVELS, poses_at, rotations

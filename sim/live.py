@@ -1,4 +1,4 @@
-"""A physical world in which people interfere: the world that the executive acts in (`planner.acting`).
+"""A physical world in which people interfere: the world that the executive acts in (`planner.acting.executive`).
 
 Rule 1: an intervention acts on bodies: a cup that is moved is taken out of the hand, and what is in it goes with it.
 Rule 2: a primitive is stopped where it is as soon as something happens to what it concerns.
@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from planner.episode import Change, Intervention
+from planner.acting.episode import Change, Intervention
 from planner.plan import Step
-from reasoner.embodiment import Body, PerceiverUse
+from reasoner.embodiment.values import Body, PerceiverUse
 from reasoner.symbols import Fact, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
 from sim.perception import tilt_of

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reasoner.embodiment import PerceiverUse
+from reasoner.embodiment.values import PerceiverUse
 from sim.urdf import Array
 
 if TYPE_CHECKING:

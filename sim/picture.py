@@ -17,7 +17,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from reasoner.embodiment import Embodiment, Shape
+from reasoner.embodiment.values import Embodiment, Shape
 from sim.bodies import outline, wall
 from sim.urdf import Array
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reasoner.embodiment import Embodiment, Hand, Place, Robot
+from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
 from sim.attempt import MARGIN, Numbers, grip_stages
 from sim.collision import Surroundings, box, fixed_spheres, read_mover
 from sim.kinematics import read_arm

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
-from reasoner.embodiment import Hand, Robot
+from reasoner.embodiment.values import Hand, Robot
 from sim.collision import Mover, fixed_spheres, read_mover
 from sim.kinematics import Arm, hand_frames, read_arm
 from sim.motion import Limits, pose_of

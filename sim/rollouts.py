@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from reasoner.embodiment import Embodiment
+from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import State
 from sim.verify import Rollout, verify
 from sim.world import Perturbation, Step, World

@@ -14,8 +14,8 @@ from threading import Semaphore, Thread
 import numpy as np
 import pybullet
 
+from planner.acting.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
 from planner.plan import Step
-from planner.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
 from reasoner.symbols import Problem
 from sim.verdict import Verdict
 from sim.world import World

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from planner.validation import successor
-from reasoner.embodiment import Embodiment
+from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import Problem, State
 from sim.perception import perceiver
 from sim.verdict import Verdict

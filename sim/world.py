@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 import pybullet
 
-from reasoner.embodiment import Embodiment, Fixture, Shape
+from reasoner.embodiment.values import Embodiment, Fixture, Shape
 from reasoner.symbols import State, Symbol
 from sim.bodies import KINDS, center_height, height_of, inner_radius, outer_radius, outline, packed, vessel_height
 from sim.collision import Solid, Surroundings, box, column

@@ -49,7 +49,7 @@ def test_rooms_import_only_rooms_to_their_left() -> None:
 @pytest.mark.parametrize(
     ("path", "source", "package"),
     [
-        ("ontology/seeded.py", "import reasoner.graph\n", "reasoner"),
+        ("ontology/seeded.py", "import reasoner.graph.knowledge\n", "reasoner"),
         ("reasoner/seeded.py", "from planner import search\n", "planner"),
         ("reasoner/deep/seeded.py", "import os, sim as body\n", "sim"),
         ("planner/seeded.py", "def f():\n    from sim.world import World\n", "sim"),
@@ -74,7 +74,7 @@ def test_a_seeded_violation_is_caught(tmp_path: Path, path: str, source: str, pa
 
 def test_imports_to_the_left_and_within_a_room_are_allowed(tmp_path: Path) -> None:
     (tmp_path / "planner").mkdir()
-    source = "import ontology\nfrom reasoner.symbols import Symbol\nfrom . import sim\nfrom planner.task import Task\n"
+    source = "import ontology\nfrom reasoner.symbols import Symbol\nfrom . import sim\nfrom planner.grounded.task import Task\n"
     (tmp_path / "planner" / "fine.py").write_text(source)
     assert violations(tmp_path) == []
 

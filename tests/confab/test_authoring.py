@@ -8,9 +8,9 @@ import pytest
 import confab
 from confab.authoring import difference, migrate, new_domain, unknown_terms
 from confab.reaching import with_current_reach
-from reasoner.graph import KnowledgeError
-from reasoner.memory import memory_lines
-from reasoner.validate import validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.links_file import memory_lines
+from reasoner.validation.validate import validate
 
 
 def test_a_new_domain_validates_and_can_be_planned_in(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ from rich.console import Console
 import confab
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from planner.acting import Moment
-from planner.episode import Change
-from planner.symbolic import SymbolicWorld
-from reasoner.episodes import EPISODES, PROV, assert_episode
-from reasoner.graph import KnowledgeError, KnowledgeGraph, read_into, text
-from reasoner.validate import validate
+from planner.acting.episode import Change
+from planner.acting.executive import Moment
+from planner.acting.symbolic_world import SymbolicWorld
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
+from reasoner.memory.episodes import EPISODES, PROV, assert_episode
+from reasoner.validation.validate import validate
 
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 

@@ -6,10 +6,10 @@ import pytest
 
 import confab
 from confab.explaining import Explanation, explain
-from planner.compiling import Program
-from planner.deciding import Field, Ground
-from planner.judging import Judge
-from reasoner.graph import KnowledgeError
+from planner.experience.choice_points import Field, Ground
+from planner.experience.scoring import Judge
+from planner.hierarchical.operators import Program
+from reasoner.graph.knowledge import KnowledgeError
 from tests.planner.lessons import taught
 
 STEPS: list[Ground] = [("B1_MOVE", ("cup1", "location7"))]

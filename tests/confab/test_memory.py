@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 import confab
 from confab.cli import app
 from confab.explaining import explain
-from planner.episode import Failure
-from planner.teaching import lesson
-from reasoner.experience import Candidate, Conclusion, Decision, Experience
+from planner.acting.episode import Failure
+from planner.experience.demonstrations import lesson
 from reasoner.generate import write_scene
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
 
 
 @pytest.fixture(scope="module")

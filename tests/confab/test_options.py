@@ -8,8 +8,8 @@ import confab
 from confab.authoring import new_domain
 from planner.plan import Status
 from reasoner.generate import write_scene
-from reasoner.observed import save_observed
-from reasoner.recognition import recognise
+from reasoner.reading.observed import save_observed
+from reasoner.reading.relevance import recognise
 from reasoner.symbols import Symbol
 
 

@@ -7,8 +7,8 @@ import pytest
 import confab
 import ontology
 from confab.authoring import new_domain
-from reasoner.graph import KnowledgeError, load
-from reasoner.validate import validate
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.validation.validate import validate
 
 LABELS = "SELECT ?label WHERE { <https://example.org/tearoom-scene#plate3> rdfs:label ?label }"
 

@@ -16,7 +16,7 @@ from confab.authoring import new_domain
 from confab.physics import Report, on_trust
 from confab.show import plan_tree, show
 from planner.plan import Plan
-from reasoner.reach import reach_hash
+from reasoner.embodiment.reach import reach_hash
 from reasoner.symbols import Symbol
 from sim.faults import hidden_wall
 from sim.reach import fingerprint, reach

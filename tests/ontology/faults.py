@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import ontology
-from reasoner.findings import Finding
-from reasoner.validate import validate
+from reasoner.validation.findings import Finding
+from reasoner.validation.validate import validate
 
 NAME, WITH_BODIES = "washing", "watering"
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "validation.md"

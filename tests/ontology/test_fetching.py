@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from reasoner import fetching
-from reasoner.fetching import fetch
-from reasoner.graph import KnowledgeError, load
+from reasoner.graph.fetching import fetch
+from reasoner.graph.knowledge import KnowledgeError, fetching, load
 
 TURTLE = "<{iri}> a <http://www.w3.org/2002/07/owl#Ontology> {more} .\n"
 XML = (

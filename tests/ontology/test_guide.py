@@ -10,9 +10,9 @@ import pytest
 
 import ontology
 from confab.authoring import new_domain
-from reasoner.graph import load, text
+from reasoner.graph.knowledge import load, text
 from reasoner.names import local_name
-from reasoner.validate import validate
+from reasoner.validation.validate import validate
 from sim.perception import BUILT_IN as PERCEIVERS
 from sim.skills import BUILT_IN as SKILLS
 

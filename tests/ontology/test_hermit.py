@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph import KnowledgeError, KnowledgeGraph, load
-from reasoner.hermit import classify
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from reasoner.validation.hermit import classify
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import ontology
-from reasoner.graph import KnowledgeError, load
+from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.names import local_name
 from tests.ontology.faults import skeleton
 from tests.ontology.owlapi import ontology_iri

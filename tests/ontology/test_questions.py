@@ -11,8 +11,8 @@ import pyoxigraph as ox
 import pytest
 
 import ontology
-from reasoner.graph import KnowledgeGraph, load, text
-from reasoner.inference import infer
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeGraph, load, text
 from reasoner.names import local_name
 
 

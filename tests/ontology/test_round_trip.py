@@ -11,7 +11,7 @@ import pytest
 import confab
 import ontology
 from reasoner.generate import write_scene
-from reasoner.observed import save_observed
+from reasoner.reading.observed import save_observed
 from tests.ontology import owlapi
 from tests.ontology.faults import WITH_BODIES, skeleton
 from tests.ontology.test_imports import TEMPLATES

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 import ontology
-from reasoner.graph import KnowledgeError
-from reasoner.hermit import NoJavaError
-from reasoner.rules import RULES
-from reasoner.validate import checks, validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.validation.hermit import NoJavaError
+from reasoner.validation.rules import RULES
+from reasoner.validation.validate import checks, validate
 from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, found, seed, skeleton
 
 

@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from planner.compiling import Program
-from planner.deciding import decisions, single_level
-from planner.guided import Memory
-from planner.teaching import lesson
-from reasoner.experience import Experience
+from planner.experience.choice_points import decisions, single_level
+from planner.experience.demonstrations import lesson
+from planner.experience.portfolio import Memory
+from planner.hierarchical.operators import Program
 from reasoner.generate import generate
-from reasoner.graph import load
-from reasoner.reading import Reading, read
-from reasoner.recognition import recognise
+from reasoner.graph.knowledge import load
+from reasoner.memory.counts import Experience
+from reasoner.reading.problem import Reading, read
+from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
 
 

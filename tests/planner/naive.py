@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import (
     FALSE,
     AnyOf,

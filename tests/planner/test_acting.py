@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.acting import Moment, Patience, act
-from planner.caution import Caution
-from planner.episode import Change, End, Episode, Intervention
-from planner.fast import plan
-from planner.learning import learn
+from planner.acting.episode import Change, End, Episode, Intervention
+from planner.acting.executive import Moment, Patience, act
+from planner.acting.failure_memory import Caution
+from planner.acting.symbolic_world import Said, SymbolicWorld
+from planner.hierarchical.planner import plan
+from planner.paper.hierarchy import plan as paper_plan
+from planner.paper.learning import learn
 from planner.plan import Plan, Step
-from planner.refinement import plan as paper_plan
-from planner.symbolic import Said, SymbolicWorld
 from planner.validation import successor, validate
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.links import Links
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.memory.links import Links
+from reasoner.reading.problem import read
 from reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 SERVED_AS_IN_FIGURE_8 = {

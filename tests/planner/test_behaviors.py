@@ -4,7 +4,7 @@ from itertools import permutations
 
 import pytest
 
-from planner.behaviors import DomainError, Model
+from planner.paper.transitions import DomainError, Model
 from reasoner.symbols import (
     AnyOf,
     Behavior,

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from planner.binding import binding
-from planner.fast import plan
+from planner.hierarchical.inherited_preconditions import binding
+from planner.hierarchical.planner import plan
 from planner.plan import Plan
 from planner.validation import successor, validate
 from reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition

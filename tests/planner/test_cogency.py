@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.cogency import PAPER, PaperConstants, cogencies, ranking
-from planner.learning import reinforce
-from reasoner.links import Links
+from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
+from planner.paper.learning import reinforce
+from reasoner.memory.links import Links
 from reasoner.symbols import Domain, Problem, SituationType, Symbol
 
 LOCATION = SituationType("LOCATION", ("Cup",), "LOCATION")

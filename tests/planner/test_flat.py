@@ -8,16 +8,16 @@ from time import perf_counter
 
 import pytest
 
-from planner.flat import plan_level, search
-from planner.grounding import TooLargeError, ground
-from planner.kernel import heuristic as compiled_heuristic
+from planner.grounded.best_first import plan_level, search
+from planner.grounded.grounding import TooLargeError, ground
+from planner.grounded.hff import heuristic
+from planner.grounded.hff_numba import heuristic as compiled_heuristic
+from planner.grounded.plan_windows import regrouped, shortened, shorter
+from planner.grounded.task import Task
 from planner.plan import Limits, Plan, Reason, Status
-from planner.relaxed import heuristic
-from planner.task import Task
 from planner.validation import validate
-from planner.windows import regrouped, shortened, shorter
-from reasoner.pddl_import import imported
-from reasoner.pddl_syntax import parse
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
 from reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
@@ -141,7 +141,7 @@ def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monk
     task = ground(tabletop)
     assert isinstance(task, Task)
     plain = search(task, evaluate=heuristic(task))
-    monkeypatch.setattr("planner.kernel.PLAIN", 5 * len(task.owners))
+    monkeypatch.setattr("planner.grounded.hff_numba.PLAIN", 5 * len(task.owners))
     assert search(task) == plain
 
 

@@ -7,11 +7,11 @@ import itertools
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.behaviors import DomainError
-from planner.flat import plan_level, search
-from planner.grounding import ground
+from planner.grounded.best_first import plan_level, search
+from planner.grounded.grounding import ground
+from planner.grounded.task import Task
+from planner.paper.transitions import DomainError
 from planner.plan import Limits, Reason, Status
-from planner.task import Task
 from reasoner.symbols import (
     FALSE,
     TRUE,

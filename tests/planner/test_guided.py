@@ -4,16 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from planner import fast, guided
-from planner.compiling import Program
-from planner.deciding import Field, Ground, single_level
-from planner.describing import Schema
-from planner.guided import Memory
-from planner.judging import Judge
+from planner.experience import portfolio as guided
+from planner.experience.choice_points import Field, Ground, single_level
+from planner.experience.demonstrations import lesson, shortened, shortest
+from planner.experience.features import Schema
+from planner.experience.portfolio import Memory
+from planner.experience.scoring import Judge
+from planner.hierarchical import planner as fast
+from planner.hierarchical.operators import Program
 from planner.plan import Outcome, Status
-from planner.teaching import lesson, shortened, shortest
 from planner.validation import validate
-from reasoner.experience import Candidate, Decision, Experience, Tally
+from reasoner.memory.counts import Candidate, Decision, Experience, Tally
 from reasoner.symbols import Problem, Symbol
 from tests.planner.lessons import problem, taught, teach
 

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from planner import optimal
-from planner.exhaust import Space, TooLargeError
-from planner.grounding import ground
-from planner.optimal import a_star, lm_cut
+from planner.grounded.grounding import ground
+from planner.grounded.state_space import Space, TooLargeError
+from planner.hierarchical import bounds as optimal
+from planner.hierarchical.bounds import a_star, lm_cut
 from planner.plan import Counts, Limits, Reason, Status
 from planner.validation import validate
 from tests.planner.families import family, random_table

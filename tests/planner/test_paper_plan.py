@@ -4,14 +4,14 @@ from itertools import permutations
 
 import pytest
 
-from planner.learning import learn
+from planner.paper.hierarchy import plan
+from planner.paper.learning import learn
 from planner.plan import Plan, Status, Step
-from planner.refinement import plan
 from planner.validation import validate
-from reasoner.graph import load
-from reasoner.links import Links
-from reasoner.quantify import quantify
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.memory.links import Links
+from reasoner.reading.problem import read
+from reasoner.reading.quantification import quantify
 from reasoner.symbols import Problem
 
 FIGURE_7 = {

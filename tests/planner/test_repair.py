@@ -5,13 +5,13 @@ from functools import cache
 
 import pytest
 
-from planner.fast import plan
+from planner.acting.repair import CLOSE, cost, difference, mend, replan, vanished
+from planner.hierarchical.planner import plan
+from planner.hierarchical.serialization import Compiled, compiled
 from planner.plan import Limits, Plan, Step
-from planner.repair import CLOSE, cost, difference, mend, replan, vanished
-from planner.serialise import Compiled, compiled
 from planner.validation import successor
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem, State, Symbol
 
 

@@ -6,12 +6,12 @@ import networkx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.fast import plan
+from planner.acting.schedule import Order, makespan, partial_order, schedule
+from planner.hierarchical.planner import plan
 from planner.plan import Plan
-from planner.schedule import Order, makespan, partial_order, schedule
 from planner.validation import validate
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem
 
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterable
 
-from planner.behaviors import Applied, Values
-from planner.cogency import PaperConstants
+from planner.paper.astar import a_star
+from planner.paper.cogency import PaperConstants
+from planner.paper.transitions import Applied, Values
 from planner.plan import Limits, Status
-from planner.search import a_star
 from reasoner.symbols import GroundBehavior
 
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from planner.paper.hierarchy import plan
 from planner.plan import Plan, Step
-from planner.refinement import plan
 from planner.validation import validate
-from reasoner.graph import load
-from reasoner.reading import read
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem
 
 

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from planner.compiling import Program
-from planner.deciding import Field
-from planner.wants import Env, Wants
+from planner.experience.choice_points import Field
+from planner.hierarchical.operators import Program
+from planner.hierarchical.subgoals import Env, Wants
 from reasoner.symbols import Condition, Problem
 from tests.planner.families import family, random_table
 from tests.planner.rooms import rooms

@@ -3,9 +3,9 @@
 import sys
 from pathlib import Path
 
-from reasoner.experience import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.counts_file import load, save
 from reasoner.names import Names
-from reasoner.remembering import load, save
 
 
 def main(path: Path) -> None:

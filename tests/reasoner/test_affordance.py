@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from planner.behaviors import Model, ground
-from reasoner.affordance import SITUATION, affordances, applicable_query, write_situation
-from reasoner.graph import KnowledgeGraph, load
-from reasoner.inference import infer
-from reasoner.reading import Reading, read
+from planner.paper.transitions import Model, ground
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeGraph, load
+from reasoner.reading.affordance import SITUATION, affordances, applicable_query, write_situation
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import State, Symbol
 from tests.ontology.faults import skeleton
 

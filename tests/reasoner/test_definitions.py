@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from planner.behaviors import Model
-from reasoner.graph import KnowledgeError, load
-from reasoner.inference import infer
-from reasoner.reading import Reading, read
+from planner.paper.transitions import Model
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import (
     AnyOf,
     ClassCondition,
@@ -18,7 +18,7 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.validate import validate
+from reasoner.validation.validate import validate
 from tests.ontology.faults import skeleton
 
 DIRTY = "c:about :B1_WASH.item ; c:situationType :CLEANLINESS ; c:value :dirty"

@@ -5,7 +5,7 @@ from copy import deepcopy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reasoner.experience import Candidate, Conclusion, Decision, Experience, Tally
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience, Tally
 
 candidates = st.builds(
     lambda behavior, kind, value, who: Candidate(

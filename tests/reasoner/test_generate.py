@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.fast import plan
+from planner.hierarchical.planner import plan
 from reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, write_scene
-from reasoner.graph import KnowledgeError, load
-from reasoner.reading import Reading, read
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Problem, Symbol
-from reasoner.validate import validate
+from reasoner.validation.validate import validate
 
 
 def reading_of(folder: Path, family: str, **sizes: int) -> Reading:

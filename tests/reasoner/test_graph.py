@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import ontology
-from reasoner.graph import KnowledgeError, load
+from reasoner.graph.knowledge import KnowledgeError, load
 
 HEADER = """@prefix owl: <http://www.w3.org/2002/07/owl#> .
 <https://example.org/mine> a owl:Ontology ; owl:imports <{}> .

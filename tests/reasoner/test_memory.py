@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 import rdflib
 
-from planner.learning import learn
-from planner.refinement import plan
-from reasoner.graph import KnowledgeError, KnowledgeGraph, load, read_into
-from reasoner.links import Links
-from reasoner.memory import load_links, save_links
-from reasoner.reading import Reading, read
+from planner.paper.hierarchy import plan
+from planner.paper.learning import learn
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_into
+from reasoner.memory.links import Links
+from reasoner.memory.links_file import load_links, save_links
+from reasoner.reading.problem import Reading, read
 
 
 @pytest.fixture(scope="module")

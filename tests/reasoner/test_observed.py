@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph import KnowledgeError, load
-from reasoner.observed import assert_observed, load_observed, save_observed
-from reasoner.reading import read
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.observed import assert_observed, load_observed, save_observed
+from reasoner.reading.problem import read
 from reasoner.symbols import Symbol
 
 CUP2 = Symbol("LOCATION", ("cup2",))

@@ -11,19 +11,19 @@ from pathlib import Path
 import pytest
 
 from confab.pddl_commands import export_pddl, import_pddl, read_pddl_plan
-from planner.flat import plan_level, search
-from planner.grounding import ground
+from planner.grounded.best_first import plan_level, search
+from planner.grounded.grounding import ground
+from planner.grounded.task import Task
 from planner.plan import Limits, Plan, Status, Step
-from planner.task import Task
 from planner.validation import validate as faults
-from reasoner.graph import KnowledgeError, load
-from reasoner.pddl_export import Exported, plan_of, to_pddl
-from reasoner.pddl_import import Imported, imported
-from reasoner.pddl_syntax import PddlError, parse, parse_files
-from reasoner.reading import read
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.pddl.exporting import Exported, plan_of, to_pddl
+from reasoner.pddl.importing import Imported, imported
+from reasoner.pddl.syntax import PddlError, parse, parse_files
+from reasoner.pddl.turtle import turtle
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem
-from reasoner.turtle import turtle
-from reasoner.validate import validate
+from reasoner.validation.validate import validate
 from tests.planner.naive import tabletop
 
 TRUCKS = (

@@ -7,7 +7,7 @@ from pathlib import Path
 import confab
 from confab.pddl_commands import import_pddl
 from planner.validation import validate as faults
-from reasoner.validate import validate
+from reasoner.validation.validate import validate
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "ferry"
 

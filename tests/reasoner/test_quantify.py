@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 
 import ontology
-from planner.behaviors import DomainError, Model, ground
+from planner.paper.transitions import DomainError, Model, ground
 from reasoner.generate import write_scene
-from reasoner.graph import load
-from reasoner.quantify import Quantified, by_join, by_query, quantify, query_for
-from reasoner.reading import read
-from reasoner.recognition import recognise
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
+from reasoner.reading.quantification import Quantified, by_join, by_query, quantify, query_for
+from reasoner.reading.relevance import recognise
 from tests.reasoner.worlds import graph_of, worlds
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph import KnowledgeError, load
-from reasoner.reading import Reading, parse_fact, read, with_goals
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.problem import Reading, parse_fact, read, with_goals
 from reasoner.symbols import Symbol, Witness
 
 SCENE = """

@@ -9,14 +9,14 @@ from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
 from ontology import ROOT
-from planner.behaviors import DomainError, Model, ground
+from planner.paper.astar import mismatches
+from planner.paper.hierarchy import plan
+from planner.paper.transitions import DomainError, Model, ground
 from planner.plan import Limits, Status
-from planner.refinement import plan
-from planner.search import mismatches
 from reasoner.generate import families, generate, write_scene
-from reasoner.graph import KnowledgeError, KnowledgeGraph, load
-from reasoner.reading import read, with_goals
-from reasoner.recognition import recognise
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from reasoner.reading.problem import read, with_goals
+from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
 from tests.reasoner.worlds import HEAD, graph_of, worlds
 

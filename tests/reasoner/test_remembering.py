@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 import rdflib
 
-from reasoner.experience import Candidate, Conclusion, Decision, Experience
-from reasoner.graph import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.counts_file import load, pull, push, save
 from reasoner.names import Names
-from reasoner.remembering import load, pull, push, save
 
 NAMES = Names(f"https://x.org/k#{name}" for name in ("B1_MOVE", "B1_POUR", "Cup", "Bottle"))
 DOMAIN = "https://x.org/k"

@@ -11,13 +11,12 @@ from threading import Thread
 
 import pytest
 
-from planner.refinement import plan
-from reasoner import stores
+from planner.paper.hierarchy import plan
 from reasoner.generate import write_scene
-from reasoner.graph import KnowledgeError, KnowledgeGraph, load
-from reasoner.reading import read
-from reasoner.recognition import recognise
-from reasoner.stores import Endpoint, connect, on_disk
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, stores
+from reasoner.graph.stores import Endpoint, connect, on_disk
+from reasoner.reading.problem import read
+from reasoner.reading.relevance import recognise
 from tests.reasoner.servers import free_port, oxigraph, rdflib_endpoint
 
 PAPER = "https://w3id.org/confab/beverage-serving"
@@ -81,7 +80,7 @@ def test_a_named_graph_per_ontology_lets_one_endpoint_hold_several_scenes(scene:
 
 def load_iri(file: Path) -> list[str]:
     probe = KnowledgeGraph("")
-    from reasoner.graph import read_into
+    from reasoner.graph.knowledge import read_into
 
     read_into(probe, file, "asserted")
     return [str(row[0].value) for row in probe.select("SELECT ?o { ?o a owl:Ontology }") if row[0]]

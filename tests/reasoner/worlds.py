@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from reasoner.graph import KnowledgeGraph, load
+from reasoner.graph.knowledge import KnowledgeGraph, load
 
 HEAD = """
 @prefix : <https://w3id.org/confab/core#> .

@@ -8,7 +8,7 @@ import pytest
 
 import confab
 from planner.plan import Step
-from reasoner.embodiment import Embodiment
+from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import State
 from sim.verify import expectations
 

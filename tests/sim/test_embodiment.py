@@ -1,8 +1,8 @@
 import pyoxigraph as ox
 import pytest
 
-from reasoner.embody import EmbodimentError, read_embodiment
-from reasoner.graph import load
+from reasoner.embodiment.reading import EmbodimentError, read_embodiment
+from reasoner.graph.knowledge import load
 from reasoner.names import local_name
 
 from .conftest import Case

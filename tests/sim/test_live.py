@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 import confab
-from planner.episode import Change, Intervention
+from planner.acting.episode import Change, Intervention
 from planner.plan import Step
 from reasoner.symbols import Fact, Symbol
 from sim.live import LiveWorld

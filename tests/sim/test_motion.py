@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reasoner.embodiment import Embodiment
+from reasoner.embodiment.values import Embodiment
 from sim.attempt import MARGIN
 from sim.collision import Solid, Surroundings, box, read_mover
 from sim.kinematics import read_arm

@@ -1,0 +1,403 @@
+"""Repair: what of a plan is still valid is kept, the rest is planned anew.
+
+The steps that are still to be done are replayed on one table from the situation as it is. A step is
+
+dropped     if what it is for holds already, or isn't wanted any more
+kept        if its primitives still do what they should; else refined anew (by another hand, for instance)
+put off     if it can't be done yet; then so is what concerns the same individuals
+
+What was put off is tried again as long as anything else succeeds. The goals that are open in the end are left to the fast
+planner, on the same table. A hand that stands in the middle of something first finishes it, or is brought to rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
+from time import perf_counter
+
+from planner.hierarchical.planner import plan as fast_plan
+from planner.hierarchical.refinement_cache import Done
+from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled
+from planner.hierarchical.state import Cell, arguments_of, key_of
+from planner.hierarchical.subplans import Effort, LimitError
+from planner.hierarchical.unsolvability import unattainable
+from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
+from reasoner.symbols import FALSE, Problem, State, Symbol
+
+RESTING = Effort(depth=6, expansions=400)
+CLOSE = 1.1
+"""A repair that costs more than replanning by more than this factor gives way to it."""
+
+MOST = 5_000
+"""So many expansions a repair may take, before the whole is planned anew."""
+
+Planner = Callable[[Problem], Outcome]
+
+
+@dataclass(frozen=True)
+class Mended:
+    """What is to be done from now on, and how it came about. `steps` is None if nothing was found."""
+
+    kind: str
+    steps: tuple[Step, ...] | None
+    cost: float
+    seconds: float
+    outcome: Outcome | None = None
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What repair found: the steps, their cost, and the `least` that any plan for the open goals costs."""
+
+    steps: tuple[Step, ...]
+    cost: float
+    least: float
+
+
+def mend(
+    problem: Problem,
+    rest: Sequence[Step],
+    planned: Problem,
+    planner: Planner | None = None,
+    using: Compiled | None = None,
+    in_progress: bool = True,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+) -> Mended:
+    """Return what to do from a situation that isn't the one that a plan was made for.
+
+    Parameters
+    ----------
+    problem : Problem
+        The situation as it is, and the goal as it is now.
+    rest : sequence of Step
+        What was to be done from here on; the first step may be partly done, with only its open sub-steps below it.
+    planned : Problem
+        What `rest` was planned for: the situation that was expected here, and the goal.
+    planner : callable, optional
+        Plans from scratch, from a situation of rest; the fast planner if left out.
+    using : Compiled, optional
+        From `planner.hierarchical.planner.compiled`, for the same domain, individuals and static facts.
+    in_progress : bool
+        Whether the first step of `rest` may be finished as it was planned.
+    limits : Limits
+    """
+    begin = perf_counter()
+    using = using or compiled(problem)
+    repaired = repair(problem, rest, planned, using, in_progress, limits)
+    fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
+    if repaired is not None and not fewer and repaired.cost <= repaired.least:
+        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
+    anew, outcome = replan(problem, planner, using, limits)
+    if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
+        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
+    return Mended("replan", anew, cost(problem, anew or ()), perf_counter() - begin, outcome)
+
+
+def repair(
+    problem: Problem, rest: Sequence[Step], planned: Problem, using: Compiled, in_progress: bool, limits: Limits
+) -> Repaired | None:
+    """Return what is to be done with as much of `rest` as is still valid, or None if that wasn't found.
+
+    The least counts what was planned and isn't touched by the changes, what was in progress, and for each goal that is open the
+    step that achieves it; of the steps that concern one thing that is touched, or that a new step concerns, one.
+    """
+    wanted = planned.goal
+    touched = changed_individuals(planned, problem)
+    call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
+    call.proved = True  # what is impossible is proved by replanning
+    pending = list(rest)
+    try:
+        if not _at_rest(call):
+            if in_progress:
+                _finish(call, pending, wanted)
+            else:
+                del pending[:1]
+            settle(call)
+        finished = len(call.steps)
+        begun = finished if rest and touched.isdisjoint(rest[0].arguments) else 0
+        _restore(call, pending)
+        restored = len(call.steps)
+        whole = _replay(call, pending, wanted)
+        kept = range(restored, len(call.steps)) if whole else ()  # where nothing is dropped, all has its purpose
+        begun = begun if whole else 0
+        settle(call)
+        solved = not unattainable(call.segments) and call.serialise()
+    except (LimitError, UnsolvableError):
+        solved = False
+    if not solved:
+        return None
+    costs = [_cost(call, done) for done in call.steps]
+    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
+    needed |= {i for i in _last_steps(call) if i < begun or i >= finished}
+    old, first = {(step.behavior, step.arguments) for step in rest}, call.program.levels[0]
+    new = [step[2] for step in call.steps if step[0] == first and (step[1], step[2]) not in old]
+    for individual in touched.union(*new):  # its steps could perhaps be done as one
+        together = [i for i in needed if individual in call.steps[i][2]]
+        needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
+    return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
+
+
+def changed_individuals(planned: Problem, now: Problem) -> set[str]:
+    """Return the individuals that are named by what differs between two situations and their goals."""
+    touched: set[str] = set()
+    for old, new in ((planned.initial, now.initial), (planned.goal, now.goal)):
+        for symbol in old.keys() | new.keys():
+            was, is_ = old.get(symbol, FALSE), new.get(symbol, FALSE)
+            if was != is_:
+                touched.update((*symbol.arguments, was, is_))
+    return touched
+
+
+def replan(
+    problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
+) -> tuple[tuple[Step, ...] | None, Outcome]:
+    """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
+    first: tuple[Step, ...] = ()
+    call = _call(problem, using, limits)
+    if not _at_rest(call):
+        try:
+            settle(call)
+        except LimitError as limit:
+            return None, Outcome(Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}"))
+        first, problem = call.tree().steps, replace(problem, initial=call.table.state())
+    outcome = planner(problem) if planner is not None else fast_plan(problem, limits=limits, using=using)
+    if outcome.plan is None:
+        return None, outcome
+    return renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps, outcome
+
+
+def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
+    """Return the goals that can't hold because what they are about is gone, or lies where no fact speaks of it, and why."""
+    return [
+        (
+            symbol,
+            Reason(
+                f"{symbol} = {value} is wanted, but {symbol.arguments[0]} isn't to be seen", (*symbol.arguments, value)
+            ),
+        )
+        for symbol, value in problem.goal.items()
+        if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean
+    ]
+
+
+def settle(call: Call) -> bool:
+    """Bring everything that the upper levels don't know of to rest, the lowest level first; whether that succeeded.
+
+    What a hand holds goes where it is wanted if that takes no longer, else to any place.
+    """
+    levels, domain = call.program.levels, call.problem.domain
+    for level in reversed(levels[1:]):
+        targets = {
+            (name, key): situation.rest
+            for name, situation in domain.situations.items()
+            if situation.level == level and situation.rest is not None
+            for key, value in call.table.now[name].items()
+            if value != situation.rest
+        }
+        if not targets:
+            continue
+        hidden = {
+            (name, key): call.goal[name, key]
+            for name, cells in call.table.now.items()
+            for key, value in cells.items()
+            if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
+        }
+        found = (call.segments.find(level, {**targets, **hidden}, {}, RESTING) if hidden else None) or (
+            call.segments.find(level, targets, {}, RESTING)
+        )
+        for name, arguments in found or ():
+            done = call.refiner.do(level, name, arguments)
+            if done is None:
+                return False
+            call.steps.append(done)
+    return _at_rest(call)
+
+
+def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
+    """Return how many primitives of the old steps are dropped, and how many of the new ones are added.
+
+    What is done in another order is dropped at one place and added at the other: the two sequences are compared.
+    """
+    before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
+    same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
+    return len(before) - same, len(after) - same
+
+
+def cost(problem: Problem, steps: Iterable[Step]) -> float:
+    """Return what the primitives of some steps cost."""
+    behaviors = problem.domain.behaviors
+    return sum(behaviors[step.behavior].cost for step in Plan(tuple(steps)).primitives)
+
+
+def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
+    """Return steps with their paths counted from `first` on."""
+    return tuple(
+        replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
+        for i, step in enumerate(steps, first)
+    )
+
+
+# -------------------------------------------------------------------------------------------------------------- replaying
+
+
+def _finish(call: Call, pending: list[Step], wanted: State) -> None:
+    """Do the open steps of what is in progress, up to a situation of rest, and take them from `pending`.
+
+    If they don't lead to one, or to what isn't wanted any more, nothing is done, and the first of them is given up.
+    """
+    mark = len(call.table.trail)
+    for count, step in enumerate(pending, 1):
+        done = _redo(call, step, begun=count == 1)
+        if done is None:
+            break
+        call.steps.append(done)
+        if _at_rest(call):
+            if _useless(call, call.table.since(mark), wanted):
+                break  # nor is it to be finished if it changes nothing that the upper levels know of
+            del pending[:count]
+            return
+    call.table.undo(mark)
+    call.steps.clear()
+    del pending[:1]
+
+
+def _restore(call: Call, pending: Sequence[Step]) -> None:
+    """Achieve first, where one step does it, the open goals that no pending step is for: something happened to them."""
+    planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
+    orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
+    before = call.order() if len(orphans) > 1 else {}
+    for cell in orphans:
+        if not any(other in orphans for other in before.get(cell, ())):
+            call.achieve(call.program.levels[0], cell, EASY)
+
+
+def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
+    """Do as many of the pending steps as can be done, in their order where that is possible; whether none was dropped."""
+    progress, whole = True, True
+    while progress and pending:
+        progress, put_off, waiting = False, list[Step](), set[str]()
+        for step in pending:
+            call.segments.check_time()
+            if not waiting.isdisjoint(step.arguments):
+                put_off.append(step)
+                continue
+            effects = _effects(call, step.behavior, step.arguments, step.bindings)
+            if _useless(call, effects, wanted):
+                _achieve_instead(call, effects)
+                whole = False
+                continue
+            if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
+                whole = False
+                continue
+            done = _redo(call, step) or call.refiner.do(step.level, step.behavior, step.arguments)
+            if done is None:
+                put_off.append(step)
+                waiting.update(individual for _, key in effects for individual in arguments_of(key))
+            else:
+                call.steps.append(done)
+                progress = True
+        pending[:] = put_off
+    return whole and not pending
+
+
+def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
+    """Do a step by the very primitives that it has, or return None with the table as it was.
+
+    Of a step that was `begun` before, only what is below it counts; any other must be applicable, and do what it promises.
+    """
+    mark = len(call.table.trail)
+    applicable = call.segments.forward[step.behavior](*step.arguments)
+    if applicable is None and not (begun and step.steps):
+        return None
+    if not step.steps:
+        assert applicable is not None
+        call.refiner.apply(applicable[1])
+        return step.level, step.behavior, step.arguments, applicable[0], ()
+    below = []
+    for position, child in enumerate(step.steps):
+        done = _redo(call, child, begun and position == 0)
+        if done is None:
+            call.table.undo(mark)
+            return None
+        below.append(done)
+    now = call.table.now
+    if not begun and applicable is not None and any(now[s].get(k, FALSE) != value for s, k, value in applicable[1]):
+        call.table.undo(mark)
+        return None
+    names = call.program.variables[step.behavior]
+    bindings = applicable[0] if applicable and not begun else tuple(step.bindings.get(name, "") for name in names)
+    return step.level, step.behavior, step.arguments, bindings, tuple(below)
+
+
+def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
+    """Where another value is wanted now than the one that a step gives, give that, if one step does it."""
+    for cell in effects:
+        if cell in call.goal and not call.met(cell):
+            call.achieve(call.program.levels[0], cell, EASY)
+
+
+def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
+    """Whether all that is changed, as far as the first level knows of it, was wanted once and isn't any more."""
+    situations, first = call.problem.domain.situations, call.program.levels[0]
+    return all(
+        call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value
+        for (name, key), value in effects.items()
+        if situations[name].level <= first
+    )
+
+
+def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapping[str, str]) -> dict[Cell, str]:
+    """Return the values that a step gives to symbols, whether it is applicable or not."""
+    lifted = call.problem.domain.behaviors[behavior]
+    env = {p.name: argument for p, argument in zip(lifted.parameters, arguments, strict=True)}
+    env |= {f"?{name}": value for name, value in bindings.items()}
+    return {
+        (effect.situation, key_of(tuple(env.get(a, a) for a in effect.arguments))): env.get(effect.value, effect.value)
+        for effect in lifted.effects
+        if not effect.when
+    }
+
+
+def _at_rest(call: Call) -> bool:
+    """Whether everything that the uppermost level doesn't know of rests."""
+    return all(
+        value == situation.rest
+        for name, situation in call.problem.domain.situations.items()
+        if situation.level > call.program.levels[0] and situation.rest is not None
+        for value in call.table.now[name].values()
+    )
+
+
+def _cost(call: Call, done: Done) -> float:
+    """Return what the primitives of a step cost."""
+    below = done[4]
+    return sum([_cost(call, child) for child in below]) if below else call.problem.domain.behaviors[done[1]].cost
+
+
+def _last_steps(call: Call) -> set[int]:
+    """Return the positions of the steps that are the last to give a goal that was open its value.
+
+    Steps below the first level that follow each other serve one purpose.
+    """
+    start, variables, first = call.problem.initial, call.program.variables, call.program.levels[0]
+    last: dict[Cell, int] = {}
+    together: dict[int, set[int]] = {}
+    before: set[int] = set()
+    for position, (level, name, arguments, bindings, _) in enumerate(call.steps):
+        for cell in _effects(call, name, arguments, dict(zip(variables[name], bindings, strict=False))):
+            last[cell] = position
+        before = {*before, position} if level > first else set()
+        together[position] = before or {position}
+    found: set[int] = set()
+    for symbol, value in call.problem.goal.items():
+        cell = symbol.situation, key_of(symbol.arguments)
+        if cell in last and start.get(symbol, FALSE) != value:
+            found |= together[last[cell]]
+    return found
+
+
+def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
+    deadline = None if limits.seconds is None else perf_counter() + limits.seconds
+    return Call(problem, using, deadline, None, limits.expansions)

@@ -1,0 +1,142 @@
+"""A world of symbols: behaviours do exactly what they promise, unless somebody interferes or a fault is planted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from planner.acting.episode import Change, Intervention
+from planner.plan import Step
+from planner.validation import successor
+from reasoner.symbols import Problem, State, Symbol
+
+
+@dataclass(frozen=True)
+class Said:
+    """The symbolic world's verdict."""
+
+    ok: bool
+    code: str | None = None
+    objects: tuple[str, ...] = ()
+    message: str = ""
+
+
+DONE = Said(True)
+Fault = Callable[[Step, State], Said | None]
+"""Decides whether a primitive fails in a situation, and how; for trials."""
+
+
+class SymbolicWorld:
+    """A world in which every primitive takes its time and then has its effects.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its initial state is the world's.
+    seconds_of : mapping of behaviour to seconds
+        How long each takes; a second if not said.
+    fault : callable, optional
+    """
+
+    def __init__(
+        self, problem: Problem, seconds_of: Mapping[str, float] | None = None, fault: Fault | None = None
+    ) -> None:
+        self.problem = problem
+        self.state: dict[Symbol, str] = dict(problem.initial)
+        self.seconds = 0.0
+        self._seconds_of = dict(seconds_of or {})
+        self._fault = fault
+        self._waiting: list[Intervention] = []
+
+    def observe(self) -> State:
+        """Return the whole state."""
+        return dict(self.state)
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of what shall happen at a time."""
+        self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
+
+    def execute(self, step: Step) -> Said:
+        """Carry out a primitive; what happens in the meantime stops it if its precondition is lost."""
+        end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
+        disturbed = False
+        while self._waiting and (self._waiting[0].at or 0.0) < end:
+            happening = self._waiting.pop(0)
+            self.seconds = max(self.seconds, happening.at or 0.0)
+            if happening.of_world:
+                self.disturb(happening)
+                disturbed = True
+        behavior = self.problem.domain.behaviors[step.behavior]
+        after = successor(self.problem, behavior, step.arguments, self.state)
+        if after is None:
+            lost = "its precondition was lost in the meantime" if disturbed else "its precondition doesn't hold"
+            return Said(False, "interrupted" if disturbed else "not applicable", step.arguments, lost)
+        self.seconds = end
+        fault = self._fault(step, self.state) if self._fault is not None else None
+        if fault is not None:
+            return fault
+        self.state = after
+        return DONE
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention happen."""
+        if intervention.change is Change.ADD:
+            self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
+        self.state = disturbed(self.problem, self.state, intervention)
+
+
+def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
+    """Return the state after somebody has changed the world.
+
+    An object that is moved or taken away is let go: a hand that held it rests, and one that was at it stays where it was.
+    """
+    after = dict(state)
+    if intervention.change is Change.REMOVE:
+        for symbol in state:
+            if symbol.arguments[0] == intervention.individual:
+                del after[symbol]
+        _let_go(problem, state, after, intervention.individual)
+    for fact in intervention.facts:
+        if state.get(fact.symbol) != fact.value and _is_whereabouts(problem, fact.symbol.situation):
+            _let_go(problem, state, after, fact.symbol.arguments[0])
+        after[fact.symbol] = fact.value
+    return after
+
+
+def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
+    """Take an individual out of the values of others: where it was if that can be said of them, else their rest."""
+    own = [value for symbol, value in state.items() if symbol.arguments[0] == individual]
+    for symbol, value in state.items():
+        if value == individual and symbol in after:
+            situation = problem.domain.situations[symbol.situation]
+            possible = problem.classes.get(situation.range, ())
+            instead = next((v for v in own if v in possible), situation.rest)
+            if instead is None:
+                del after[symbol]
+            else:
+                after[symbol] = instead
+
+
+def _is_whereabouts(problem: Problem, situation: str) -> bool:
+    """Whether a situation type shares values with another one: what changes it, changes what others are at."""
+    own = set(problem.classes.get(problem.domain.situations[situation].range, ()))
+    return any(
+        own & set(problem.classes.get(other.range, ()))
+        for other in problem.domain.situations.values()
+        if other.name != situation and not other.boolean
+    )
+
+
+def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
+    """Return the problem with one more individual, which is counted last in its classes."""
+    kinds, waiting = {kind}, [kind]
+    while waiting:
+        for parent in problem.parents.get(waiting.pop(), ()):
+            if parent not in kinds:
+                kinds.add(parent)
+                waiting.append(parent)
+    classes = {
+        name: (*members, individual) if name in kinds and individual not in members else members
+        for name, members in problem.classes.items()
+    }
+    return replace(problem, classes=classes)

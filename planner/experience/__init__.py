@@ -1,0 +1,1 @@
+"""Experience at the planner's side: what is counted, how it judges, and the search that it leads."""

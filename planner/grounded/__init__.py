@@ -1,0 +1,1 @@
+"""One level grounded to bits: reachability, operators, heuristic search, all of its states."""

@@ -1,0 +1,227 @@
+"""The flat core: one level of a problem, grounded and searched without hierarchy.
+
+It plans imported domains that have one level only, and is the last resort where refinement fails.
+
+state       a Python integer, a bit per fact
+h           relaxed-plan heuristic of a state (`planner.grounded.hff`)
+best        least h so far; a lower one boosts the preferred operators and is followed by a lookahead
+open        two queues of expanded nodes, by h: with all of a node's operators, with its preferred ones
+
+Lazy greedy best-first search with preferred operators: Richter and Helmert, "Preferred operators and deferred
+evaluation in satisficing planning", ICAPS 2009. Lookahead: Vidal, "A lookahead strategy for heuristic search
+planning", ICAPS 2004. What is found is made shorter by `planner.grounded.plan_windows`.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from time import perf_counter
+
+from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.hff import Evaluate
+from planner.grounded.hff_numba import automatic
+from planner.grounded.plan_windows import shorter
+from planner.grounded.task import Task
+from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from reasoner.symbols import Problem, State
+
+BOOST = 1000  # turns that the preferred operators get on a new best h
+ALONE = 1000  # evaluations before the search without lookahead begins to get its share
+SHARE = 3  # of so many evaluations, it gets one
+FAR = 1 << 40  # more than any h
+SHORTEN, SHORTENING = 500_000, 20  # work on the finished plan: so much, and a twentieth of the search's
+
+Prefer = Callable[[int, list[int]], list[int]]
+"""Puts a state's preferred operators in order, the best first; this is where cogency comes in."""
+
+
+@dataclass(frozen=True)
+class Flat:
+    """What a flat search found: `plan`, operators of the task, is there exactly if `status` is solved."""
+
+    status: Status
+    plan: tuple[int, ...] = ()
+    reason: Reason | None = None
+    counts: Counts = field(default_factory=Counts)
+
+
+def plan_level(
+    problem: Problem,
+    level: int | None = None,
+    initial: State | None = None,
+    goal: State | None = None,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    prefer: Callable[[Task], Prefer] | None = None,
+) -> Outcome:
+    """Plan one level of a problem, the lowest if none is given.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : int, optional
+    initial, goal : State, optional
+        In place of the problem's own.
+    limits : Limits
+        The time includes grounding.
+    prefer : function of a task to a function of a state and its preferred operators, optional
+        Puts them in order, the best first.
+
+    Returns
+    -------
+    Outcome
+        Unsolvable is said of this level only.
+    """
+    began = perf_counter()
+    deadline = None if limits.seconds is None else began + limits.seconds
+    level = problem.domain.levels[-1] if level is None else level
+    try:
+        task = ground(problem, level, initial, goal, deadline=deadline)
+    except (TooLargeError, OutOfTimeError) as error:
+        return Outcome(Status.GAVE_UP, reason=Reason(f"grounding: {error}"), seconds=perf_counter() - began)
+    if isinstance(task, Reason):
+        return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
+    found = search(task, limits, deadline, prefer=prefer(task) if prefer else None)
+    plan = Plan(task.steps(found.plan)) if found.status is Status.SOLVED else None
+    return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began)
+
+
+def search(
+    task: Task,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    deadline: float | None = None,
+    evaluate: Evaluate | None = None,
+    prefer: Prefer | None = None,
+    found: Callable[[Sequence[int]], None] | None = None,
+) -> Flat:
+    """Search a plan for a grounded task.
+
+    Three searches take turns: with lookahead; without it, since it can lead astray; by open goals first, and then h. The
+    same limit of expansions gives the same plan; a deadline can only cut the search short.
+
+    Parameters
+    ----------
+    task : Task
+    limits : Limits
+        Their seconds are the caller's to turn into a deadline.
+    deadline : float, optional
+        On the clock of `time.perf_counter`.
+    evaluate : function of a state, optional
+        In place of h_FF, plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`).
+    prefer : function of a state and its preferred operators, optional
+    found : function of a plan, optional
+        Called with the first plan, before it is made shorter.
+    """
+    counts = Counts()
+    if task.initial & task.goal == task.goal:
+        return Flat(Status.SOLVED, (), None, counts)
+    evaluate = evaluate or automatic(task)
+    kinds = ((True, False), (False, False), (True, True))  # lookahead, open goals first
+    searches = [_best_first(task, evaluate, counts, prefer, *kind) for kind in kinds]
+    turns = 0
+    while True:
+        turns += 1
+        try:
+            next(searches[1 + turns // SHARE % 2 if turns > ALONE and turns % SHARE == 0 else 0])
+        except StopIteration as done:
+            if done.value is None:
+                what = f"all {counts.expanded} states that can be reached were searched"
+                return Flat(Status.UNSOLVABLE, (), Reason(f"no plan exists: {what}"), counts)
+            if found:
+                found(done.value)
+            work = SHORTEN + counts.evaluated * len(task.owners) // SHORTENING
+            return Flat(Status.SOLVED, tuple(shorter(task, done.value, work, deadline)), None, counts)
+        if counts.expanded >= limits.expansions:
+            return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
+        if deadline is not None and perf_counter() > deadline:
+            return Flat(Status.GAVE_UP, (), Reason("the time limit came first"), counts)
+
+
+def _best_first(
+    task: Task, evaluate: Evaluate, counts: Counts, prefer: Prefer | None, lookahead: bool, goals_first: bool
+) -> Generator[None, None, list[int] | None]:
+    """Search greedily; yield after each evaluation, return the plan, or None if there is none."""
+    apply, goal = task.applied, task.goal
+    came_from: dict[int, tuple[int, tuple[int, ...]]] = {task.initial: (task.initial, ())}
+    queues: tuple[list[tuple[int, int, int, list[int]]], ...] = (
+        [],
+        [],
+    )  # (h, number, state, operators still to be tried)
+    turns = [0, 0]
+    number, best = 0, 1 << 60
+    waiting = [task.initial]  # states to be evaluated, the last first
+    while True:
+        if not waiting:
+            if not queues[0] and not queues[1]:
+                return None
+            which = int(not queues[0] or (bool(queues[1]) and turns[1] <= turns[0]))
+            turns[which] += 1
+            _, _, state, operators = queues[which][0]
+            operator = operators.pop()
+            if not operators:
+                heapq.heappop(queues[which])
+            after = apply(state, operator)
+            counts.generated += 1
+            if after is None or after in came_from:
+                continue
+            came_from[after] = (state, (operator,))
+            waiting.append(after)
+        state = waiting.pop()
+        if state & goal == goal:
+            return _path(came_from, state)
+        evaluation = evaluate(state)
+        counts.evaluated += 1
+        yield
+        if evaluation is None:
+            continue
+        counts.expanded += 1
+        h, relaxed_plan, applicable = evaluation
+        if goals_first:
+            h += FAR * (goal & ~state).bit_count()
+        number += 1
+        possible = set(applicable)
+        preferred = [operator for operator in relaxed_plan if operator in possible]
+        if prefer and len(preferred) > 1:
+            preferred = prefer(state, preferred)
+        if applicable:
+            rest = possible.difference(preferred)
+            heapq.heappush(queues[0], (h, number, state, [*sorted(rest, reverse=True), *preferred[::-1]]))
+        if preferred:
+            heapq.heappush(queues[1], (h, number, state, preferred[::-1]))
+        if h < best:
+            best = h
+            turns[1] -= BOOST
+            if lookahead:
+                after, path = _ahead(task, state, relaxed_plan)
+                if len(path) > 1 and after not in came_from:
+                    came_from[after] = (state, tuple(path))
+                    waiting.append(after)
+
+
+def _ahead(task: Task, state: int, relaxed_plan: Sequence[int]) -> tuple[int, list[int]]:
+    """Apply a relaxed plan as far as it goes; return the state reached and the operators applied."""
+    path: list[int] = []
+    left = list(relaxed_plan)
+    while True:
+        stuck = []
+        for operator in left:
+            after = task.applied(state, operator)
+            if after is None:
+                stuck.append(operator)
+            elif after != state:
+                state = after
+                path.append(operator)
+        if len(stuck) == len(left):
+            return state, path
+        left = stuck
+
+
+def _path(came_from: dict[int, tuple[int, tuple[int, ...]]], state: int) -> list[int]:
+    parts: list[tuple[int, ...]] = []
+    while True:
+        before, operators = came_from[state]
+        if not operators:
+            return [operator for part in reversed(parts) for operator in part]
+        parts.append(operators)
+        state = before

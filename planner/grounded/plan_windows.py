@@ -1,0 +1,363 @@
+"""Shorter plans: a window of steps is replaced where a bounded search finds fewer that do what the rest of the plan needs.
+
+window      consecutive steps, from the state before them to the bits that the steps behind it (and the goal) need
+operators   those nearest to the window: reachable early from its start and wanted early by its end
+search      A* with h_FF on these operators alone; what can't become shorter by h is cut off
+order       windows are tried on the plan as it is and regrouped, so that a step stands behind one that it depends on
+
+Work is counted in operators looked at and never in seconds, so the same plan is improved alike on any machine.
+
+Action elimination (`shortened`): Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
+2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.grounded.hff import heuristic
+from planner.grounded.joins import Ints
+from planner.grounded.task import Change, Grouped, Task
+
+SIZES = (8, 16)  # steps of a window
+OPERATORS = 150  # of a window's search
+EVALUATIONS = 100  # of a window's search
+LOOK = 50  # operators ranked for what one evaluated costs
+
+
+def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
+    """Return a plan with no more steps than a given one, by replacing windows of it.
+
+    Parameters
+    ----------
+    task : Task
+    plan : sequence of int
+        Operators that lead from the task's initial state to its goal.
+    work : int
+        Operators that may be looked at, half a million to a million per second.
+    deadline : float, optional
+        On the clock of `time.perf_counter`.
+    """
+    windows = _Windows(task, work, deadline)
+    best = shortened(task, plan, deadline)
+    while True:
+        before = len(best)
+        for size in SIZES:
+            best = windows.pass_over(best, size)
+            best = windows.pass_over(regrouped(task, best), size)
+        best = shortened(task, best, deadline)
+        if len(best) == before or windows.over:
+            return best
+
+
+def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
+    """Return a plan without steps that the goal doesn't need, nor steps that only those need."""
+    plan = list(plan)
+    state, i = task.initial, 0
+    while i < len(plan):
+        if deadline is not None and perf_counter() > deadline:
+            break
+        trial, kept = state, []
+        for operator in plan[i + 1 :]:
+            after = task.applied(trial, operator)
+            if after is not None:
+                trial = after
+                kept.append(operator)
+        if trial & task.goal == task.goal:
+            plan[i:] = kept
+        else:
+            after = task.applied(state, plan[i])
+            assert after is not None
+            state, i = after, i + 1
+    return plan
+
+
+def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
+    """Return a plan's steps in an order in which a step stands behind the latest that it depends on, as far as that leads on.
+
+    Steps that depend on one another, or of which one would undo what the other needs, keep their order.
+    """
+    n = len(plan)
+    states = _states(task, plan)
+    after: list[set[int]] = [set() for _ in range(n)]
+    setter: dict[int, int] = {}
+    readers: dict[int, list[int]] = {}
+    clearer: dict[int, int] = {}
+    causes: list[set[int]] = [set() for _ in range(n)]
+    for i, operator in enumerate(plan):
+        precondition, changes = task.known(operator)
+        need, clear, set_ = precondition, 0, 0
+        for when, c, s in changes:
+            if states[i] & when == when:
+                need |= when
+                clear |= c
+                set_ |= s
+        for bit in _bits(need):
+            if bit in setter:
+                after[setter[bit]].add(i)
+                causes[i].add(setter[bit])
+            readers.setdefault(bit, []).append(i)
+        for bit in _bits(clear):
+            for r in readers.pop(bit, ()):
+                if r != i:
+                    after[r].add(i)
+            if bit in setter and setter[bit] != i:
+                after[setter[bit]].add(i)
+            clearer[bit] = i
+        for bit in _bits(set_):
+            if bit in clearer and clearer[bit] != i:
+                after[clearer[bit]].add(i)
+            setter[bit] = i
+    open_ = [0] * n
+    for followers in after:
+        for f in followers:
+            open_[f] += 1
+    ready = [i for i in range(n) if not open_[i]]
+    placed: dict[int, int] = {}
+    order: list[int] = []
+    while ready:
+        i = max(ready, key=lambda i: (max((placed[c] for c in causes[i]), default=-1), -i))
+        ready.remove(i)
+        placed[i] = len(order)
+        order.append(i)
+        for f in after[i]:
+            open_[f] -= 1
+            if not open_[f]:
+                ready.append(f)
+    found = [plan[i] for i in order]
+    return found if _leads(task, task.initial, found) else list(plan)
+
+
+def _states(task: Task, plan: Sequence[int]) -> list[int]:
+    """Return the states that a plan goes through."""
+    found = [task.initial]
+    for operator in plan:
+        after = task.applied(found[-1], operator)
+        assert after is not None
+        found.append(after)
+    return found
+
+
+def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
+    """Return whether a plan leads from a state to the goal."""
+    for operator in plan:
+        after = task.applied(state, operator)
+        if after is None:
+            return False
+        state = after
+    return state & task.goal == task.goal
+
+
+@dataclass
+class _Windows:
+    """What the windows of one task share; `work` counts down."""
+
+    task: Task
+    work: int
+    deadline: float | None
+    failed: set[tuple[int, int, int]] = field(default_factory=set)
+    """Where nothing shorter was found: state, what was wanted, steps."""
+
+    @property
+    def over(self) -> bool:
+        """Whether no more work may be done."""
+        return self.work <= 0 or (self.deadline is not None and perf_counter() > self.deadline)
+
+    def pass_over(self, plan: list[int], size: int) -> list[int]:
+        """Return the plan after one pass of windows, half overlapping."""
+        states, needed = _states(self.task, plan), self.needed(plan)
+        start = 0
+        while start < len(plan) - 1 and not self.over:
+            end = min(start + size, len(plan))
+            found = self.replacement(plan[start:end], states[start], needed[end] & states[end])
+            if found is not None and _leads(self.task, states[start], [*found, *plan[end:]]):
+                plan[start:end] = found
+                states, needed = _states(self.task, plan), self.needed(plan)
+                start = max(0, start - size // 2)
+                continue
+            if end == len(plan):
+                break
+            start += size // 2
+        return plan
+
+    def needed(self, plan: Sequence[int]) -> list[int]:
+        """Return for each position the bits that the steps from there on need, the goal included."""
+        states = _states(self.task, plan)
+        wanted = self.task.goal
+        found = [wanted]
+        for state, operator in zip(reversed(states[:-1]), reversed(plan), strict=True):
+            precondition, changes = self.task.known(operator)
+            more = precondition
+            for when, _, set_ in changes:
+                if state & when == when and set_ & wanted:
+                    more |= when
+                    wanted &= ~set_
+            wanted |= more
+            found.append(wanted)
+        return found[::-1]
+
+    def replacement(self, steps: list[int], state: int, wanted: int) -> list[int] | None:
+        """Search fewer steps from a state to what is wanted; what is found is right as far as the window's operators tell."""
+        if (state, wanted, len(steps)) in self.failed:
+            return None
+        operators = self.near(steps, state, wanted)
+        task = self.part(operators, state, wanted)
+        found = self.search(task, len(steps))
+        if found is None:
+            self.failed.add((state, wanted, len(steps)))
+            return None
+        return [operators[operator] for operator in found]
+
+    def search(self, task: Task, limit: int) -> list[int] | None:
+        """Search a plan with fewer steps than a limit: A*, cut off where g + h reaches the limit."""
+        evaluate, wanted = heuristic(task), task.goal
+        entries: list[tuple[int, int, int, int, list[int]]] = []
+        came_from: dict[int, tuple[int, int]] = {}
+        g_of = {task.initial: 0}
+        waiting = [task.initial]
+        number = 0
+        while number < EVALUATIONS:
+            for state in waiting:
+                number += 1
+                evaluation = evaluate(state)
+                if evaluation is not None and g_of[state] + evaluation[0] < limit:
+                    heapq.heappush(entries, (g_of[state] + evaluation[0], evaluation[0], number, state, evaluation[2]))
+            if not entries:
+                break
+            _, _, _, before, applicable = heapq.heappop(entries)
+            g = g_of[before] + 1
+            waiting = []
+            for operator in applicable:
+                after = task.applied(before, operator)
+                if after is None or g_of.get(after, limit) <= g:
+                    continue
+                came_from[after], g_of[after] = (before, operator), g
+                if after & wanted == wanted:
+                    found = []
+                    while after != task.initial:
+                        after, step = came_from[after]
+                        found.append(step)
+                    self.work -= number * len(task.owners)
+                    return found[::-1]
+                waiting.append(after)
+        self.work -= number * len(task.owners)
+        return None
+
+    @cached_property
+    def arrays(self) -> tuple[Ints, Ints, Ints]:
+        """Of the relaxed operators: owner, and row per need and per add."""
+        task = self.task
+        number = np.arange(len(task.owners))
+        return (
+            np.array(task.owners, np.int64),
+            np.repeat(number, np.diff(task.needs.starts)),
+            np.repeat(number, np.diff(task.adds.starts)),
+        )
+
+    def flags(self, bits: int) -> NDArray[np.bool_]:
+        """Return for each bit whether it is set."""
+        packed = np.frombuffer(bits.to_bytes((self.task.size + 7) // 8, "little"), np.uint8)
+        return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
+
+    def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
+        """Return the operators nearest to a window, in ascending order, its own among them."""
+        task, far = self.task, 1000
+        owners, _, _ = self.arrays
+        self.work -= len(owners) // LOOK
+        at_first = self.flags(state)
+        forward = np.full(len(owners), far)
+        known = at_first.copy()
+        for depth in range(len(steps)):
+            sums = np.concatenate([[0], np.cumsum(known[task.needs.items])])
+            ready = (np.diff(sums[task.needs.starts]) == np.diff(task.needs.starts)) & (forward == far)
+            if not ready.any():
+                break
+            forward[ready] = depth
+            known[task.adds.items[ready[self.arrays[2]]]] = True
+        lost = 0
+        for operator in steps:
+            for _, cleared, _ in task.known(operator)[1]:
+                lost |= cleared
+        target = self.flags(wanted & (~state | lost))
+        backward = np.full(len(owners), far)
+        later = np.zeros(task.size, bool)
+        for depth in range(len(steps)):
+            sums = np.concatenate([[0], np.cumsum(target[task.adds.items])])
+            helps = (np.diff(sums[task.adds.starts]) > 0) & (backward == far) & (forward < far)
+            target |= later
+            later[:] = False
+            if helps.any():
+                backward[helps] = depth
+                new = np.zeros(task.size, bool)
+                new[task.needs.items[helps[self.arrays[1]]]] = True
+                target |= new & ~at_first
+                later = new & at_first
+        score = forward + backward
+        order = np.argsort(score, kind="stable")
+        order = order[score[order] < far]
+        chosen = dict.fromkeys(steps)
+        for operator in owners[order].tolist():
+            if len(chosen) >= OPERATORS:
+                break
+            if operator >= 0:
+                chosen[operator] = None
+        return sorted(chosen)
+
+    def part(self, operators: Sequence[int], state: int, wanted: int) -> Task:
+        """Return the task of getting from a state to what is wanted by some operators; it has only the bits that they need."""
+        task = self.task
+        place = {operator: i for i, operator in enumerate(operators)}
+        rows = [*operators, *(r for r in self.beside if task.owners[r] < 0 or task.owners[r] in place)]
+        needs = [task.needs[r] for r in rows]
+        derived = sum(bit for bit, _ in task.derived)
+        bits = sorted({bit for found in needs for bit in found}.union(_bits(wanted | derived)))
+        new = {bit: i for i, bit in enumerate(bits)}
+        mask = sum(1 << bit for bit in bits)
+
+        def small(state: int) -> int:
+            return sum(1 << new[bit] for bit in _bits(state & mask))
+
+        def change(operator: int) -> tuple[int, tuple[Change, ...]]:
+            precondition, changes = task.known(operators[operator])
+            return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in changes)
+
+        return replace(
+            task,
+            size=len(bits),
+            initial=small(state),
+            goal=small(wanted),
+            costs=[task.costs[operator] for operator in operators],
+            owners=[place.get(task.owners[r], -1) for r in rows],
+            needs=_grouped([[new[bit] for bit in found] for found in needs]),
+            adds=_grouped([[new[bit] for bit in task.adds[r] if bit in new] for r in rows]),
+            derived=tuple((small(bit), tuple(map(small, groups))) for bit, groups in task.derived),
+            change=change,
+            describe=lambda operator: task.describe(operators[operator]),
+            _changes={},
+        )
+
+    @cached_property
+    def beside(self) -> list[int]:
+        """The relaxed operators that are conditional effects or derived bits."""
+        return list(range(len(self.task), len(self.task.owners)))
+
+
+def _bits(mask: int) -> list[int]:
+    found = []
+    while mask:
+        low = mask & -mask
+        found.append(low.bit_length() - 1)
+        mask ^= low
+    return found
+
+
+def _grouped(lists: Sequence[Sequence[int]]) -> Grouped:
+    starts = np.concatenate([[0], np.cumsum([len(found) for found in lists])]).astype(np.int64)
+    return Grouped(starts, np.array([i for found in lists for i in found], np.int64))

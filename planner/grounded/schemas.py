@@ -1,0 +1,248 @@
+"""Behaviours in the form in which they are joined: a conjunction of atoms, filters, and what only a state can decide.
+
+Atom        a table's row has to match it: a positive value or relation, a class
+filter      decided by static knowledge alone, once its variables are bound
+residue     the rest: negated values, disjunctions, "none such that"
+
+A positive `Witness` becomes a variable of its own. Variables that no atom binds are local to the condition they occur
+in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+from planner.paper.transitions import DomainError
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    substituted,
+)
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A row of a table: of a situation type (its arguments, then its value unless it is boolean), a relation or a class."""
+
+    table: tuple[str, str]
+    terms: tuple[str, ...]
+    fluent: bool = False
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A behaviour, or one of its conditional effects, as a join.
+
+    `terms` are what tells one operator from another; other variables are joined over and dropped. A conditional
+    effect has the terms of its behaviour first. `effects` are pairs of position and effect, in the order in which
+    they are made.
+    """
+
+    behavior: Behavior
+    terms: tuple[str, ...]
+    atoms: tuple[Atom, ...]
+    filters: tuple[Condition, ...]
+    residue: tuple[Condition, ...]
+    kinds: Mapping[str, str]
+    effects: tuple[tuple[int, ValueEffect], ...]
+    conditional: bool = False
+
+
+def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed: frozenset[str]) -> list[Schema]:
+    """Return the schema of a behaviour, followed by one for each of its conditional effects.
+
+    Parameters
+    ----------
+    behavior : Behavior
+    situations : mapping of name to SituationType
+    changed : set of situation types
+        Those that some behaviour of the level changes; the others are static there.
+
+    Raises
+    ------
+    DomainError
+        Nothing determines a variable that an effect or a negated condition names.
+    """
+    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    parameters = tuple(parameter.name for parameter in behavior.parameters)
+    # What becomes false does so first: an action that makes the same thing true and false makes it true, as in PDDL.
+    effects = list(enumerate(sorted(behavior.effects, key=lambda effect: effect.value != FALSE)))
+    compile_ = _Compiler(situations, changed, kinds)
+    base = compile_.schema(behavior, parameters, behavior.preconditions, tuple(e for e in effects if not e[1].when))
+    found = [base]
+    for position, effect in effects:
+        if effect.when:
+            own = set().union(*map(variables, effect.when)) - set(base.terms)
+            names = {name: f"?*{name[1:]}" for name in own}  # not those that a precondition has of the same name
+            compile_.kinds |= {names[name]: kinds[name] for name in sorted(own)}
+            conditions = (*behavior.preconditions, *(substituted(c, names) for c in effect.when))
+            arguments = tuple(names.get(a, a) for a in effect.arguments)
+            renamed = replace(effect, arguments=arguments, value=names.get(effect.value, effect.value))
+            found.append(compile_.schema(behavior, base.terms, conditions, ((position, renamed),), conditional=True))
+    return found
+
+
+@dataclass
+class _Compiler:
+    situations: Mapping[str, SituationType]
+    changed: frozenset[str]
+    kinds: dict[str, str]
+
+    def schema(
+        self,
+        behavior: Behavior,
+        first: tuple[str, ...],
+        conditions: Sequence[Condition],
+        effects: tuple[tuple[int, ValueEffect], ...],
+        conditional: bool = False,
+    ) -> Schema:
+        kinds, fresh = dict(self.kinds), count()
+        plain = [c for c in conditions if not isinstance(c, Witness | AnyOf)]
+        shared = {*first, *(p.name for p in behavior.parameters), *(t for c in plain for t in _own_terms(c))}
+        parts = list(dict.fromkeys(self._flat(conditions, shared, kinds, fresh)))
+        atoms = [atom for part in parts for atom in self._atom(part)]
+        others = [part for part in parts if not list(self._atom(part))]
+        parameters = [parameter.name for parameter in behavior.parameters]
+        bound = dict.fromkeys([*first, *parameters, *(t for atom in atoms for t in atom.terms if _is_variable(t))])
+        atoms += [Atom(("class", kinds[name]), (name,)) for name in bound]
+        filters = [part for part in others if not self._fluent(part)]
+        residue = [part for part in others if self._fluent(part)]
+        for part in others:
+            for name in _required(part):
+                if name not in bound:
+                    raise DomainError(f"{behavior.name}: nothing determines {name}; add a value condition that does")
+        for _, effect in effects:
+            for name in (*effect.arguments, effect.value):
+                if _is_variable(name) and name not in bound:
+                    raise DomainError(f"{behavior.name}: nothing determines {name}, which an effect names")
+        used = {t for atom in atoms if atom.fluent for t in atom.terms}
+        used |= {t for part in residue for t in _terms(part)}
+        used |= {t for _, effect in effects for t in (*effect.arguments, effect.value)}
+        declared = {*self.kinds}
+        terms = [*first, *(name for name in bound if name not in first and (name in used or name in declared))]
+        return Schema(behavior, tuple(terms), tuple(atoms), tuple(filters), tuple(residue), kinds, effects, conditional)
+
+    def _flat(
+        self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
+    ) -> Iterator[Condition]:
+        """Yield the conjuncts, positive witnesses opened up; variables that are not `shared` get names of their own."""
+        for condition in conditions:
+            if isinstance(condition, Witness) and not condition.negated:
+                yield from self._opened(
+                    condition.conditions, {condition.variable: condition.kind}, shared, kinds, fresh
+                )
+            elif isinstance(condition, AnyOf) and not condition.negated and len(condition.alternatives) == 1:
+                yield from self._opened(condition.alternatives[0], {}, shared, kinds, fresh)
+            elif isinstance(condition, ValueCondition):
+                yield self._plain(condition)
+            else:
+                yield condition
+
+    def _opened(
+        self,
+        group: Sequence[Condition],
+        witness: Mapping[str, str],
+        shared: set[str],
+        kinds: dict[str, str],
+        fresh: Iterator[int],
+    ) -> Iterator[Condition]:
+        """Yield the conjuncts of a group, its own variables renamed."""
+        own = {name: kinds[name] for name in sorted(set().union(*map(variables, group)) - shared - witness.keys())} | {
+            **witness
+        }
+        names = {name: f"?{next(fresh)}{name[1:]}" for name in own}
+        kinds |= {names[name]: kind for name, kind in own.items()}
+        yield from (ClassCondition(names[name], kind) for name, kind in own.items())
+        yield from self._flat([substituted(c, names) for c in group], shared | set(names.values()), kinds, fresh)
+
+    def _plain(self, condition: ValueCondition) -> ValueCondition:
+        """Return a condition on a boolean symbol as one on its being true."""
+        if not self.situations[condition.situation].boolean:
+            return condition
+        if condition.value not in (TRUE, FALSE):
+            raise DomainError(f"{condition.situation} is true or false; {condition.value} can't be its value")
+        return replace(condition, value=TRUE, negated=condition.negated is (condition.value == TRUE))
+
+    def _atom(self, condition: Condition) -> Iterator[Atom]:
+        match condition:
+            case ValueCondition(situation, arguments, value, False):
+                terms = arguments if self.situations[situation].boolean else (*arguments, value)
+                yield Atom(("situation", situation), terms, situation in self.changed)
+            case RelationCondition(relation, arguments, False):
+                yield Atom(("relation", relation), arguments)
+            case ClassCondition(term, kind, False):
+                yield Atom(("class", kind), (term,))
+
+    def _fluent(self, condition: Condition) -> bool:
+        return any(isinstance(c, ValueCondition) and c.situation in self.changed for c in walk(condition))
+
+
+def variables(condition: Condition) -> set[str]:
+    """Return the variables that a condition has from outside."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            found = {*arguments, value}
+        case RelationCondition(_, arguments):
+            found = {*arguments}
+        case ClassCondition(term):
+            found = {term}
+        case EqualityCondition(left, right):
+            found = {left, right}
+        case Witness(variable, _, conditions):
+            found = {t for c in conditions for t in variables(c)} - {variable}
+        case AnyOf(alternatives):
+            found = {t for group in alternatives for c in group for t in variables(c)}
+    return {t for t in found if t.startswith("?")}
+
+
+def walk(condition: Condition) -> Iterator[Condition]:
+    """Yield a condition and all conditions inside it."""
+    yield condition
+    for group in _groups(condition):
+        for inner in group:
+            yield from walk(inner)
+
+
+def _groups(condition: Condition) -> tuple[tuple[Condition, ...], ...]:
+    if isinstance(condition, Witness):
+        return (condition.conditions,)
+    return condition.alternatives if isinstance(condition, AnyOf) else ()
+
+
+def _is_variable(term: str) -> bool:
+    return term.startswith("?")
+
+
+def _own_terms(condition: Condition) -> tuple[str, ...]:
+    match condition:
+        case ValueCondition(_, arguments, value):
+            return (*arguments, value)
+        case RelationCondition(_, arguments):
+            return arguments
+        case ClassCondition(term):
+            return (term,)
+        case EqualityCondition(left, right):
+            return (left, right)
+    return ()
+
+
+def _terms(condition: Condition) -> set[str]:
+    """Return every variable in a condition."""
+    return {t for inner in walk(condition) for t in _own_terms(inner) if _is_variable(t)}
+
+
+def _required(condition: Condition) -> set[str]:
+    """Return the variables of a condition that is no group."""
+    return {t for t in _own_terms(condition) if _is_variable(t)}

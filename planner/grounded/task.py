@@ -1,0 +1,141 @@
+"""A grounded task: the symbols of a problem as bits, its behaviours as operators on one Python integer.
+
+==============================  =================================================================
+in `reasoner.symbols`           here
+==============================  =================================================================
+`Fact`                          a bit; one that is always true or never reachable has none
+a fact that must not hold       a bit of its own, its complement, where some condition asks for it
+`AnyOf`, a negated `Witness`    a derived bit, where static knowledge doesn't decide it
+`Behavior` with all its terms   an operator
+conditional effect              a step of an operator, and a relaxed operator of its own
+==============================  =================================================================
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from planner.grounded.joins import Ints
+from planner.plan import Step
+from reasoner.symbols import FALSE, Fact, Problem, Symbol
+
+Change = tuple[int, int, int]
+"""Where all bits of the first are set, the bits of the second are cleared and then those of the third set."""
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """For each of n things a list of integers: ``items[starts[i]:starts[i + 1]]``."""
+
+    starts: Ints
+    items: Ints
+
+    def __getitem__(self, i: int) -> list[int]:
+        """Return the list of thing `i`."""
+        found: list[int] = self.items[self.starts[i] : self.starts[i + 1]].tolist()
+        return found
+
+    def lists(self) -> list[list[int]]:
+        """Return all lists."""
+        items, starts = self.items.tolist(), self.starts.tolist()
+        return [items[low:high] for low, high in itertools.pairwise(starts)]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One level of a problem, grounded; `planner.grounded.grounding.ground` makes it.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : int
+    facts : sequence of Fact
+        What the first bits stand for.
+    size : int
+        Number of bits: facts, their complements, derived ones.
+    initial, goal : int
+        A state; the bits wanted.
+    constants : mapping of Symbol to value
+        The symbols that no operator changes.
+    costs : list of float
+        Per operator.
+    owners : list of int
+        Per relaxed operator, the operator that it is or a conditional effect of which it is.
+    needs, adds : Grouped
+        Per relaxed operator, the bits that it needs and those that it may set.
+    derived : sequence of (bit, alternatives)
+        The bit is set in a state that has all bits of an alternative; later ones may need earlier ones.
+    change : function of an operator
+        To its precondition and its changes, in the order in which they are made.
+    describe : function of an operator
+        To its behaviour, arguments and bindings.
+    """
+
+    problem: Problem
+    level: int
+    facts: Sequence[Fact]
+    size: int
+    initial: int
+    goal: int
+    constants: Mapping[Symbol, str]
+    costs: list[float]
+    owners: list[int]
+    needs: Grouped
+    adds: Grouped
+    derived: tuple[tuple[int, tuple[int, ...]], ...]
+    change: Callable[[int], tuple[int, tuple[Change, ...]]]
+    describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
+    _changes: dict[int, tuple[int, tuple[Change, ...]]] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        """Return the number of operators."""
+        return len(self.costs)
+
+    def applied(self, state: int, operator: int) -> int | None:
+        """Return the state after an operator, or None where it isn't applicable."""
+        precondition, changes = self._changes.get(operator) or self.known(operator)
+        if state & precondition != precondition:
+            return None
+        after = state
+        for when, cleared, set_ in changes:
+            if state & when == when:
+                after = after & ~cleared | set_
+        return self.completed(after) if self.derived else after
+
+    def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
+        """Return an operator's precondition and changes, worked out once."""
+        known = self._changes.get(operator)
+        if known is None:
+            known = self._changes[operator] = self.change(operator)
+        return known
+
+    def completed(self, state: int) -> int:
+        """Return the state with its derived bits as they have to be."""
+        for bit, alternatives in self.derived:
+            if any(state & wanted == wanted for wanted in alternatives):
+                state |= bit
+            else:
+                state &= ~bit
+        return state
+
+    def values(self, state: int) -> dict[Symbol, str]:
+        """Return a state as values of symbols; a boolean symbol that could never be true is left out."""
+        found = dict(self.constants)
+        situations = self.problem.domain.situations
+        for i, fact in enumerate(self.facts):
+            if state >> i & 1:
+                found[fact.symbol] = fact.value
+            elif situations[fact.symbol.situation].boolean:
+                found[fact.symbol] = FALSE
+        return found
+
+    def steps(self, plan: Sequence[int]) -> tuple[Step, ...]:
+        """Return a plan's operators as steps of its level."""
+        found = []
+        for position, operator in enumerate(plan):
+            behavior, arguments, bindings = self.describe(operator)
+            number = self.problem.id_of(behavior, arguments)
+            found.append(Step((position,), number, self.level, behavior, arguments, bindings))
+        return tuple(found)

@@ -1,0 +1,121 @@
+"""Why a fact can't be reached, in the ontology's terms: which behaviour could bring it about, and what that one lacks.
+
+A behaviour's conditions, with the goal's individuals put in, can't all hold; of them as many are dropped as can be while this
+stays so, those that change first: what is left is the reason. A fact among it that can't be reached has a reason of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from planner.grounded.grounding import Reached
+from planner.grounded.joins import TooLargeError
+from planner.grounded.schemas import Atom, Schema
+from planner.plan import Reason
+from reasoner.symbols import TRUE, Fact, Symbol
+
+DEPTH = 6
+MOST_ROWS = 1_000_000
+
+
+def unreachable(reached: Reached, goal: Fact) -> Reason:
+    """Return why a goal is not reachable even if nothing ever becomes false."""
+    because, terms = _because(reached, goal, frozenset())
+    return Reason(f"{goal} can't be reached: {because}", tuple(dict.fromkeys((*_words(goal), *terms))))
+
+
+def _words(fact: Fact) -> tuple[str, ...]:
+    return (*fact.symbol.arguments, fact.symbol.situation, fact.value)
+
+
+def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str, tuple[str, ...]]:
+    """Return the reason as half a sentence, and the terms that it names."""
+    name = goal.symbol.situation
+    situation = reached.situations.get(name)
+    whole = not any(word.startswith("?") for word in _words(goal))
+    if situation is None or (whole and not situation.boolean and goal.symbol not in reached.initial):
+        return f"there is no {goal.symbol} on level {reached.level}", ()
+    found = []
+    for schema in reached.schemas:
+        for _, effect in schema.effects:
+            if effect.situation != name:
+                continue
+            terms = _unified(reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value))
+            if terms is not None:
+                found.append((schema, _core(reached, schema, terms)))
+    if not found:
+        return f"no behaviour of level {reached.level} makes it so", ()
+    schema, core = min(found, key=lambda pair: (len(pair[1]), sum(atom.fluent for atom in pair[1])))
+    could = f"{schema.behavior.name} could make it so, but"
+    if not core:
+        return f"{could} its conditions exclude one another", (schema.behavior.name,)
+    text = f"{could} {_said(schema, core)}"
+    words = tuple(t for atom in core for t in (atom.table[1], *atom.terms) if not t.startswith("?"))
+    if len(core) == 1 and core[0].fluent and len(above) < DEPTH:
+        deeper = _fact(reached, core[0])
+        if deeper not in above | {goal}:
+            more, others = _because(reached, deeper, above | {goal})
+            return f"{text}: {more}", (schema.behavior.name, *words, *others)
+    return text, (schema.behavior.name, *words)
+
+
+def _unified(reached: Reached, schema: Schema, terms: Sequence[str], words: Sequence[str]) -> dict[str, str] | None:
+    """Return what to put in for variables so that the terms become the words, or None; a word may be a variable itself."""
+    found: dict[str, str] = {}
+    for term, word in zip(terms, words, strict=True):
+        if word.startswith("?"):
+            continue
+        if (found.setdefault(term, word) if term.startswith("?") else term) != word:
+            return None
+    classes = reached.problem.classes
+    fits = all(word in classes.get(schema.kinds[term], ()) for term, word in found.items())
+    return found if fits else None
+
+
+def _core(reached: Reached, schema: Schema, terms: dict[str, str]) -> list[Atom]:
+    """Return a smallest set of a schema's conditions that can't hold together with these individuals."""
+    atoms = [replace(atom, terms=tuple(terms.get(t, t) for t in atom.terms)) for atom in schema.atoms]
+    order = sorted(atoms, key=lambda atom: (atom.table[0] != "class", not atom.fluent))
+    core = list(order)
+    for atom in order:
+        rest = [a for a in core if a is not atom]
+        if not _satisfiable(reached, schema, rest):
+            core = rest
+    return core if not _satisfiable(reached, schema, core) else []
+
+
+def _satisfiable(reached: Reached, schema: Schema, atoms: Sequence[Atom]) -> bool:
+    trial = replace(schema, atoms=tuple(atoms), filters=(), terms=())
+    most, reached.most = reached.most, MOST_ROWS
+    try:
+        return next(reached.joined(trial), None) is not None
+    except TooLargeError:
+        return True
+    finally:
+        reached.most = most
+
+
+def _fact(reached: Reached, atom: Atom) -> Fact:
+    name, boolean = atom.table[1], reached.situations[atom.table[1]].boolean
+    arguments, value = (atom.terms, TRUE) if boolean else (atom.terms[:-1], atom.terms[-1])
+    return Fact(Symbol(name, arguments), value)
+
+
+def _said(schema: Schema, core: Sequence[Atom]) -> str:
+    """Return what fails to hold, e.g. ``no Hand canReach location9``."""
+    if len(core) == 1 and core[0].table[0] == "class":
+        return f"{_term(schema, core[0].terms[0])} is no {core[0].table[1]}"
+    if len(core) == 1 and len(core[0].terms) == 2 and not core[0].fluent:
+        (left, right), relation = core[0].terms, core[0].table[1]
+        if left.startswith("?"):
+            return f"no {schema.kinds[left]} {relation} {_term(schema, right)}"
+        if right.startswith("?"):
+            return f"{left} {relation} no {schema.kinds[right]}"
+        return f"{relation}({left}, {right}) doesn't hold"
+    said = " and ".join(f"{a.table[1]}({', '.join(_term(schema, t) for t in a.terms)})" for a in core)
+    return f"{said} can't be" if len(core) == 1 else f"nothing satisfies {said}"
+
+
+def _term(schema: Schema, term: str) -> str:
+    return f"some {schema.kinds[term]}" if term.startswith("?") else term

@@ -1,0 +1,265 @@
+"""Plans with a proof of how far from optimal they can be, at most.
+
+upper   cost of the best plan so far: the fast planner's, made shorter for as long as that helps
+lower   what any plan costs at least: LM-cut of the initial state, the layers that exhaustion has finished, or the least f of A*
+        with LM-cut; all of the lowest level
+
+When both meet, the plan is optimal. When a limit comes first, both are returned, and their ratio bounds the loss.
+
+LM-cut: Helmert and Domshlak, "Landmarks, critical paths and abstractions: what's the difference anyway?", ICAPS 2009. Relaxed
+operators that are effects of one behaviour share its cost here, which keeps the sum admissible with conditional effects.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+
+from planner.grounded.grounding import OutOfTimeError, ground
+from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
+from planner.grounded.state_space import Space, TooLargeError
+from planner.grounded.task import Task
+from planner.hierarchical.planner import Compiled, compiled
+from planner.hierarchical.planner import plan as fast_plan
+from planner.hierarchical.serialization import closed, refusal
+from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from reasoner.symbols import Problem
+
+SEARCHING = 0.9
+"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
+Heuristic = Callable[[int], float]
+"""A lower bound on the cost from a state to the goal; infinite where there is no way."""
+
+
+def plan(
+    problem: Problem,
+    *,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    using: Compiled | None = None,
+) -> Outcome:
+    """Plan, and prove a bound: an outcome whose `bound` no plan of the lowest level can be cheaper than.
+
+    Parameters
+    ----------
+    problem : Problem
+    limits : Limits
+        Expansions of A* (and ten times as many states of exhaustion); the time is used up unless optimality is proved before.
+    using : Compiled, optional
+
+    Returns
+    -------
+    Outcome
+        Optimal if `bound` is the cost of the plan's primitives.
+    """
+    begin = perf_counter()
+    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
+    using = using or compiled(problem)
+    best = fast_plan(problem, limits=_left(limits, deadline), using=using)
+    best = _shortened(problem, best, limits, using, deadline)
+    if best.status is Status.UNSOLVABLE:
+        return best
+    lower, found = _proved(problem, best, limits, deadline)
+    plan = found if found is not None else best.plan
+    status = Status.SOLVED if plan is not None else best.status
+    return replace(
+        best,
+        status=status,
+        plan=plan,
+        reason=None if plan is not None else best.reason,
+        bound=lower,
+        seconds=perf_counter() - begin,
+    )
+
+
+def _left(limits: Limits, deadline: float | None) -> Limits:
+    return limits if deadline is None else Limits(limits.expansions, max(deadline - perf_counter(), 0.0))
+
+
+def cost(problem: Problem, plan: Plan) -> float:
+    """Return the cost of a plan's primitives."""
+    return sum(problem.domain.behaviors[step.behavior].cost for step in plan.primitives)
+
+
+def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
+    """Improve a plan by ever more clusters, until that stops helping or half of the time is gone."""
+    begin = perf_counter()
+    shapes = 8
+    while best.plan is not None and shapes <= 512:
+        if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
+            break
+        again = fast_plan(problem, limits=_left(limits, deadline), using=using, improve=shapes)
+        shapes *= 4
+        if again.plan is not None and cost(problem, again.plan) < cost(problem, best.plan):
+            best = again
+    return best
+
+
+def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:
+    """Return a lower bound, and a cheaper plan if one was found on the way."""
+    level = problem.domain.levels[-1]
+    upper = cost(problem, best.plan) if best.plan is not None else math.inf
+    try:
+        if refusal(closed(problem, level, deadline)) is not None:
+            return 0.0, None
+        task = ground(problem, level, deadline=deadline)
+    except (GroundingTooLargeError, OutOfTimeError):
+        return 0.0, None
+    if isinstance(task, Reason):
+        return math.inf, None
+    heuristic = lm_cut(task, deadline)
+    lower = heuristic(task.initial)
+    costs = set(task.costs)
+    if lower < upper and len(costs) == 1:
+        half = None if deadline is None else (perf_counter() + deadline) / 2
+        try:
+            found = Space(problem, level).search(limits.expansions * 10, half)
+            if found.steps is not None:
+                total = len(found.steps) * costs.pop()
+                return total, Plan(found.steps) if total < upper else None
+        except TooLargeError as large:
+            lower = max(lower, large.layers * min(costs))
+        except TimeoutError:
+            pass
+    if lower < upper:
+        counts = best.search.get(level) or Counts()
+        bound, operators = a_star(task, heuristic, upper, limits.expansions, deadline, counts)
+        return max(lower, bound), None if operators is None else Plan(task.steps(operators))
+    return lower, None
+
+
+def a_star(
+    task: Task, heuristic: Heuristic, upper: float, expansions: int, deadline: float | None, counts: Counts
+) -> tuple[float, list[int] | None]:
+    """Return the least f that is left, and the operators of a plan cheaper than `upper` if one was found.
+
+    Without a plan and with f no less than `upper`, a plan of cost `upper` is optimal.
+    """
+    g = {task.initial: 0.0}
+    came_from: dict[int, tuple[int, int]] = {}
+    start = heuristic(task.initial)
+    queue = [(start, start, 0, task.initial)]  # f, h, order of generation, state
+    lower, number = start, 0
+    while queue:
+        f, h, _, state = heapq.heappop(queue)
+        lower = max(lower, min(f, upper))
+        if f >= upper:
+            return upper, None
+        if f > g[state] + h:
+            continue
+        if state & task.goal == task.goal:
+            steps = []
+            while state in came_from:
+                state, operator = came_from[state]
+                steps.append(operator)
+            return f, steps[::-1]
+        if counts.expanded >= expansions or (deadline is not None and perf_counter() > deadline):
+            return lower, None
+        counts.expanded += 1
+        for operator in range(len(task)):
+            after = task.applied(state, operator)
+            if after is None:
+                continue
+            counts.generated += 1
+            new = g[state] + task.costs[operator]
+            if new < g.get(after, math.inf):
+                g[after] = new
+                came_from[after] = state, operator
+                estimate = heuristic(after)
+                number += 1
+                if deadline is not None and perf_counter() > deadline:
+                    return lower, None
+                if new + estimate < upper:
+                    heapq.heappush(queue, (new + estimate, estimate, number, after))
+    return upper, None
+
+
+def lm_cut(task: Task, deadline: float | None = None) -> Heuristic:
+    """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is a bound, too.
+
+    Bits are numbered as in the task, with two more: one that always holds, for operators that need nothing, and one that the
+    goal's bits give at no cost.
+    """
+    always, end = task.size, task.size + 1
+    needs = [bits or [always] for bits in task.needs.lists()]
+    adds = task.adds.lists()
+    owners = list(task.owners)
+    needs.append([bit for bit in range(task.size) if task.goal >> bit & 1] or [always])
+    adds.append([end])
+    owners.append(-1)
+    needed_by: list[list[int]] = [[] for _ in range(task.size + 2)]
+    added_by: list[list[int]] = [[] for _ in range(task.size + 2)]
+    for o, (needed, added) in enumerate(zip(needs, adds, strict=True)):
+        if not o % 1000 and deadline is not None and perf_counter() > deadline:
+            return lambda state: 0.0
+        for bit in needed:
+            needed_by[bit].append(o)
+        for bit in added:
+            added_by[bit].append(o)
+
+    def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
+        """Return each bit's cost, the costliest need counting, and for each operator that need (-1: out of reach)."""
+        value = [math.inf] * (task.size + 2)
+        missing = [len(bits) for bits in needs]
+        support = [-1] * len(needs)
+        queue = [(0.0, bit) for bit in facts]
+        for bit in facts:
+            value[bit] = 0.0
+        while queue:
+            if deadline is not None and perf_counter() > deadline:
+                raise TimeoutError
+            reached, bit = heapq.heappop(queue)
+            if reached > value[bit]:
+                continue
+            for o in needed_by[bit]:
+                missing[o] -= 1
+                if not missing[o]:
+                    support[o] = bit
+                    total = reached + (price[owners[o]] if owners[o] >= 0 else 0.0)
+                    for added in adds[o]:
+                        if total < value[added]:
+                            value[added] = total
+                            heapq.heappush(queue, (total, added))
+        return value, support
+
+    def evaluate(state: int) -> float:
+        facts = [bit for bit in range(task.size) if state >> bit & 1]
+        facts.append(always)
+        price = list(task.costs)
+        total = 0.0
+        while True:
+            try:
+                value, support = h_max(facts, price)
+            except TimeoutError:
+                return total
+            if math.isinf(value[end]):
+                return math.inf
+            if value[end] == 0.0:
+                return total
+            zone, waiting = {end}, [end]  # from where the goal costs nothing more
+            while waiting:
+                for o in added_by[waiting.pop()]:
+                    bit = support[o]
+                    if bit >= 0 and bit not in zone and (owners[o] < 0 or price[owners[o]] == 0.0):
+                        zone.add(bit)
+                        waiting.append(bit)
+            before, waiting, cut = set(facts), list(facts), set()  # what is reached without entering the zone
+            while waiting:
+                bit = waiting.pop()
+                for o in needed_by[bit]:
+                    if support[o] == bit:
+                        if any(added in zone for added in adds[o]):
+                            cut.add(owners[o])
+                        else:
+                            for added in adds[o]:
+                                if added not in before:
+                                    before.add(added)
+                                    waiting.append(added)
+            least = min(price[owner] for owner in cut)
+            for owner in cut:
+                price[owner] -= least
+            total += least
+
+    return evaluate

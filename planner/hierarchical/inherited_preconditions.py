@@ -1,0 +1,131 @@
+"""What upper levels ask of a change, asked of the lower level's steps as well.
+
+Searching a lower level anew finds ways that the levels above have no step for: that is how a plan gets shorter. But a condition
+that only an upper level states ("a cup that is filled isn't moved") would then no longer be asked. So where plans are made anew,
+each behaviour of the lower level may bring about a value that the upper level knows only where some behaviour of the upper level
+could: its conditions on the individuals of the change itself must hold.
+
+Not asked are conditions on what an upper behaviour names besides (the other vessel), and on the old value of a symbol that is
+between two values of the upper level (the place that something in a hand came from).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from planner.paper.transitions import mentions
+from reasoner.symbols import (
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Problem,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    substituted,
+)
+
+
+def binding(problem: Problem, level: int) -> Domain:
+    """Return the domain with what the levels above `level` ask added to the preconditions of its behaviours.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : int
+        The level that is planned anew.
+
+    Returns
+    -------
+    Domain
+        Its plans on that level are plans of the problem's own domain, too.
+    """
+    domain = problem.domain
+    above = [behavior for behavior in domain.behaviors.values() if behavior.level < level]
+    bound = {}
+    for name, behavior in domain.behaviors.items():
+        if behavior.level == level:
+            asked = [guard for effect in behavior.effects for guard in _guards(problem, behavior, effect, above)]
+            behavior = replace(behavior, preconditions=(*behavior.preconditions, *asked))
+        bound[name] = behavior
+    return replace(domain, behaviors=bound)
+
+
+def _guards(
+    problem: Problem, behavior: Behavior, effect: ValueEffect, above: Sequence[Behavior]
+) -> Iterator[Condition]:
+    """Yield what a level above asks of an effect: at most one condition for each of these levels."""
+    for level in sorted({upper.level for upper in above}):
+        if problem.domain.situations[effect.situation].level > level:
+            continue
+        makers = [(upper, e) for upper in above if upper.level == level for e in upper.effects]
+        makers = [(upper, e) for upper, e in makers if e.situation == effect.situation]
+        if not makers:
+            continue  # the level has the symbol, but changes it nowhere: what the lower one does with it is left to that one
+        alternatives = [*_between(problem, behavior, effect, level)]
+        alternatives += [group for maker in makers for group in _asked(problem, behavior, effect, *maker, level)]
+        alternatives += [(AnyOf((effect.when,), negated=True),)] if effect.when else []
+        if () not in alternatives:
+            yield AnyOf(tuple(alternatives))
+
+
+def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: int) -> Iterator[tuple[Condition, ...]]:
+    """Yield one alternative for each value of the effect that the level doesn't know: nothing is asked of these."""
+    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
+    unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
+    if len(unknown) == len(values):
+        yield ()
+    for value in unknown:
+        yield (EqualityCondition(effect.value, value),)
+
+
+def _asked(
+    problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
+) -> Iterator[tuple[Condition, ...]]:
+    """Yield the conditions under which an upper behaviour's effect could be this one; nothing if it never could."""
+    terms = {term.name: term.kind for term in (*upper.parameters, *upper.variables)}
+    here = {term.name: term.kind for term in (*lower.parameters, *lower.variables)}
+    names: dict[str, str] = {}
+    asked: list[Condition] = []
+    for mine, other in zip((*effect.arguments, effect.value), (*its.arguments, its.value), strict=True):
+        if other not in terms:
+            if mine not in here and mine != other:
+                return
+            asked += [EqualityCondition(mine, other)] if mine != other else []
+        elif other in names:
+            asked += [EqualityCondition(mine, names[other])] if mine != names[other] else []
+        else:
+            names[other] = mine
+            asked += [ClassCondition(mine, terms[other])] if here.get(mine) != terms[other] else []
+    kind = problem.domain.situations[effect.situation].range
+    unsettled = any(problem.value_levels.get(value, 1) > level for value in problem.classes.get(kind, ()))
+    found = {(c.situation, c.arguments): c.value for c in lower.preconditions if isinstance(c, ValueCondition)}
+    own: list[Condition] = []
+    for condition in upper.preconditions:
+        if isinstance(condition, ValueCondition) and not mentions(replace(condition, value="")) - names.keys():
+            symbol = (condition.situation, tuple(names.get(a, a) for a in condition.arguments))
+            if unsettled and symbol == (effect.situation, effect.arguments):
+                continue
+            if (
+                condition.value in terms.keys() - names.keys()
+                and here.get(found.get(symbol, "")) == terms[condition.value]
+            ):
+                names[condition.value] = found[symbol]
+        own.append(condition)
+    closed = [substituted(condition, names) for condition in _closed(own, set(names), terms)]
+    yield (*asked, *(condition for condition in closed if condition not in lower.preconditions))
+
+
+def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
+    """Yield the conditions on what is known, with what these determine put in as witnesses; the others are left out."""
+    yield from (condition for condition in conditions if mentions(condition) <= known)
+    for condition in conditions:
+        if isinstance(condition, ValueCondition) and mentions(condition) - known == {condition.value}:
+            variable = condition.value
+            about = [c for c in conditions if variable in mentions(c) and mentions(c) <= {*known, variable}]
+            yield Witness(variable, terms[variable], tuple(about))

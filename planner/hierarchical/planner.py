@@ -1,0 +1,170 @@
+"""The fast planner: proofs first, then goals in series, then every state, then flat search; what is found is shortened.
+
+Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
+never that there is no plan.
+
+======================  ==============================================  ==============================
+stage                   decides                                         module
+======================  ==============================================  ==============================
+static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
+goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
+relaxed reachability    that a goal can't be reached                    `planner.grounded.grounding`
+exhaustion              small problems, both ways                       `planner.grounded.state_space`
+flat search             the rest, until a limit comes                   `planner.grounded.best_first`
+======================  ==============================================  ==============================
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from time import perf_counter
+
+from planner.grounded.best_first import plan_level
+from planner.grounded.state_space import TooLargeError
+from planner.hierarchical.postoptimization import Improver, length
+from planner.hierarchical.refinement_cache import Done
+from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled, exhaust
+from planner.hierarchical.subplans import Advice, LimitError, Watch, nobody
+from planner.hierarchical.unsolvability import contested, unattainable
+from planner.plan import Limits, Outcome, Plan, Reason, Status
+from reasoner.symbols import FALSE, Problem
+
+__all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
+
+IMPROVEMENTS = 2
+"""So many shapes of clusters are planned anew by default."""
+DETOURS = 1.25
+"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
+SEARCHING = 0.93
+"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
+FIRST_TURN = 2_000
+"""Expansions of flat search before exhaustion has its first turn."""
+STATES_PER_EXPANSION = 20
+"""Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
+
+
+def plan(
+    problem: Problem,
+    *,
+    advice: Advice | None = None,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    improve: int = IMPROVEMENTS,
+    using: Compiled | None = None,
+    watch: Watch = nobody,
+) -> Outcome:
+    """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
+
+    Parameters
+    ----------
+    problem : Problem
+    advice : Advice, optional
+        Orders what could be done; without it the order is that of goals, behaviours and individuals.
+    limits : Limits
+    improve : int
+        How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
+    using : Compiled, optional
+        From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
+    watch : Watch, optional
+        Told the level of each expansion, and `None` before what costs most: detours for several goals, and lower levels where
+        relaxed reachability disproves nothing.
+
+    Returns
+    -------
+    Outcome
+    """
+    with paused_collection():
+        return _plan(problem, advice, limits, improve, using, watch)
+
+
+@contextmanager
+def paused_collection() -> Iterator[None]:
+    """Pause the garbage collector: what planning makes has no cycles, and going through it all took a third of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _plan(
+    problem: Problem,
+    advice: Advice | None,
+    limits: Limits,
+    improve: int,
+    using: Compiled | None,
+    watch: Watch,
+) -> Outcome:
+    begin = perf_counter()
+    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
+    call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
+    call.segments.watch = watch
+
+    def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
+        seconds, cache = perf_counter() - begin, call.refiner
+        counts = call.segments.counts
+        return Outcome(status, plan, reason, counts, call.fallbacks, seconds, hits=cache.hits, misses=cache.misses)
+
+    impossible = unattainable(call.segments) or contested(call.segments)
+    if impossible:
+        return outcome(Status.UNSOLVABLE, reason=impossible)
+    try:
+        if call.serialise():
+            if improve:
+                with suppress(LimitError):  # then the first plan is what there is
+                    first, call.steps = call.steps, turned(call)
+                    left = improve if call.steps is first else (improve + 1) // 2
+                    call.steps = Improver(call.refiner, call.using.shapes, left).improve(call.steps)
+            return outcome(Status.SOLVED, call.tree())
+    except UnsolvableError as proof:
+        return outcome(Status.UNSOLVABLE, reason=proof.reason)
+    except LimitError as limit:
+        return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
+    call.fallbacks += 1
+    if call.too_large is not None:
+        text = f"goals in series found no plan, and {call.too_large.text}"
+        return outcome(Status.GAVE_UP, reason=Reason(text))
+    return outcome(*last_resort(problem, limits, deadline))
+
+
+def turned(call: Call) -> list[Done]:
+    """Return the shorter of a call's steps and those that come out with the goals in reverse order.
+
+    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is tried
+    uses the most abstract level alone and expands no more nodes than the call did.
+    """
+    unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
+    if len(call.steps) <= DETOURS * unmet or len(call.program.levels) < 2:
+        return call.steps
+    problem = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
+    other = Call(problem, call.using, call.segments.deadline, None, call.segments.expanded)
+    other.proved = True  # there is a plan
+    other.efforts = tuple((level, effort) for level, effort in other.efforts if level == call.program.levels[0])
+    with suppress(LimitError):
+        if other.serialise() and length(other.steps) < length(call.steps):
+            return other.steps
+    return call.steps
+
+
+def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:
+    """Decide a problem on its lowest level alone: by its states if they are few enough to be counted, and by flat search.
+
+    The two take turns, each first with little: which of them is the right one can't be told beforehand.
+    """
+    for expansions in (min(limits.expansions, FIRST_TURN), limits.expansions):
+        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+        flat = plan_level(problem, limits=Limits(expansions, left))
+        if flat.status is not Status.GAVE_UP or (deadline is not None and perf_counter() > deadline):
+            break
+        try:
+            found = exhaust(problem, deadline, expansions * STATES_PER_EXPANSION)
+        except TooLargeError:
+            continue
+        except LimitError as limit:
+            return Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}")
+        return (Status.SOLVED, found, None) if isinstance(found, Plan) else (Status.UNSOLVABLE, None, found)
+    return flat.status, flat.plan, flat.reason

@@ -1,0 +1,387 @@
+"""Goals in series: each by a few relevant steps on one table, and what was achieved before is kept.
+
+active   goals to try in one step
+asleep   goals that something stands in the way of; they wake when a symbol that they wait for changes
+kept     goals that are achieved: a segment may undo them, but must restore them
+before   goals after which others could no longer be achieved (a full cup isn't moved) wait for those
+
+When no goal is attainable in one step, longer segments are searched, then segments on the level below, for one goal after the
+other. Steps are refined and done as soon as a segment is found, so that a step which can't be refined is noticed where it stands,
+forbidden there, and the segment searched again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import product
+
+from planner.grounded.best_first import search as flat_search
+from planner.grounded.grounding import OutOfTimeError, Reached, ground
+from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
+from planner.grounded.state_space import Space, TooLargeError
+from planner.grounded.unreachable import unreachable
+from planner.hierarchical.operators import Achiever, Program
+from planner.hierarchical.refinement_cache import Done, Refiner, Template
+from planner.hierarchical.state import Cell, Table, arguments_of, key_of
+from planner.hierarchical.subplans import Advice, Effort, Forbidden, Ground, LimitError, Segments
+from planner.hierarchical.subproblem import detour
+from planner.plan import Limits, Plan, Reason, Status, Step
+from reasoner.symbols import FALSE, Condition, Fact, Problem, State
+
+EASY = Effort(depth=1, expansions=10)
+SHORT = Effort(depth=3, expansions=150)
+LONG = Effort(depth=16, expansions=200, questions=150)
+WIDE = Effort(depth=16, expansions=1000, slack=1, breadth=3, questions=500)
+NEARBY, WIDER = Effort(depth=0, expansions=0), Effort(depth=0, expansions=0, breadth=2)
+"""All states of what a goal concerns and one or two values of each sort, see `planner.hierarchical.subproblem`."""
+TOGETHER = Effort(depth=0, expansions=2_000)
+"""All goals that are left at once, by flat search on the level, where it is small enough."""
+
+FEW_OPERATORS, FEW_STATES = 300, 30_000
+"""The smallest problems, of which every state is looked at before the greater efforts."""
+COSTLY = 4
+"""So many goals that need detours are a task of which a watcher is told."""
+MOST_ROWS, MOST_CHANGES, MOST_TOGETHER = 2_000_000, 10_000_000, 3_000_000
+"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded: the lowest (600 MB),
+and another for all goals at once."""
+
+
+class UnsolvableError(Exception):
+    """A proof that there is no plan came up; the reason is its argument."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
+
+
+def exhaust(problem: Problem, deadline: float | None, most: int, operators: int = 5_000) -> Plan | Reason:
+    """Return a shortest plan of the lowest level, or why there is none; `TooLargeError` if that takes too much."""
+    level = problem.domain.levels[-1]
+    try:
+        found = Space(problem, level, operators).search(most, deadline)
+    except TimeoutError as error:
+        raise LimitError("the time limit") from error
+    if found.steps is not None:
+        return Plan(found.steps)
+    states = f"all {found.states} states of level {level} that can be reached were looked at"
+    return Reason(f"no state with the goal's facts can be reached; {states}")
+
+
+def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
+    """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
+    reached = Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
+    reached.close()
+    return reached
+
+
+def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
+    """Return why a level isn't to be grounded, if it would take too much memory: an effect on a symbol touches all its values."""
+    values = {}
+    for name, situation in reached.situations.items():
+        rows = len(reached.tables["situation", name])
+        values[name] = 1 if situation.boolean else 1 + rows // max(len(reached.symbols[name]), 1)
+    changes = sum(
+        len(rows) * sum(values[effect.situation] for _, effect in schema.effects)
+        for schema, rows in zip(reached.schemas, reached.rows, strict=True)
+    )
+    if changes <= most:
+        return None
+    return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
+
+
+@dataclass
+class Compiled:
+    """What can be kept between calls on problems with the same domain, individuals and static facts.
+
+    `replay` can be switched off, to see what templates are worth.
+    """
+
+    program: Program
+    templates: dict[str, list[Template]] = field(default_factory=dict)
+    shapes: dict[object, Template | None] = field(default_factory=dict)
+    replay: bool = True
+
+
+def compiled(problem: Problem) -> Compiled:
+    """Compile the behaviours of a problem, for use in any number of calls with other initial states and goals."""
+    return Compiled(Program(problem))
+
+
+class Call:
+    """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
+
+    def __init__(
+        self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None, most: int
+    ) -> None:
+        self.problem = problem
+        self.using = using
+        self.program = using.program
+        self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
+        self.table = Table(problem.domain.situations, problem.initial)
+        self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
+        self.refiner = Refiner(self.segments, using.templates)
+        self.refiner.use_templates = using.replay
+        self.kept: dict[Cell, str] = {}
+        self.steps: list[Done] = []
+        self.fallbacks = 0
+        self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
+        self.moved = False
+        self.proved = False
+        self.too_large: Reason | None = None
+        self.together_at: dict[int, int] = {}
+        *upper, lowest = self.program.levels
+        self.efforts = (
+            *product(upper[:1], (SHORT, NEARBY, WIDER, LONG)),
+            *product(upper[1:], (SHORT, NEARBY, WIDER, TOGETHER, LONG)),
+            *product(upper, (WIDE,)),
+            *product((lowest,), (SHORT, LONG, WIDE) if upper else (SHORT, LONG)),
+        )
+
+    def serialise(self) -> bool:
+        """Achieve the goals one after the other; whether all are."""
+        first = self.program.levels[0]
+        active: deque[Cell] = deque()
+        asleep: dict[Cell, None] = {}
+        waiting: dict[Cell, list[Cell]] = {}
+        for cell, value in self.goal.items():
+            if self.met(cell):
+                self.kept[cell] = value
+        before = self.order()
+        active.extend(cell for cell in self.goal if cell not in self.kept)
+
+        def sleep(cell: Cell, until: Sequence[Cell]) -> None:
+            asleep[cell] = None
+            for other in until:
+                waiting.setdefault(other, []).append(cell)
+
+        def wake(mark: int) -> None:
+            for situation, key, _ in self.table.trail[mark:]:
+                for cell in waiting.pop((situation, key), ()):
+                    if cell in asleep:
+                        del asleep[cell]
+                        active.append(cell)
+                        self.failed.pop(cell, None)
+                cell = situation, key
+                if cell in self.kept:
+                    asleep.pop(cell, None)
+                    if not self.met(cell):
+                        del self.kept[cell]
+                        active.append(cell)
+                elif cell in asleep:
+                    del asleep[cell]
+                    active.append(cell)
+
+        while active or asleep:
+            mark = len(self.table.trail)
+            while active:
+                cell = active.popleft()
+                self.segments.check_time()
+                if self.met(cell):
+                    self.kept[cell] = self.goal[cell]
+                    continue
+                unmet = [other for other in before.get(cell, ()) if other not in self.kept]
+                if unmet:
+                    sleep(cell, unmet)
+                elif self.achieve(first, cell, EASY):
+                    wake(mark)
+                    mark = len(self.table.trail)
+                else:
+                    sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
+            if asleep and not self.harder(asleep, before):
+                return False
+            wake(mark)
+        return True
+
+    def harder(self, asleep: dict[Cell, None], before: Mapping[Cell, Sequence[Cell]]) -> bool:
+        """Achieve one of the sleeping goals by a longer segment, or by one on a lower level."""
+
+        def candidates() -> Iterator[Cell]:
+            none = True
+            for cell in asleep:
+                if all(other in self.kept for other in before.get(cell, ())):
+                    none = False
+                    yield cell
+            if none:  # where goals wait for each other, none waits
+                yield from asleep
+
+        for level, effort in self.efforts:
+            if effort is NEARBY and len(self.goal) - len(self.kept) >= COSTLY:
+                self.segments.watch(None)
+            if level != self.program.levels[0] or effort is LONG:
+                self.prove()
+            if effort is TOGETHER:
+                if self.together(level):
+                    self.fallbacks += 1
+                    return True
+                continue
+            for cell in candidates():
+                if (level, effort) in self.failed.get(cell, ()):
+                    continue
+                if self.achieve(level, cell, effort):
+                    self.fallbacks += level != self.program.levels[0]
+                    return True
+                self.failed.setdefault(cell, []).append((level, effort))
+        if self.moved:  # something was done since some of these attempts failed
+            self.failed.clear()
+            self.moved = False
+            return self.harder(asleep, before)
+        return False
+
+    def prove(self) -> None:
+        """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
+
+        Or if the level has so few states that going through all of them costs less than going on.
+        """
+        if not self.proved:
+            self.proved = True
+            level, deadline = self.program.levels[-1], self.segments.deadline
+            try:
+                reached = closed(self.problem, level, deadline)
+                for symbol, value in sorted(self.problem.goal.items()):
+                    if not reached.possible(symbol, value):
+                        raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
+                self.segments.watch(None)
+                self.too_large = refusal(reached)
+                if self.too_large is not None:
+                    return
+                task = ground(self.problem, level, deadline=deadline)
+            except GroundingTooLargeError as error:
+                self.too_large = Reason(f"level {level} is too large to be grounded: {error}")
+                return
+            except OutOfTimeError as error:
+                raise LimitError("the time limit") from error
+            if isinstance(task, Reason):
+                raise UnsolvableError(task)
+            if len(task) <= FEW_OPERATORS:
+                with suppress(TooLargeError):
+                    found = exhaust(self.problem, self.segments.deadline, FEW_STATES, FEW_OPERATORS)
+                    if isinstance(found, Reason):
+                        raise UnsolvableError(found)
+
+    def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
+        """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
+        forbidden: set[Forbidden] = set()
+        mark = len(self.table.trail)
+        while True:
+            found = self.segment(level, cell, effort, forbidden)
+            if found is None:
+                return False
+            done: list[Done] = []
+            for name, arguments in found:
+                step = self.refiner.do(level, name, arguments)
+                if step is None:
+                    forbidden.add(((name, arguments), frozenset(self.table.since(mark).items())))
+                    break
+                done.append(step)
+            if len(done) == len(found):
+                self.steps.extend(done)
+                self.moved = True
+                self.kept[cell] = self.goal[cell]
+                return True
+            self.table.undo(mark)
+
+    def segment(self, level: int, cell: Cell, effort: Effort, forbidden: set[Forbidden]) -> list[Ground] | None:
+        """Return steps to one goal after which those kept hold again, looked for with some effort."""
+        if effort in (NEARBY, WIDER):
+            goal, deadline = (cell, self.goal[cell]), self.segments.deadline
+            return (
+                detour(self.program, self.table, level, goal, self.kept, effort.breadth, deadline)
+                if not forbidden
+                else None
+            )
+        search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
+        return search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
+
+    def together(self, level: int) -> bool:
+        """Achieve all goals at once by flat search on a level; whether that succeeded, and not tried twice from one state."""
+        if len(self.steps) == self.together_at.get(level):
+            return False
+        self.together_at[level] = len(self.steps)
+        deadline, state = self.segments.deadline, self.table.state()
+        try:
+            if refusal(closed(self.problem, level, deadline, state), MOST_TOGETHER) is not None:
+                return False
+            task = ground(self.problem, level, state, deadline=deadline)
+        except (GroundingTooLargeError, OutOfTimeError):
+            return False
+        if isinstance(task, Reason):
+            return False
+        found = flat_search(task, Limits(TOGETHER.expansions), deadline)
+        self.segments.counts[level].add(found.counts)
+        mark, before = len(self.table.trail), len(self.steps)
+        for operator in found.plan if found.status is Status.SOLVED else ():
+            name, arguments, _ = task.describe(operator)
+            step = self.refiner.do(level, name, arguments)
+            if step is None:
+                self.table.undo(mark)
+                del self.steps[before:]
+                return False
+            self.steps.append(step)
+        self.moved |= len(self.steps) > before
+        return len(self.steps) > before
+
+    def met(self, cell: Cell) -> bool:
+        """Whether a goal holds now."""
+        return self.table.now[cell[0]].get(cell[1], FALSE) == self.goal[cell]
+
+    def order(self) -> dict[Cell, list[Cell]]:
+        """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""
+        by_individual: dict[str, list[Cell]] = {}
+        for cell in self.goal:
+            if cell not in self.kept:
+                for individual in {*arguments_of(cell[1]), self.goal[cell]}:
+                    by_individual.setdefault(individual, []).append(cell)
+        before: dict[Cell, list[Cell]] = {}
+        known: dict[tuple[str, str, int], bool] = {}
+        for cells in by_individual.values():
+            for cell in cells:
+                for other in cells:
+                    if cell is not other:
+                        pattern = cell[0], other[0], self.program.alike.sort.get(arguments_of(cell[1])[0], -1)
+                        if pattern not in known:
+                            known[pattern] = self.rules_out(other, cell)
+                        if known[pattern]:
+                            before.setdefault(other, []).append(cell)
+        return before
+
+    def rules_out(self, first: Cell, then: Cell) -> bool:
+        """Whether with goal `first` achieved, no behaviour of the first level could achieve goal `then` any more."""
+        level = self.program.levels[0]
+        mark = len(self.table.trail)
+        self.table.put(*first, self.goal[first])
+        try:
+            dead = False
+            for achiever in self.program.achievers.get((level, then[0]), ()):
+                achieve = self.segments.achieve[achiever.behavior, achiever.effect]
+                for _, unmet, env in achieve(*arguments_of(then[1]), self.goal[then]):
+                    if all(self.attainable(level, achiever.soft[number], achiever, env) for number in unmet):
+                        return False
+                    dead = True
+            return dead
+        finally:
+            self.table.undo(mark)
+
+    def attainable(self, level: int, condition: Condition, achiever: Achiever, env: Mapping[str, str | None]) -> bool:
+        """Whether some behaviour of a level has an effect that could bring an unmet condition about."""
+        for situation, key, values in self.segments.wants.of(achiever, condition, env, level):
+            for other in self.program.achievers.get((level, situation), ()):
+                for value in values:
+                    achieve = self.segments.achieve[other.behavior, other.effect]
+                    if next(achieve(*arguments_of(key), value), None) is not None:
+                        return True
+        return False
+
+    def tree(self) -> Plan:
+        """Return the steps done as a plan."""
+        id_of, variables = self.program.id_of, self.program.variables
+
+        def step(done: Done, path: tuple[int, ...]) -> Step:
+            level, name, arguments, bindings, below = done
+            bound = dict(zip(variables[name], bindings, strict=True)) if bindings else {}
+            inner = tuple([step(child, (*path, i)) for i, child in enumerate(below)])
+            return Step(path, id_of(name, arguments), level, name, arguments, bound, None, inner)
+
+        return Plan(tuple([step(done, (i,)) for i, done in enumerate(self.steps)]))

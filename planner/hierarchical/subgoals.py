@@ -1,0 +1,288 @@
+"""What would have to change for an unmet condition to hold: from an achiever to the values that it wants.
+
+A want is a symbol with the values of which one would do. Where many would, one of each sort is proposed (`Alike`), so that a
+thousand free places count as one; the values that goals name are proposed besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeAlias
+
+from planner.hierarchical.operators import FEW, Achiever, Program, mentioned
+from planner.hierarchical.state import Cell, Key, Table, arguments_of, key_of, representatives
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+
+Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
+"""Situation type, key, and the values of which one is wanted."""
+Env: TypeAlias = "Mapping[str, str | None]"
+
+
+class Wants:
+    """Turns unmet conditions into wants, for one table and goal.
+
+    Parameters
+    ----------
+    program : Program
+    table : Table
+    goal : mapping of cell to value
+        Its values are proposed for their symbols, and not handed to others as free ones.
+    """
+
+    def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
+        self.program = program
+        self.table = table
+        self.goal = goal
+        self.breadth = 1
+        self._cursors: dict[int, int] = {}
+        self._known: dict[tuple[object, ...], bool] = {}
+        self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
+        self._negations: dict[int, tuple[ValueCondition, ValueCondition]] = {}
+        self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
+        self._fresh: dict[tuple[object, ...], list[Want]] = {}
+        self._free: dict[tuple[str, str, int], list[str]] = {}
+        self._age = -1
+        self.wanted: dict[str, dict[str, None]] = {}
+        for (situation, _), value in goal.items():
+            self.wanted.setdefault(situation, {})[value] = None
+
+    def towards(self, achiever: Achiever, number: int, env: Env, level: int) -> Sequence[Want]:
+        """Return alternative wants for the soft condition `number`, as `of` does; the same as long as nothing changes."""
+        self._forget()
+        scope = self._scopes.get((id(achiever), number))
+        if scope is None:
+            scope = self._scopes[id(achiever), number] = self._scope(achiever, achiever.soft[number])
+        key = id(achiever), number, level, self.breadth, *[env.get(term) for term in scope]
+        found = self._fresh.get(key)
+        if found is None:
+            found = self._fresh[key] = list(self.of(achiever, achiever.soft[number], env, level))
+        return found
+
+    def _forget(self) -> None:
+        """Forget what was read off the table before it changed."""
+        if self._age != self.table.age:
+            self._age = self.table.age
+            self._fresh.clear()
+            self._free.clear()
+
+    def _scope(self, achiever: Achiever, condition: Condition) -> tuple[str, ...]:
+        """Return the variables on which the wants of a condition depend."""
+        found = dict.fromkeys(self._about(condition)[2])
+        for term in tuple(found):
+            if term in achiever.determined:
+                found.update(dict.fromkeys(a for a in achiever.determined[term][1] if a.startswith("?")))
+        return tuple(found)
+
+    def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
+        """Yield alternative wants, any of which may bring an achiever's unmet condition nearer."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                key = self._key(arguments, env)
+                if key is not None and (key in self.table.now[situation] or self._boolean(situation)):
+                    if value.startswith("?") and achiever.determined.get(value) == (situation, arguments):
+                        values = self.candidates(situation, key, achiever.kinds[value])
+                    elif negated:
+                        avoid = env.get(value, value)
+                        values = self._others(situation, key, avoid, level)
+                    else:
+                        wanted = env.get(value, value)
+                        values = () if wanted is None else (wanted,)
+                    if values:
+                        yield situation, key, values
+            case Witness(variable, kind, conditions, negated):
+                if negated:
+                    for individual in self._satisfying(condition, env):
+                        inner = {**env, variable: individual}
+                        for c in conditions:
+                            if isinstance(c, ValueCondition):
+                                yield from self.of(achiever, self._negation(c), inner, level)
+                else:
+                    for individual in self._some(kind):
+                        inner = {**env, variable: individual}
+                        if all(self.holds(c, inner) for c in conditions if not _fluent(c)):
+                            for c in conditions:
+                                if _fluent(c) and not self.holds(c, inner):
+                                    yield from self.of(achiever, c, inner, level)
+            case AnyOf(alternatives, negated):
+                for group in alternatives:
+                    for c in group:
+                        if isinstance(c, ValueCondition) and self.holds(c, env) is negated:
+                            yield from self.of(achiever, self._negation(c) if negated else c, env, level)
+        yield from self._redetermined(achiever, condition, env)
+
+    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
+        """Yield wants for other values of the symbols that determine a condition's variables."""
+        if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
+            return
+        for term in self._about(condition)[2]:
+            if term in achiever.determined:
+                situation, arguments = achiever.determined[term]
+                key = self._key(arguments, env)
+                if key is None or key not in self.table.now[situation]:
+                    continue
+                values = tuple(
+                    value
+                    for value in self.candidates(situation, key, achiever.kinds[term])
+                    if value != env[term] and self._would_hold(condition, env, term, value)
+                )
+                if values:
+                    yield situation, key, values
+
+    def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
+        """Return whether nothing can change a condition, whether it compares, its variables, and itself.
+
+        Itself, so that its `id` stays its own.
+        """
+        found = self._conditions.get(id(condition))
+        if found is None:
+            found = _static(condition), _compares(condition), tuple(sorted(mentioned(condition))), condition
+            self._conditions[id(condition)] = found
+        return found
+
+    def _negation(self, condition: ValueCondition) -> ValueCondition:
+        """Return the opposite of a condition, always the same one."""
+        found = self._negations.get(id(condition))
+        if found is None:
+            opposite = replace(condition, negated=not condition.negated)
+            found = self._negations[id(condition)] = opposite, condition
+        return found[0]
+
+    def _would_hold(self, condition: Condition, env: Env, term: str, value: str) -> bool:
+        """Whether a condition would hold with another value for a variable.
+
+        What is static is asked once, unless it compares individuals once for all that no static fact tells apart.
+        """
+        static, compares, others, _ = self._about(condition)
+        if not static:
+            return self.holds(condition, {**env, term: value})
+        sort = {} if compares else self.program.alike.sort
+        bound = [value if other == term else env.get(other) for other in others]
+        key = id(condition), *[None if who is None else sort.get(who, who) for who in bound]
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = self.holds(condition, {**env, term: value})
+        return known
+
+    def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
+        """Return values of a class for a symbol: its goal, and one of each sort, free ones first."""
+        members = self.program.problem.classes.get(kind, ())
+        if len(members) <= FEW:
+            return members
+        self._forget()
+        found = self._free.get((situation, kind, self.breadth))
+        if found is None:
+            groups, wanted = self.program.alike.groups(members), self.wanted.get(situation, {})
+            found = representatives(groups, self.table.who[situation], wanted, self.breadth, self._cursors)
+            self._free[situation, kind, self.breadth] = found
+        goal = self.goal.get((situation, key))
+        if goal is not None and goal not in found and goal in self.program.members[kind]:
+            return (goal, *found)
+        return tuple(found)
+
+    def _others(self, situation: str, key: Key, avoid: str | None, level: int) -> tuple[str, ...]:
+        if self._boolean(situation):
+            return (FALSE,) if avoid == TRUE else (TRUE,)
+        levels = self.program.problem.value_levels
+        values = self.candidates(situation, key, self.program.domain.situations[situation].range)
+        return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
+
+    def _some(self, kind: str) -> list[str]:
+        members = self.program.problem.classes.get(kind, ())
+        return list(members) if len(members) <= FEW else [group[0] for group in self.program.alike.groups(members)]
+
+    def _boolean(self, situation: str) -> bool:
+        return self.program.domain.situations[situation].boolean
+
+    def _key(self, arguments: tuple[str, ...], env: Env) -> Key | None:
+        found = tuple(env.get(a, a) for a in arguments)
+        return None if None in found else key_of(found)  # type: ignore[arg-type]
+
+    # ----------------------------------------------------------------------------------------------------- interpreter
+
+    def holds(self, condition: Condition, env: Env) -> bool:
+        """Whether a condition holds now, with all its outer variables bound."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                default = FALSE if self._boolean(situation) else None
+                key = self._key(arguments, env)
+                now = None if key is None else self.table.now[situation].get(key, default)
+                return (now is not None and now == env.get(value, value)) is not negated
+            case RelationCondition(relation, arguments, negated):
+                tuples = self.program.problem.relations.get(relation, frozenset())
+                return (tuple(env.get(a, a) for a in arguments) in tuples) is not negated
+            case ClassCondition(term, kind, negated):
+                return (env.get(term, term) in self.program.members.get(kind, ())) is not negated
+            case EqualityCondition(left, right, negated):
+                return (env.get(left, left) == env.get(right, right)) is not negated
+            case Witness(negated=negated):
+                return (next(self._satisfying(condition, env), None) is not None) is not negated
+            case AnyOf(alternatives, negated):
+                return any(self._all(group, env) for group in alternatives) is not negated
+
+    def _all(self, conditions: tuple[Condition, ...], env: Env) -> bool:
+        bound = dict(env)
+        for condition in conditions:
+            if (
+                isinstance(condition, ValueCondition)
+                and condition.value.startswith("?")
+                and condition.value not in bound
+            ):
+                key = self._key(condition.arguments, bound)
+                now = None if key is None else self.table.now[condition.situation].get(key)
+                if now is None:
+                    return False
+                bound[condition.value] = now
+            elif not self.holds(condition, bound):
+                return False
+        return True
+
+    def _satisfying(self, witness: Witness, env: Env) -> Iterator[str]:
+        members = self.program.members.get(witness.kind, frozenset())
+        pool: Iterator[str] = iter(self.program.problem.classes.get(witness.kind, ()))
+        for c in witness.conditions:
+            if isinstance(c, ValueCondition) and c.arguments == (witness.variable,) and not c.negated:
+                value = env.get(c.value, c.value)
+                if value is not None and not value.startswith("?") and value != FALSE:
+                    keys = self.table.who[c.situation].get(value, {})
+                    pool = iter([arguments_of(key)[0] for key in keys if arguments_of(key)[0] in members])
+        for individual in pool:
+            if self._all(witness.conditions, {**env, witness.variable: individual}):
+                yield individual
+
+
+def _fluent(condition: Condition) -> bool:
+    return isinstance(condition, ValueCondition | Witness | AnyOf)
+
+
+def _static(condition: Condition) -> bool:
+    match condition:
+        case ValueCondition():
+            return False
+        case Witness(_, _, conditions):
+            return all(map(_static, conditions))
+        case AnyOf(alternatives):
+            return all(_static(c) for group in alternatives for c in group)
+    return True
+
+
+def _compares(condition: Condition) -> bool:
+    """Whether a condition says that individuals are the same, or aren't."""
+    match condition:
+        case EqualityCondition():
+            return True
+        case Witness(_, _, conditions):
+            return any(map(_compares, conditions))
+        case AnyOf(alternatives):
+            return any(_compares(c) for group in alternatives for c in group)
+    return False

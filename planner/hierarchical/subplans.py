@@ -1,0 +1,347 @@
+"""A few steps towards a few wants: search over relevant behaviours, on a state that is changed in place.
+
+targets   the symbols that shall get a value, with it
+kept      what must hold again in the end; `None` means that everything else must (a refinement changes nothing else)
+off       symbols that haven't the value that they must have in the end: the goal of this search, empty when it is reached
+depth     how many steps are left
+changed   the symbols that differ from the start of the segment, with their values: this names a state
+
+Only relevant behaviours are tried: those that give a symbol that is off its value, or that give an unmet precondition of such
+a behaviour its value, and so on. A chain of k of them takes at least k steps, so that longer chains than `depth` aren't looked
+at. `find` deepens iteratively and returns a shortest segment of those that relevance admits; `seek` goes further, best first,
+for segments too long for that. What relevance doesn't admit is left to flat search.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TypeAlias
+
+from planner.hierarchical.operators import Achiever, Program
+from planner.hierarchical.state import Cell, Key, Table, arguments_of
+from planner.hierarchical.subgoals import Env, Want, Wants
+from planner.plan import Counts
+from reasoner.symbols import FALSE
+
+Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
+"""A quantified behaviour: its name and arguments."""
+Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
+"""A quantified behaviour, and the changes since the segment began after which it is forbidden."""
+Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
+"""Orders what could be done, given the level and the state; may leave nothing out."""
+Watch: TypeAlias = "Callable[[int | None], object]"
+"""Told the level of each expansion, and `None` before what costs most begins."""
+
+
+FIRST = 3
+"""Weight of the way to a target against the way back of what has to be restored, which grows while that is gone."""
+
+
+class LimitError(Exception):
+    """A limit of the planning call has been reached; the message says which."""
+
+
+def nobody(level: int | None) -> None:
+    """Watch nothing."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to try.
+
+    `depth` is the most steps of a segment or a chain, `expansions` the most of one search; `slack` is by how much a chain may
+    be longer than the shortest, `breadth` how many taken values of a sort are proposed where none is free; `questions` is the
+    most values that chains towards one symbol may lead through.
+    """
+
+    depth: int
+    expansions: int
+    slack: int = 0
+    breadth: int = 1
+    questions: int = 200
+
+
+@dataclass
+class Segments:
+    """Searches short segments on one table.
+
+    Parameters
+    ----------
+    program : Program
+    table : Table
+    goal : mapping of cell to value
+        The task's goal, which proposes values.
+    deadline : float, optional
+        `perf_counter` at which `LimitError` is raised.
+    advice : Advice, optional
+    watch : Watch, optional
+    most : int
+        Expansions of all searches together, after which `LimitError` is raised.
+    """
+
+    program: Program
+    table: Table
+    goal: Mapping[Cell, str]
+    deadline: float | None = None
+    advice: Advice | None = None
+    most: int = 200_000
+    watch: Watch = nobody
+    counts: dict[int, Counts] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.expanded = 0
+        self.focus: dict[str, None] = {}
+        bound = self.program.bind(self.table, self.focus)
+        self.forward, self.achieve = bound.forward, bound.achieve
+        self.wants = Wants(self.program, self.table, self.goal)
+        self.counts = {level: Counts() for level in self.program.levels}
+        self.widest = {
+            level: max(len(b.effects) for b in self.program.domain.at_level(level)) for level in self.program.levels
+        }
+
+    def find(
+        self,
+        level: int,
+        targets: Mapping[Cell, str],
+        kept: Mapping[Cell, str] | None,
+        effort: Effort,
+        forbidden: AbstractSet[Forbidden] = frozenset(),
+    ) -> list[Ground] | None:
+        """Return the shortest relevant steps that bring all targets about and everything kept back, or None.
+
+        The table is left as it was found.
+        """
+        table, now = self.table, self.table.now
+        self.wants.breadth = effort.breadth
+        counts, widest = self.counts[level], self.widest[level]
+        origin: dict[Cell, str] = {}
+        steps: list[Ground] = []
+        left = effort.expansions
+        seen: dict[frozenset[tuple[Cell, str]], int] = {}
+
+        def deepen(depth: int, off: dict[Cell, str], changed: dict[Cell, str]) -> bool:
+            nonlocal left
+            if not off:
+                return True
+            if len(off) > depth * widest or left <= 0:
+                return False
+            here = frozenset(changed.items())
+            if seen.get(here, 0) >= depth:
+                return False
+            seen[here] = depth
+            left -= 1
+            self.expand(level)
+            mark = len(table.trail)
+            for ground in self.ordered(level, off, depth):
+                if forbidden and (ground, here) in forbidden:
+                    continue
+                counts.generated += 1
+                done = self.step(ground, off, changed, origin, targets, kept)
+                if done is not None:
+                    steps.append(ground)
+                    if deepen(depth - 1, *done):
+                        return True
+                    steps.pop()
+                    table.undo(mark)
+            return False
+
+        start = len(table.trail)
+        off = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
+        for depth in range(1, effort.depth + 1):
+            found = deepen(depth, off, {})
+            table.undo(start)
+            if found:
+                return steps
+            if left <= 0:
+                return None
+        return None
+
+    def seek(
+        self,
+        level: int,
+        targets: Mapping[Cell, str],
+        kept: Mapping[Cell, str] | None,
+        effort: Effort,
+        forbidden: AbstractSet[Forbidden] = frozenset(),
+    ) -> list[Ground] | None:
+        """Return relevant steps to the same end as `find`, found best first, or None.
+
+        h is the sum, over the symbols that are off (targets weighing more), of the length of the shortest chain that something
+        applicable starts. A node's successors are queued by its own h (deferred evaluation), so that each state's relevance is
+        worked out once. The table is left as it was found.
+        """
+        table, now = self.table, self.table.now
+        self.wants.breadth = effort.breadth
+        counts = self.counts[level]
+        origin: dict[Cell, str] = {}
+        start = len(table.trail)
+        off = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
+        queue: list[tuple[int, int, dict[Cell, str], dict[Cell, str], tuple[Ground, ...]]] = [(0, 0, off, {}, ())]
+        seen: set[frozenset[tuple[Cell, str]]] = set()
+        left, number = effort.expansions, 0
+        while queue and left > 0:
+            _, _, off, changed, steps = heapq.heappop(queue)
+            here = frozenset(changed.items())
+            if here in seen:
+                continue
+            seen.add(here)
+            left -= 1
+            self.expand(level)
+            table.undo(start)
+            for (situation, key), value in changed.items():
+                table.put(situation, key, value)
+            found: dict[Ground, None] = {}
+            h = 0
+            for cell, value in off.items():
+                h += self.nearest(level, cell, value, effort, found) * (FIRST if cell in targets else 1)
+            mark = len(table.trail)
+            for ground in found if self.advice is None else self.advice(level, table, list(found)):
+                if forbidden and (ground, here) in forbidden:
+                    continue
+                counts.generated += 1
+                done = self.step(ground, off, changed, origin, targets, kept)
+                if done is not None:
+                    if not done[0]:
+                        table.undo(start)
+                        return [*steps, ground]
+                    number += 1
+                    rank = 2 * (h + len(done[0]) - len(off)) + len(steps)
+                    heapq.heappush(queue, (rank, number, *done, (*steps, ground)))
+                    table.undo(mark)
+        table.undo(start)
+        return None
+
+    def step(
+        self,
+        ground: Ground,
+        off: Mapping[Cell, str],
+        changed: Mapping[Cell, str],
+        origin: dict[Cell, str],
+        targets: Mapping[Cell, str],
+        kept: Mapping[Cell, str] | None,
+    ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
+        """Do a behaviour on the table and return what is off and changed after it, or None if it isn't applicable."""
+        now = self.table.now
+        done = self.forward[ground[0]](*ground[1])
+        if done is None:
+            return None
+        still, changes = dict(off), dict(changed)
+        for situation, key, value in done[1]:
+            old = now[situation].get(key)
+            if old is None:
+                if not self.exists(situation, key):
+                    continue
+                old = FALSE
+            if old == value:
+                continue
+            self.table.put(situation, key, value)
+            cell = situation, key
+            first = origin.setdefault(cell, old)
+            if value == first:
+                changes.pop(cell, None)
+            else:
+                changes[cell] = value
+            wanted = targets.get(cell) or (first if kept is None else kept.get(cell))
+            if wanted is None or wanted == value:
+                still.pop(cell, None)
+            else:
+                still[cell] = wanted
+        return still, changes
+
+    def expand(self, level: int) -> None:
+        """Count an expansion, and look at the clock now and then."""
+        counts = self.counts[level]
+        counts.expanded += 1
+        self.expanded += 1
+        self.watch(level)
+        if self.expanded > self.most:
+            raise LimitError(f"{self.most} expansions")
+        self.check_time()
+
+    def exists(self, situation: str, key: object) -> bool:
+        """Whether a boolean symbol exists that the table doesn't list."""
+        kind = self.program.domain.situations[situation]
+        return kind.boolean and all(
+            argument in self.program.members.get(of, ())
+            for argument, of in zip(arguments_of(key), kind.arguments, strict=True)  # type: ignore[arg-type]
+        )
+
+    def ordered(self, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground] | Sequence[Ground]:
+        """Return the relevant behaviours, in the order that advice gives them if there is any."""
+        found = self.relevant(level, off, depth)
+        return found if self.advice is None else self.advice(level, self.table, list(found))
+
+    def relevant(self, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
+        """Yield each applicable behaviour that starts a chain of at most `depth` towards a symbol that is off, once."""
+        given: set[Ground] = set()
+        for cell, value in off.items():
+            for length, ground in self.chains(level, cell, value):
+                if length > depth:
+                    break
+                if ground is not None and ground not in given:
+                    given.add(ground)
+                    yield ground
+
+    def nearest(self, level: int, cell: Cell, value: str, effort: Effort, found: dict[Ground, None]) -> int:
+        """Add the behaviours that start the shortest chains to a value, or hardly longer ones; return the shortest length."""
+        shortest = effort.depth + 1
+        for length, ground in self.chains(level, cell, value, effort.questions):
+            if length > min(shortest + effort.slack, effort.depth):
+                break
+            if ground is not None:
+                found[ground] = None
+                shortest = min(shortest, length)
+        return shortest
+
+    def chains(self, level: int, cell: Cell, value: str, questions: int = 1000) -> Iterator[tuple[int, Ground | None]]:
+        """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
+
+        Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer.
+        """
+        asked: set[tuple[str, Key, str]] = set()
+        wants: Iterable[Want] = [(*cell, (value,))]
+        blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
+        length = 0
+        while (blocked or not length) and len(asked) < questions:
+            length += 1
+            yield length, None
+            if blocked:  # worked out only now: who wants no longer chains has gone
+                wants = [
+                    want
+                    for achiever, unmet, env in blocked
+                    for number in unmet
+                    for want in self.wants.towards(achiever, number, env, level)
+                ]
+            blocked = []
+            for situation, key, values in wants:
+                for wanted in values:
+                    if (question := (situation, key, wanted)) in asked:
+                        continue
+                    asked.add(question)
+                    self.check_time()
+                    for achiever in self.program.achievers.get((level, situation), ()):
+                        achieve = self.achieve[achiever.behavior, achiever.effect]
+                        for arguments, unmet, env in achieve(*arguments_of(key), wanted):
+                            if unmet:
+                                blocked.append((achiever, unmet, env))
+                            else:
+                                yield length, (achiever.behavior, arguments)
+
+    def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
+        """Return the symbols whose change could make a value attainable in one step."""
+        found: dict[Cell, None] = {}
+        for achiever in self.program.achievers.get((level, cell[0]), ()):
+            for _, unmet, env in self.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
+                for number in unmet:
+                    for situation, key, _ in self.wants.towards(achiever, number, env, level):
+                        found[situation, key] = None
+        return list(found)
+
+    def check_time(self) -> None:
+        """Raise `LimitError` when the time limit has passed."""
+        if self.deadline is not None and perf_counter() > self.deadline:
+            raise LimitError("the time limit")

@@ -1,0 +1,166 @@
+"""Proofs that there is no plan, cheapest first, each with its reason in the ontology's terms.
+
+All of them look at the lowest level only: what an upper level can't do proves nothing, since the level below may do it
+otherwise. A proof here is sound and seldom complete; what is left is decided by search to exhaustion.
+"""
+
+from __future__ import annotations
+
+from planner.hierarchical.operators import Achiever, Program
+from planner.hierarchical.state import Cell, arguments_of
+from planner.hierarchical.subplans import Segments
+from planner.plan import Reason
+from reasoner.symbols import FALSE, Behavior, Fact, RelationCondition, Symbol, ValueCondition, Witness
+
+
+def unattainable(segments: Segments) -> Reason | None:
+    """Return why a goal can't be brought about in any situation, or None if that can't be shown at once.
+
+    A value counts as attainable unless each behaviour that sets it lacks a static fact, or needs a value that isn't
+    attainable; what is being asked already counts as attainable, so that a "no" is a proof.
+    """
+    program = segments.program
+    level = program.levels[-1]
+    asked: dict[tuple[Cell, str], bool] = {}
+    program.thorough = True
+    try:
+        for cell, value in segments.goal.items():
+            if segments.table.now[cell[0]].get(cell[1], FALSE) != value and not _attainable(
+                segments, level, cell, value, asked
+            ):
+                return _reason(segments, level, cell, value, asked)
+    finally:
+        program.thorough = False
+    return None
+
+
+def _attainable(segments: Segments, level: int, cell: Cell, value: str, asked: dict[tuple[Cell, str], bool]) -> bool:
+    if segments.table.now[cell[0]].get(cell[1], FALSE) == value:
+        return True
+    known = asked.get((cell, value))
+    if known is not None:
+        return known
+    asked[cell, value] = True
+    for achiever in segments.program.achievers.get((level, cell[0]), ()):
+        achieve = segments.achieve[achiever.behavior, achiever.effect]
+        for _, unmet, env in achieve(*arguments_of(cell[1]), value):
+            if all(
+                _attainable(segments, level, *needed, asked)
+                for number in unmet
+                if (needed := _needed(segments, achiever, number, env)) is not None
+            ):
+                return True
+    asked[cell, value] = False
+    return False
+
+
+def _needed(segments: Segments, achiever: Achiever, number: int, env: dict[str, str | None]) -> tuple[Cell, str] | None:
+    """Return the one fact that an unmet condition needs, if it needs one."""
+    condition = achiever.soft[number]
+    if not isinstance(condition, ValueCondition) or condition.negated:
+        return None
+    if any(term in achiever.determined for term in (*condition.arguments, condition.value)):
+        return None
+    arguments = tuple(env.get(a) or a for a in condition.arguments)
+    key = arguments[0] if len(arguments) == 1 else arguments
+    return (condition.situation, key), env.get(condition.value) or condition.value
+
+
+def _reason(segments: Segments, level: int, cell: Cell, value: str, asked: dict[tuple[Cell, str], bool]) -> Reason:
+    """Return a goal with the missing static facts at the end of the chain of what it needs."""
+    goal = Fact(Symbol(cell[0], arguments_of(cell[1])), value)
+    lacking: dict[str, tuple[str, ...]] = {}
+    seen: set[tuple[Cell, str]] = set()
+    queue = [(cell, value)]
+    for at, wanted in queue:
+        if (at, wanted) in seen:
+            continue
+        seen.add((at, wanted))
+        program = segments.program
+        for achiever in program.achievers.get((level, at[0]), ()):
+            behavior = program.domain.behaviors[achiever.behavior]
+            found = False
+            for _, unmet, env in segments.achieve[achiever.behavior, achiever.effect](*arguments_of(at[1]), wanted):
+                found = True
+                for number in unmet:
+                    needed = _needed(segments, achiever, number, env)
+                    if needed is not None and asked.get(needed) is False:
+                        queue.append(needed)
+            if not found:
+                for text, names in _missing(program, behavior, achiever.effect, (*arguments_of(at[1]), wanted)):
+                    lacking[text] = names
+    if not lacking:
+        return Reason(f"{goal}: nothing brings this about", (*goal.symbol.arguments, goal.symbol.situation, goal.value))
+    terms = dict.fromkeys((*goal.symbol.arguments, goal.symbol.situation, goal.value))
+    for more in lacking.values():
+        terms.update(dict.fromkeys(more))
+    return Reason(f"{goal}: {'; '.join(lacking)}", tuple(terms))
+
+
+def _missing(
+    program: Program, behavior: Behavior, effect: int, given: tuple[str, ...]
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the static relations of a behaviour that no individual has to what its effect names."""
+    change = behavior.effects[effect]
+    env = {t: v for t, v in zip((*change.arguments, change.value), given, strict=True) if t.startswith("?")}
+    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    found = []
+    for condition in behavior.preconditions:
+        if isinstance(condition, RelationCondition) and not condition.negated:
+            bound = [env.get(a, a) for a in condition.arguments]
+            rows = program.problem.relations.get(condition.relation, frozenset())
+            if any(all(b.startswith("?") or b == r for b, r in zip(bound, row, strict=True)) for row in rows):
+                continue
+            # Said of all individuals of the first argument's class where it is true of all of them.
+            if all(row[1:] != tuple(bound[1:]) for row in rows) and condition.arguments[0] in kinds:
+                names = [f"no {kinds[condition.arguments[0]]}", *bound[1:]]
+            else:
+                names = [f"not {bound[0]}", *bound[1:]]
+            text = " ".join((names[0], condition.relation, *names[1:]))
+            found.append((text, (condition.relation, *(b for b in names[1:] if not b.startswith("?")))))
+    return found
+
+
+def contested(segments: Segments) -> Reason | None:
+    """Return which two goals want one value that only one symbol can have at a time, or None.
+
+    A situation type is exclusive on the lowest level if no two symbols share a value at the start, and every behaviour that
+    sets one to a value requires that nobody has it.
+    """
+    program = segments.program
+    takers: dict[tuple[str, str], Cell] = {}
+    for cell, value in segments.goal.items():
+        other = takers.setdefault((cell[0], value), cell)
+        if other != cell and _exclusive(segments, cell[0], value):
+            a, b = (Fact(Symbol(c[0], arguments_of(c[1])), value) for c in (other, cell))
+            terms = (*a.symbol.arguments, *b.symbol.arguments, a.symbol.situation, value)
+            return Reason(
+                f"{a} and {b} exclude each other: {program.domain.situations[cell[0]].name} {value} is for one", terms
+            )
+    return None
+
+
+def _exclusive(segments: Segments, situation: str, value: str) -> bool:
+    program = segments.program
+    if len(segments.table.who[situation].get(value, ())) > 1:
+        return False
+    for behavior in program.domain.at_level(program.levels[-1]):
+        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        setting = [e for e in behavior.effects if e.situation == situation]
+        for effect in setting:
+            if not effect.value.startswith("?"):
+                if effect.value == value:
+                    return False
+            elif value in program.members.get(kinds[effect.value], ()) and (
+                len(setting) > 1
+                or not any(
+                    isinstance(c, Witness)
+                    and c.negated
+                    and c.conditions == (ValueCondition(situation, (c.variable,), effect.value),)
+                    and program.members.get(program.domain.situations[situation].arguments[0], frozenset())
+                    <= program.members.get(c.kind, frozenset())
+                    for c in behavior.preconditions
+                )
+            ):
+                return False
+    return True

@@ -1,0 +1,109 @@
+"""A* as Algorithm 1 of the paper means it, with the cogency ranking score of eqs. (3) and (5) in f.
+
+g    cost of the behaviours from the start to a node
+h    estimated cost from a node to the goal: the situated object symbols that don't match it
+c    cogency term of the behaviour that led to a node, judged in the state before it; not accumulated along the path
+f    g + h + c, the least of which is expanded next; ties in the order of generation
+n    depth of a node
+
+Algorithm 1 as printed never puts the start into the open set, has no closed set and overwrites parents without comparing g;
+here a state is reached again only by a smaller g. The goal test takes the goal's symbols only, as Table I's goal is partial.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+
+from planner.paper.transitions import Applied, Values
+from planner.plan import Counts, Limits, Status
+
+Goal = Mapping[int, str]
+"""Wanted values by position in the state."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found: `path` is there exactly if `status` is solved."""
+
+    status: Status
+    path: tuple[Applied, ...]
+    ranks: tuple[float | None, ...]
+    counts: Counts
+
+
+def mismatches(values: Values, goal: Goal) -> int:
+    """Return h: how many symbols of the goal have another value (section IV-A of the paper)."""
+    return sum(values[i] != wanted for i, wanted in goal.items())
+
+
+def a_star(
+    start: Values,
+    goal: Goal,
+    successors: Callable[[Values], Iterable[Applied]],
+    cost: Callable[[Applied], float],
+    rank: Callable[[Values], Callable[[Applied], float]] | None = None,
+    bonus: Callable[[float, int], float] = lambda c, n: 0.0,
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    deadline: float | None = None,
+) -> Found:
+    """Search a path from `start` to a state with the values of `goal`.
+
+    Parameters
+    ----------
+    start : Values
+    goal : Goal
+    successors : function of a state to what can be done there
+    cost : function of one of them to its cost
+    rank : function of a state to the ranking scores of what can be done there (eq. 4), in [0, 1]; None leaves c at 0
+    bonus : function of ranking score and depth to the term c of eq. (3)
+    limits : Limits
+    deadline : float, optional
+        `time.perf_counter` at which to give up.
+
+    Returns
+    -------
+    Found
+        Unsolvable means that no state reachable by `successors` has the goal's values.
+    """
+    counts = Counts(generated=1, evaluated=1)
+    g = {start: 0.0}
+    depth = {start: 0}
+    came_from: dict[Values, tuple[Values, Applied, float | None]] = {}
+    open_set = [(float(mismatches(start, goal)), 0, start, 0.0)]  # f, order of generation, state, g
+    while open_set:
+        _, _, state, g_state = heapq.heappop(open_set)
+        if g_state > g[state]:
+            continue  # reached by a cheaper path since
+        if not mismatches(state, goal):
+            return _reconstruct(came_from, state, counts)
+        if counts.expanded >= limits.expansions or (deadline is not None and perf_counter() > deadline):
+            return Found(Status.GAVE_UP, (), (), counts)
+        counts.expanded += 1
+        n = depth[state] + 1
+        score = rank(state) if rank else None
+        for applied in successors(state):
+            counts.generated += 1
+            next_state, next_g = applied.after, g_state + cost(applied)
+            if next_g >= g.get(next_state, float("inf")):
+                continue
+            counts.evaluated += 1
+            c_m = score(applied) if score else None
+            c = bonus(c_m, n) if c_m is not None else 0.0
+            g[next_state], depth[next_state] = next_g, n
+            came_from[next_state] = (state, applied, c_m)
+            heapq.heappush(open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g))
+    return Found(Status.UNSOLVABLE, (), (), counts)
+
+
+def _reconstruct(
+    came_from: Mapping[Values, tuple[Values, Applied, float | None]], state: Values, counts: Counts
+) -> Found:
+    path, ranks = [], []
+    while state in came_from:
+        state, applied, c_m = came_from[state]
+        path.append(applied)
+        ranks.append(c_m)
+    return Found(Status.SOLVED, tuple(reversed(path)), tuple(reversed(ranks)), counts)

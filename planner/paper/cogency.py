@@ -1,0 +1,80 @@
+"""Cogent confabulation: how strongly a behaviour supports the facts that are assumed to hold.
+
+The memory of the paper is a table p(<o, S> | b): for each quantified behaviour b and situated object symbol <o, S> one
+categorical distribution over the values of the symbol. What was never learned is uniform.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from reasoner.memory.links import Conclusion, Links
+from reasoner.symbols import Problem, State, Symbol
+
+
+@dataclass(frozen=True)
+class PaperConstants:
+    """The constants of eqs. (2) and (5), and what is ranked: all M behaviours or the applicable ones."""
+
+    k: float = 3.0
+    anticipated_length: int = 100  # N; the paper gives no value, and one near the plan's length does harm
+    learning: float = 0.1  # λ
+    rank_among: str = "all"  # or "applicable"
+
+    def bonus(self, c_m: float, n: int) -> float:
+        """Return the term c of eq. (5): ``(c_m - 1) k w`` with ``w = max(1 - n/N, 0)``."""
+        return (c_m - 1.0) * self.k * max(1.0 - n / self.anticipated_length, 0.0)
+
+
+PAPER = PaperConstants()
+
+
+def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, str, tuple[str, ...]]]:
+    """Return the facts that a level knows of, each with the values that its symbol can have there.
+
+    Every one is a factor of the cogency, relevant or not (section III-D of the paper).
+    """
+    facts = []
+    for symbol in sorted(state):
+        if problem.domain.situations[symbol.situation].level <= level:
+            values = problem.values(symbol, level)
+            if state[symbol] in values:
+                facts.append((symbol, state[symbol], values))
+    return facts
+
+
+def cogencies(
+    links: Links, conclusions: Sequence[Conclusion], state: State, problem: Problem, level: int
+) -> dict[Conclusion, float]:
+    """Return ln cogency(b) of each conclusion: the sum of ln p(fact | b) over the facts of a state.
+
+    Facts are treated as independent given the behaviour, eq. (1); its factor k is common to all behaviours and dropped.
+
+    Returns
+    -------
+    mapping of conclusion to float
+        In [-inf, 0]; larger is more cogent. Dimensionless.
+    """
+    facts = situation(state, problem, level)
+    uniform = -sum(math.log(len(values)) for _, _, values in facts)
+    scores = {}
+    for conclusion in conclusions:
+        if conclusion not in links.tables:
+            scores[conclusion] = uniform
+            continue
+        p = [links.probability(conclusion, symbol, value, values) for symbol, value, values in facts]
+        scores[conclusion] = sum(map(math.log, p)) if all(p) else -math.inf
+    return scores
+
+
+def ranking(scores: Mapping[Conclusion, float]) -> dict[Conclusion, float]:
+    """Return c_m of eq. (4): rank 1 is the most cogent, ties share the lowest rank, divided by how many there are.
+
+    >>> ranking({("a", ()): -1.0, ("b", ()): -3.0, ("c", ()): -1.0, ("d", ()): -9.0})
+    {('a', ()): 0.25, ('b', ()): 0.75, ('c', ()): 0.25, ('d', ()): 1.0}
+    """
+    ordered = sorted(-round(score, 12) for score in scores.values())
+    return {key: (bisect_left(ordered, -round(score, 12)) + 1) / len(ordered) for key, score in scores.items()}

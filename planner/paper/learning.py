@@ -1,0 +1,79 @@
+"""Learning from a plan that was carried out: eq. (2) on every behaviour of every level, in the situation where it was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from planner.paper.cogency import PAPER, PaperConstants, situation
+from planner.paper.transitions import Model, Values
+from planner.plan import Plan, Step
+from reasoner.memory.links import Conclusion, Links
+from reasoner.symbols import GroundBehavior, Problem, State
+
+
+class LearningError(ValueError):
+    """The plan can't be done from the scene's situation, so nothing can be learned from it."""
+
+
+def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:
+    """Return the links after one successful execution of a plan; `links` itself stays as it is.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its initial state is where the plan begins.
+    plan : Plan
+        Any depth: a demonstration of the abstract level alone teaches that level.
+    links : Links
+    constants : PaperConstants
+        λ of eq. (2).
+
+    Raises
+    ------
+    LearningError
+        A step's preconditions don't hold where it is done.
+    """
+    learned = Links({c: {s: dict(t) for s, t in symbols.items()} for c, symbols in links.tables.items()})
+    model = Model(problem)
+    _learn_steps(model, plan.steps, model.values(problem.initial), learned, constants)
+    return learned
+
+
+def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Links, constants: PaperConstants) -> Values:
+    state = start
+    for step in steps:
+        applied = model.apply(GroundBehavior(step.id, step.behavior, step.arguments), state)
+        if applied is None:
+            raise LearningError(f"step {'.'.join(map(str, step.path))} ({step}): its preconditions don't hold there")
+        conclusion = (step.behavior, step.arguments)
+        reinforce(links, conclusion, model.state(state), model.problem, step.level, constants.learning)
+        state = _learn_steps(model, step.steps, state, links, constants) if step.steps else applied.after
+    return state
+
+
+def reinforce(
+    links: Links, conclusion: Conclusion, state: State, problem: Problem, level: int, learning: float
+) -> None:
+    """Apply eq. (2): raise p of the facts that hold by λ, then normalise each symbol's distribution.
+
+    Parameters
+    ----------
+    links : Links
+        Changed in place.
+    conclusion : Conclusion
+        The behaviour that was planned and executed successfully.
+    state : State
+        The situation in which it was chosen; the paper doesn't say which state is meant.
+    problem : Problem
+        Gives the values that each symbol can have.
+    level : int
+        Symbols and values of later levels aren't part of the situation.
+    learning : float
+        λ of eq. (2).
+    """
+    symbols = links.tables.setdefault(conclusion, {})
+    for symbol, value, values in situation(state, problem, level):
+        old = symbols.get(symbol) or dict.fromkeys(values, 1.0 / len(values))
+        raised = {v: p + (learning if v == value else 0.0) for v, p in old.items()}
+        total = sum(raised.values())
+        symbols[symbol] = {v: p / total for v, p in raised.items()}

@@ -1,0 +1,1 @@
+"""What the ontology says about bodies, as values for `sim/`."""

@@ -1,0 +1,58 @@
+"""Rules of validation on the measures of bodies, which a query can't work out: see `RULES` at the end.
+
+Each rule is a function from an `Embodiment` to findings without the node's IRI: short name, what, why, remedy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+from reasoner.embodiment.values import Embodiment, Shape
+
+Measured = tuple[str, str, str, str]
+"""Short name of the object, what, why, remedy."""
+
+
+def too_wide(embodiment: Embodiment) -> Iterator[Measured]:
+    """Find objects that no hand opens wide enough for."""
+    openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
+    for name, body in embodiment.bodies.items():
+        width = _width(body.shape)
+        if openings and width >= max(openings):
+            yield (
+                name,
+                f"{name} is {width * 100:.1f} cm wide where a hand takes it; the widest hand opens {max(openings) * 100:.1f} cm",
+                "a hand takes things from the side, between two fingers",
+                "make the shape narrower at e:graspHeight, or take it where it is",
+            )
+
+
+def grasped_outside(embodiment: Embodiment) -> Iterator[Measured]:
+    """Find objects whose grasp height is above their top."""
+    for name, body in embodiment.bodies.items():
+        top = body.shape.profile[-1][0] if body.shape.profile else body.shape.numbers.get("height", 0.0)
+        if not 0 < body.shape.grasp_height < top:
+            yield (
+                name,
+                f"{name} is taken {body.shape.grasp_height * 100:.1f} cm above its base, but is {top * 100:.1f} cm high",
+                "the fingers would close on nothing",
+                "state an e:graspHeight of its shape that is less than its height",
+            )
+
+
+def _width(shape: Shape) -> float:
+    """Return how far apart the fingers have to be at the grasp height."""
+    if not shape.profile:
+        return min(shape.numbers.get("width", 0.0), shape.numbers.get("depth", 0.0)) or 2 * shape.numbers["radius"]
+    radius = shape.profile[-1][1]
+    for (low, below), (high, above) in pairwise(shape.profile):
+        if low <= shape.grasp_height <= high:
+            radius = below + (above - below) * (shape.grasp_height - low) / ((high - low) or 1.0)
+    return 2 * (radius + shape.numbers.get("wall", 0.004))
+
+
+RULES: dict[str, Callable[[Embodiment], Iterator[Measured]]] = {
+    "too-wide": too_wide,
+    "grasped-outside": grasped_outside,
+}

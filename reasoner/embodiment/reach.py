@@ -1,0 +1,74 @@
+"""Reach facts: computed elsewhere from the robot's geometry, asserted in a file of their own beside the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph.knowledge import CORE, PREFIXES, KnowledgeError, KnowledgeGraph
+from reasoner.names import Names
+
+PROV = "http://www.w3.org/ns/prov#"
+RELATIONS = "SELECT DISTINCT ?relation WHERE { ?relation a :ReachRelation } ORDER BY ?relation"
+HASHES = "SELECT DISTINCT ?hash WHERE { ?ontology :inputsHash ?hash }"
+
+
+def reach_relation(graph: KnowledgeGraph) -> str:
+    """Return the IRI of the relation that reach facts are stated with.
+
+    Raises
+    ------
+    KnowledgeError
+        The domain declares none, or several.
+    """
+    found = [row[0].value for row in graph.select(RELATIONS) if isinstance(row[0], ox.NamedNode)]
+    if len(found) != 1:
+        raise KnowledgeError(f"wanted one relation that is a :ReachRelation, found {len(found)}: {', '.join(found)}")
+    return found[0]
+
+
+def reach_hash(graph: KnowledgeGraph) -> str | None:
+    """Return the hash of the inputs from which the scene's reach file was computed, if it has one."""
+    rows = graph.select(HASHES, ("reach",))
+    return rows[0][0].value if rows and isinstance(rows[0][0], ox.Literal) else None
+
+
+def save_reach(
+    path: Path, graph: KnowledgeGraph, names: Names, pairs: Iterable[tuple[str, str]], inputs_hash: str
+) -> None:
+    """Write reach facts beside the scene, with what they were computed from.
+
+    Parameters
+    ----------
+    path : Path
+        ``SCENE.reach.ttl``.
+    graph : KnowledgeGraph
+        The scene.
+    names : Names
+    pairs : iterable of (hand, place)
+        Short names.
+    inputs_hash : str
+        Identifies the geometry and the settings; another hash means that the file is stale.
+    """
+    relation = ox.NamedNode(reach_relation(graph))
+    iri = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach")
+    kind, hash_property = ox.NamedNode(PREFIXES["rdf"] + "type"), ox.NamedNode(CORE + "inputsHash")
+    by = ox.NamedNode(PROV + "wasGeneratedBy")
+    owl = PREFIXES["owl"]
+    triples = [
+        ox.Triple(iri, kind, ox.NamedNode(owl + "Ontology")),
+        ox.Triple(iri, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
+        ox.Triple(iri, by, ox.Literal("inverse kinematics of the robot's URDF at every place of the scene")),
+        ox.Triple(iri, hash_property, ox.Literal(inputs_hash)),
+        ox.Triple(by, kind, ox.NamedNode(owl + "AnnotationProperty")),
+    ]
+    triples += [
+        ox.Triple(ox.NamedNode(names.iri(hand)), relation, ox.NamedNode(names.iri(place)))
+        for hand, place in sorted(pairs)
+    ]
+    prefixes = {p: n for p, n in graph.prefixes.items() if p in ("owl", "k", "r", "t")}
+    text = ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes={**prefixes, "": CORE, "prov": PROV})
+    write_whole(path, text or b"")

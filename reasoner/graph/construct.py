@@ -1,0 +1,39 @@
+"""What a CONSTRUCT query gives, written as an ontology that imports the scene which was asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph.knowledge import PREFIXES, KnowledgeError, KnowledgeGraph
+
+
+def write_construct(graph: KnowledgeGraph, query: str, path: Path) -> int:
+    """Write the triples of a CONSTRUCT query into a Turtle file and return how many they are.
+
+    The file is an ontology called like it, beside the scene's IRI, and imports the scene: it can be planned in itself.
+
+    Raises
+    ------
+    KnowledgeError
+        The query isn't SPARQL, or its answer is no triples, or none at all.
+    """
+    answer = graph.query(query)
+    if not isinstance(answer, ox.QueryTriples):
+        raise KnowledgeError(
+            "wanted a CONSTRUCT query, whose answer is triples; leave -o out to see the rows of a SELECT"
+        )
+    found = sorted(set(answer), key=str)
+    if not found:
+        raise KnowledgeError("the query gives no triples, so no file was written")
+    owl, kind = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
+    iri = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{path.stem}")
+    head = [
+        ox.Triple(iri, kind, ox.NamedNode(owl + "Ontology")),
+        ox.Triple(iri, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
+    ]
+    text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.prefixes)
+    write_whole(path, text or b"")
+    return len(found)

@@ -1,0 +1,143 @@
+"""OWL 2 RL: what follows from the ontology is written to the graph `inferred` before planning.
+
+Only what can't change is concluded. Facts of situation types are left out, since behaviours change them; they count merely as
+proof that their subject and object have the domain and range of the property. A class that is defined by situations is
+compiled into conditions instead, see `reasoner.reading.definitions`.
+
+The reasoner runs only if the ontology says something from which more follows than the reader sees by itself (it follows
+subclasses): `needed` asks for that. What RL can't conclude is said in docs/inference.md.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import BASE, CORE, KnowledgeError, KnowledgeGraph, text
+from reasoner.names import local_name
+
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+OWL = "http://www.w3.org/2002/07/owl#"
+TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
+GIVEN = ("asserted", "reach")
+WORLD = {CORE + name for name in ("Object", "Robot", "Hand")}
+"""The core's classes of things; its others describe behaviours, of which nothing is to be concluded."""
+
+NEEDED = """
+ASK {
+  { VALUES ?axiom { owl:equivalentClass owl:intersectionOf owl:unionOf owl:someValuesFrom owl:allValuesFrom owl:hasValue
+                    owl:hasKey owl:sameAs }
+    ?subject ?axiom ?object . FILTER(?subject != :Truth) }
+  UNION { ?relation a/rdfs:subClassOf* :Relation ;
+            a|owl:inverseOf|^owl:inverseOf|^rdfs:subPropertyOf|owl:equivalentProperty ?more .
+          FILTER(?more IN (owl:TransitiveProperty, owl:SymmetricProperty)
+                 || EXISTS { ?more a owl:ObjectProperty }) }
+}"""
+CHANGING = "SELECT DISTINCT ?property WHERE { ?situation :valueProperty ?property }"
+RELATIONS = "SELECT DISTINCT ?property WHERE { ?property a/rdfs:subClassOf* :Relation }"
+CLASSES = "SELECT DISTINCT ?class WHERE { ?class a owl:Class . FILTER(isIRI(?class)) }"
+PARTS_OF_DEFINITIONS = """
+SELECT DISTINCT ?class ?part WHERE {
+  ?class owl:equivalentClass/owl:intersectionOf/rdf:rest*/rdf:first ?part . FILTER(isIRI(?class) && isIRI(?part))
+}"""
+TYPED_BY_FACTS = """
+SELECT DISTINCT ?individual ?class WHERE {
+  ?situation :valueProperty ?property . ?subject ?property ?object .
+  { ?property rdfs:domain ?class . BIND(?subject AS ?individual) } UNION
+  { ?property rdfs:range ?class . BIND(?object AS ?individual) }
+  FILTER(isIRI(?class))
+}"""
+
+
+def needed(graph: KnowledgeGraph) -> bool:
+    """Tell whether more follows from the ontology than what subclasses say."""
+    return bool(graph.query(NEEDED, GIVEN))
+
+
+def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
+    """Write what follows by OWL 2 RL into the graph `inferred`, and return how many triples that are.
+
+    Kept are types, subclasses and tuples of static relations that aren't stated already.
+
+    Parameters
+    ----------
+    graph : KnowledgeGraph
+        Its graph `inferred` is emptied first.
+    always : bool
+        Run the reasoner even if nothing is `needed`.
+
+    Raises
+    ------
+    KnowledgeError
+        Two individuals turn out to be one, because a functional property has both as its value.
+    """
+    graph.store.clear_graph(ox.NamedNode(BASE + "inferred"))
+    if not always and not needed(graph):
+        return 0
+    changing = _iris(graph, CHANGING)
+    relations, classes = _iris(graph, RELATIONS) - changing, _iris(graph, CLASSES)
+    found = []
+    for subject, predicate, value in _reason(_static(graph, changing)):
+        if predicate == SAME and subject < value:
+            _refuse_merging(graph, subject, value)
+        if (predicate in (TYPE.value, SUBCLASS) and value in classes) or predicate in relations:
+            found.append((subject, predicate, value))
+    found += [(text(kind), SUBCLASS, text(part)) for kind, part in graph.select(PARTS_OF_DEFINITIONS, GIVEN)]
+    new = [triple for triple in found if not _stated(graph, triple) and triple[0] != triple[2]]
+    graph.add("inferred", new)
+    return len(new)
+
+
+def _iris(graph: KnowledgeGraph, query: str) -> set[str]:
+    return {term.value for (term,) in graph.select(query, GIVEN) if isinstance(term, ox.NamedNode)}
+
+
+def _static(graph: KnowledgeGraph, changing: set[str]) -> Iterator[ox.Triple]:
+    """Yield what the reasoner sees: no texts, nothing inside behaviours, no facts that may change."""
+    for name in GIVEN:
+        for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name)):
+            predicate = quad.predicate.value
+            if isinstance(quad.object, ox.Literal) or predicate in changing or predicate.startswith(CORE):
+                continue
+            if not (isinstance(quad.object, ox.NamedNode) and _of_behaviors(quad.object.value)):
+                yield quad.triple
+    for individual, kind in graph.select(TYPED_BY_FACTS, GIVEN):
+        if isinstance(individual, ox.NamedNode) and isinstance(kind, ox.NamedNode):
+            yield ox.Triple(individual, TYPE, kind)
+
+
+def _of_behaviors(iri: str) -> bool:
+    return iri.startswith(CORE) and iri not in WORLD
+
+
+def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
+    """Yield the closure of some triples, those of IRIs only."""
+    import reasonable
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "static.ttl"  # N-Triples are Turtle
+        file.write_bytes(ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"")
+        reasoner = reasonable.PyReasoner()
+        reasoner.load_file(str(file))
+        for triple in reasoner.reason():
+            if all(type(term).__name__ == "URIRef" for term in triple):
+                yield tuple(map(str, triple))  # type: ignore[misc]
+
+
+def _stated(graph: KnowledgeGraph, triple: tuple[str, str, str]) -> bool:
+    subject, predicate, value = map(ox.NamedNode, triple)
+    return any(ox.Quad(subject, predicate, value, ox.NamedNode(BASE + name)) in graph.store for name in GIVEN)
+
+
+def _refuse_merging(graph: KnowledgeGraph, one: str, other: str) -> None:
+    same = ox.NamedNode(SAME)
+    stated = [(ox.NamedNode(a), same, ox.NamedNode(b)) for a, b in ((one, other), (other, one))]
+    if not any(next(graph.store.quads_for_pattern(*pair, None), None) for pair in stated):
+        raise KnowledgeError(
+            f"{local_name(one)} and {local_name(other)} would be one individual: a functional property has both as its "
+            "value. Drop one of the two facts; an owl:AllDifferent of both lets a reasoner find such a clash"
+        )

@@ -1,0 +1,292 @@
+"""The knowledge graph: ontology files with all that they import, in one SPARQL store.
+
+Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read, never written here. Nothing is
+fetched from the network (`reasoner.graph.fetching` does, if asked): an import is looked up in the catalog beside the file, then
+in the shipped one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+import pyoxigraph as ox
+
+import ontology
+
+CORE = "https://w3id.org/confab/core#"
+BASE = "urn:confab:graph:"
+GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
+SCENE = ("asserted", "inferred", "reach")
+"""The graphs that a planning call starts from."""
+FORMATS = {
+    ".ttl": ox.RdfFormat.TURTLE,
+    ".nt": ox.RdfFormat.N_TRIPLES,
+    ".owl": ox.RdfFormat.RDF_XML,
+    ".rdf": ox.RdfFormat.RDF_XML,
+}
+NO_ROWS = "wanted a SELECT query, whose answer is rows; ASK gives none, and CONSTRUCT goes into a file: -o FILE.ttl"
+PREFIXES = {
+    "": CORE,
+    "owl": "http://www.w3.org/2002/07/owl#",
+    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "skos": "http://www.w3.org/2004/02/skos/core#",
+    "xsd": "http://www.w3.org/2001/XMLSchema#",
+}
+
+Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
+Row = tuple[Term, ...]
+
+
+Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
+
+
+class Remote(Protocol):
+    """A store elsewhere that answers SPARQL 1.1, as `reasoner.graph.stores.Endpoint` is."""
+
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+        """Return what a query answers."""
+
+
+class KnowledgeError(ValueError):
+    """The knowledge that was given can't be used; the message says what, where, and what to do."""
+
+
+def text(term: Term) -> str:
+    """Return the IRI or literal of a term as text; nothing for an unbound variable."""
+    return term.value if term is not None else ""
+
+
+@dataclass
+class KnowledgeGraph:
+    """One scene with everything that it imports.
+
+    Attributes
+    ----------
+    scene : str
+        IRI of the scene's ontology.
+    store : pyoxigraph.Store
+        Named graphs as in `GRAPHS`.
+    files : mapping of ontology IRI to file
+        What was read into the graph `asserted`, the scene first.
+    prefixes : mapping of prefix to namespace
+        Those of SPARQL queries: the files' own, and `PREFIXES`.
+    remote : Remote, optional
+        The store that answers instead of `store`; it is only read.
+    round_trips : int
+        How many queries were asked so far.
+    """
+
+    scene: str
+    store: ox.Store = field(default_factory=ox.Store)
+    files: dict[str, Path] = field(default_factory=dict)
+    prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
+    remote: Remote | None = None
+    round_trips: int = 0
+
+    def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
+        """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
+
+        Raises
+        ------
+        KnowledgeError
+            The query is no SPARQL; the message has line and column.
+        """
+        answer = self.query(query, graphs, **bindings)
+        if not isinstance(answer, ox.QuerySolutions):
+            raise KnowledgeError(NO_ROWS)
+        return [tuple(row) for row in answer]
+
+    def table(self, query: str) -> tuple[tuple[str, ...], list[Row]]:
+        """Return columns and rows of a SELECT query on the union of the graphs; errors as in `select`."""
+        answer = self.query(query)
+        if not isinstance(answer, ox.QuerySolutions):
+            raise KnowledgeError(NO_ROWS)
+        return tuple(variable.value for variable in answer.variables), [tuple(row) for row in answer]
+
+    def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
+        """Return the triples of some graphs as N-Triples; of a remote store, all that it shows."""
+        if self.remote:
+            answer = self.query("CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }")
+            return (
+                answer.serialize(format=ox.RdfFormat.N_TRIPLES) or b"" if isinstance(answer, ox.QueryTriples) else b""
+            )
+        triples = {
+            q.triple
+            for name in graphs
+            for q in self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name))
+        }
+        return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
+
+    def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
+        """Return what any SPARQL 1.1 query answers on the union of some graphs; a remote store decides itself on which."""
+        self.round_trips += 1
+        if self.remote:
+            return self.remote.query(query, self.prefixes, bindings)
+        try:
+            return self.store.query(
+                query,
+                prefixes=self.prefixes,
+                default_graph=[ox.NamedNode(BASE + name) for name in graphs],
+                substitutions={ox.Variable(name): ox.NamedNode(iri) for name, iri in bindings.items()},
+            )
+        except SyntaxError as error:
+            raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
+
+    def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
+        """Add triples of IRIs to one of the named graphs."""
+        if self.remote:
+            raise KnowledgeError(f"{self.scene}: a remote store is only read; add to it with its own tools")
+        name = ox.NamedNode(BASE + graph)
+        self.store.extend(ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples)
+
+    @cached_property
+    def path(self) -> Path | None:
+        """The scene's own file, if it came from one."""
+        return self.files.get(self.scene)
+
+    @property
+    def folders(self) -> list[Path]:
+        """Where other files that the ontologies name are looked for: the shipped ones, and beside each that was read."""
+        own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
+        return list(dict.fromkeys([ontology.ROOT, *own]))
+
+
+def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
+    """Load a scene with all that it imports, and its reach file if there is one.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a shipped scene, or a file in Turtle, N-Triples or RDF/XML.
+    store : pyoxigraph.Store, optional
+        An empty store to load into; one in memory if left out.
+
+    Raises
+    ------
+    KnowledgeError
+        No such scene or file; syntax error with line and column; an import that no catalog knows.
+    """
+    path = scene_file(source)
+    graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
+    read_into(graph, path, "asserted")
+    graph.scene = _only_ontology(graph, path)
+    waiting = [(graph.scene, path)]
+    places: dict[Path, Mapping[str, Path]] = {}
+    while waiting:
+        iri, file = waiting.pop(0)
+        if iri in graph.files:
+            continue
+        if iri != graph.scene:
+            read_into(graph, file, "asserted")
+        graph.files[iri] = file
+        for imported in _imports(graph, iri):
+            if imported not in graph.files:
+                waiting.append((imported, _locate(imported, file, places)))
+    reach = path.with_name(f"{path.stem}.reach.ttl")
+    if reach.is_file():
+        read_into(graph, reach, "reach")
+    return graph
+
+
+def scene_file(source: str | Path) -> Path:
+    """Return the file that a scene's name or path stands for."""
+    shipped = ontology.scenes()
+    if str(source) in shipped:
+        return shipped[str(source)]
+    path = Path(source)
+    if path.is_file():
+        return path.resolve()
+    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)})")
+
+
+def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
+    """Read one file into a named graph of the store, and its prefixes into the graph's."""
+    form = FORMATS.get(file.suffix.lower())
+    if form is None:
+        raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
+    try:
+        if form == ox.RdfFormat.RDF_XML:
+            refuse_entity_tricks(file, file.read_text(encoding="utf-8", errors="replace"))
+        base = file.resolve().as_uri()
+        graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
+        read_prefixes(graph, file)
+    except SyntaxError as error:
+        raise KnowledgeError(f"{file}: {error.msg}") from error
+    except OSError as error:
+        raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
+
+
+def refuse_entity_tricks(file: Path | str, content: str) -> None:
+    """Let through RDF/XML whose entities abbreviate namespaces, as Protégé 4 wrote them, and nothing else of a DTD."""
+    head = content.partition("<rdf:RDF")[0]
+    doctype = re.search(r"<!DOCTYPE\s+[^\[>]*", head)
+    for entity in re.findall(r"<!ENTITY\s[^>]*>", head) + ([doctype[0] + ">"] if doctype else []):
+        plain = re.fullmatch(r"""<!ENTITY\s+[\w.-]+\s+(?:"[^"&%]*"|'[^'&%]*')\s*>|<!DOCTYPE\s+[\w:.-]+\s*>""", entity)
+        if plain is None:
+            raise KnowledgeError(
+                f"{file}: refused, since '{entity}' reads another file or grows when expanded; "
+                "save the ontology again without a document type (Protégé 5 writes none)"
+            )
+
+
+def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
+    """Read the prefixes at the top of a file into the graph's."""
+    parser = ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.resolve().as_uri())
+    list(islice(parser, 1))
+    for prefix, namespace in parser.prefixes.items():
+        graph.prefixes.setdefault(prefix, namespace)
+
+
+def _only_ontology(graph: KnowledgeGraph, path: Path) -> str:
+    rows = graph.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
+    if len(rows) != 1 or not isinstance(rows[0][0], ox.NamedNode):
+        raise KnowledgeError(
+            f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it"
+        )
+    return rows[0][0].value
+
+
+def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
+    rows = graph.select(
+        "SELECT ?ontology ?import WHERE { ?ontology owl:imports ?import } ORDER BY ?import", ontology=iri
+    )
+    return [row[1].value for row in rows if isinstance(row[1], ox.NamedNode)]
+
+
+def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
+    """Return the file of an imported ontology: by the catalog beside the importer, by the shipped one, or beside it by name."""
+    beside = importer.with_name(ontology.CATALOG)
+    for catalog in (beside, ontology.ROOT / ontology.CATALOG):
+        if catalog not in read:
+            read[catalog] = _catalog(catalog)
+        if iri in read[catalog]:
+            found = read[catalog][iri]
+            if not found.is_file():
+                raise KnowledgeError(f"{catalog}: <{iri}> shall lie in {found}, which doesn't exist; mend the entry")
+            return found
+    for suffix in ontology.SUFFIXES:
+        path = importer.with_name(iri.rstrip("#/").rsplit("/", 1)[-1] + suffix)
+        if path.is_file():
+            return path
+    web = iri.startswith(("http://", "https://"))
+    fetch = f", or fetch it: confab fetch {iri} --into {importer.parent}" if web else ""
+    raise KnowledgeError(
+        f"{importer}: imports <{iri}>, which neither {beside.name} beside it nor the shipped catalog knows; "
+        f"put its file beside this one or name it in the catalog{fetch} (nothing is fetched unasked)"
+    )
+
+
+def _catalog(path: Path) -> Mapping[str, Path]:
+    if not path.is_file():
+        return {}
+    try:
+        return ontology.catalog(path)
+    except ValueError as error:
+        raise KnowledgeError(str(error)) from error

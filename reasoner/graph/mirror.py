@@ -1,0 +1,53 @@
+"""An owlready2 world in step with a knowledge graph, for users who think in classes.
+
+The world is made from the scene's triples. What is added to it or removed from it is brought over to the graph by `pull`, which
+the front desk calls before every query. The world isn't written to files: Turtle files belong to the people who edit them.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
+from reasoner.validation.hermit import world_of
+
+
+class Mirror:
+    """An owlready2 world and the statements of it that the graph has seen.
+
+    Attributes
+    ----------
+    world : owlready2.World
+    """
+
+    def __init__(self, graph: KnowledgeGraph) -> None:
+        self.graph = graph
+        self.world: Any = world_of(graph.ntriples(SCENE))
+        self.world.get_ontology(graph.scene + "#")  # where `with` puts what is new
+        self._seen = self._lines()
+
+    def pull(self) -> int:
+        """Bring what changed in the world over to the graph `asserted`; return how many statements that are."""
+        now = self._lines()
+        added, removed = now - self._seen, self._seen - now
+        name = ox.NamedNode(BASE + "asserted")
+        for quad in _parse(added):
+            self.graph.store.add(ox.Quad(quad.subject, quad.predicate, quad.object, name))
+        for quad in _parse(removed):
+            for graph in SCENE:
+                self.graph.store.remove(ox.Quad(quad.subject, quad.predicate, quad.object, ox.NamedNode(BASE + graph)))
+        self._seen = now
+        return len(added) + len(removed)
+
+    def _lines(self) -> set[bytes]:
+        """Return the world as N-Triples, one line each."""
+        file = io.BytesIO()
+        self.world.save(file, format="ntriples")
+        return set(file.getvalue().splitlines())
+
+
+def _parse(lines: set[bytes]) -> list[ox.Quad]:
+    return list(ox.parse(b"\n".join(sorted(lines)), format=ox.RdfFormat.N_TRIPLES))

@@ -1,0 +1,275 @@
+"""Where a scene's triples may lie besides memory: on disk in Oxigraph, or behind any SPARQL 1.1 endpoint.
+
+On disk, the files are loaded once and again whenever one of them has changed. An endpoint is only read, by few and large
+queries. It shows either one default graph with everything in it, or a named graph per ontology, called like it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from urllib.parse import unquote, urlencode, urlsplit, urlunsplit
+
+import pyoxigraph as ox
+import urllib3
+from urllib3.exceptions import HTTPError, MaxRetryError, ReadTimeoutError, TimeoutError
+
+import ontology
+from reasoner.graph.knowledge import BASE, Answer, KnowledgeError, KnowledgeGraph, load, read_prefixes, scene_file, text
+
+AUTHORIZATION = "CONFAB_SPARQL_AUTHORIZATION"
+"""Environment variable with the value of the Authorization header, e.g. ``Bearer …``."""
+TIMEOUT = 60.0
+RETRIES = 3
+BACKOFF = 0.2
+BUSY = (429, 502, 503, 504)
+RESULTS = "application/sparql-results+json"
+FORM = re.compile(r"\b(SELECT|ASK|CONSTRUCT|DESCRIBE)\b", re.IGNORECASE)
+PROLOGUE = re.compile(r"#[^\n]*|\bPREFIX\s+\S*\s*<[^>]*>|\bBASE\s*<[^>]*>", re.IGNORECASE)
+STAMP = "urn:confab:file"
+SATELLITES = tuple(f".{kind}" for kind in ontology.SATELLITES)
+
+ONTOLOGIES = """
+SELECT DISTINCT ?graph ?ontology ?import WHERE {
+  { ?ontology a owl:Ontology . OPTIONAL { ?ontology owl:imports ?import } }
+  UNION { GRAPH ?graph { ?ontology a owl:Ontology . OPTIONAL { ?ontology owl:imports ?import } } }
+} ORDER BY ?graph ?ontology ?import"""
+
+
+# ---------------------------------------------------------------------------------------------------------- an endpoint
+
+
+@dataclass
+class Endpoint:
+    """A SPARQL 1.1 endpoint, asked by POST.
+
+    Parameters
+    ----------
+    url : str
+        A user name and password in it are sent as basic authentication, and not shown.
+    authorization : str, optional
+        Value of the Authorization header.
+    timeout : float
+        Seconds to wait for an answer.
+    retries : int
+        How often a question is asked again after a lost connection or a busy server, each time after twice the pause.
+    graphs : tuple of str
+        IRIs of the named graphs whose union is asked; the endpoint's default graph if empty.
+    """
+
+    url: str
+    authorization: str | None = field(default=None, repr=False)
+    timeout: float = TIMEOUT
+    retries: int = RETRIES
+    graphs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        parts = urlsplit(self.url)
+        if parts.username is not None:
+            login = f"{unquote(parts.username)}:{unquote(parts.password or '')}"
+            self.authorization = self.authorization or urllib3.make_headers(basic_auth=login)["authorization"]
+            self.url = urlunsplit(parts._replace(netloc=parts.netloc.rpartition("@")[2]))
+
+    @cached_property
+    def _pool(self) -> urllib3.PoolManager:
+        retry = urllib3.Retry(
+            total=self.retries,
+            read=min(1, self.retries),  # a question that took too long isn't asked for ever
+            backoff_factor=BACKOFF,
+            status_forcelist=BUSY,
+            allowed_methods=None,  # a query changes nothing, so a POST may be repeated
+            raise_on_status=False,
+            respect_retry_after_header=False,
+        )
+        return urllib3.PoolManager(
+            retries=retry, timeout=urllib3.Timeout(connect=min(5.0, self.timeout), read=self.timeout)
+        )
+
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+        """Return what a SPARQL 1.1 query answers.
+
+        Parameters
+        ----------
+        query : str
+        prefixes : mapping of prefix to namespace
+        bindings : mapping of variable to IRI
+            Of variables that the query selects.
+
+        Raises
+        ------
+        KnowledgeError
+            Nothing answers there, or too slowly; it wants authentication; it is no endpoint; the query isn't SPARQL.
+        """
+        form = FORM.search(PROLOGUE.sub(" ", query))
+        rows = form is None or form.group().upper() in ("SELECT", "ASK")
+        response = self._post(_complete(query, prefixes, bindings), RESULTS if rows else "application/n-triples")
+        try:
+            if rows:
+                return ox.parse_query_results(response, format=ox.QueryResultsFormat.JSON)
+            triples = ox.Store()
+            triples.load(response, format=ox.RdfFormat.N_TRIPLES)
+        except (SyntaxError, ValueError) as error:
+            raise KnowledgeError(
+                f"{self.url}: the answer is no SPARQL 1.1 result ({error}); is it an endpoint?"
+            ) from error
+        return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
+
+    def _post(self, query: str, accept: str) -> bytes:
+        fields = [("query", query), *(("default-graph-uri", graph) for graph in self.graphs)]
+        headers = {"Accept": accept, "Content-Type": "application/x-www-form-urlencoded"}
+        if self.authorization:
+            headers["Authorization"] = self.authorization
+        try:
+            response = self._pool.request("POST", self.url, body=urlencode(fields), headers=headers)
+        except (MaxRetryError, TimeoutError) as error:
+            cause = error.reason if isinstance(error, MaxRetryError) else error
+            if isinstance(cause, ReadTimeoutError):
+                raise KnowledgeError(
+                    f"{self.url}: no answer within {self.timeout:g} s; the store is too slow for this, or the limit too low"
+                ) from None
+            raise KnowledgeError(
+                f"{self.url}: nothing answers there ({_short(cause)}); is the server running?"
+            ) from None
+        except HTTPError as error:
+            raise KnowledgeError(f"{self.url}: {_short(error)}") from None
+        if response.status == 200:
+            return response.data
+        raise KnowledgeError(f"{self.url}: {_refusal(response.status, response.data.decode('utf-8', 'replace'))}")
+
+
+def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, retries: int = RETRIES) -> KnowledgeGraph:
+    """Return the scene that a SPARQL 1.1 endpoint holds, with all that it imports there.
+
+    Parameters
+    ----------
+    url : str
+        Of the endpoint, e.g. ``http://localhost:7878/query``.
+    scene : str, optional
+        IRI of the scene; needed if the endpoint holds several.
+    timeout, retries
+        As in `Endpoint`. The Authorization header is taken from the environment (`AUTHORIZATION`).
+
+    Raises
+    ------
+    KnowledgeError
+        As `Endpoint.query`; or there is no such scene, no scene at all, or several to choose from.
+    """
+    endpoint = Endpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)
+    graph = KnowledgeGraph("", remote=endpoint)
+    imports: dict[str, set[str]] = {}
+    places: dict[str, set[str | None]] = {}
+    for where, iri, imported in graph.select(ONTOLOGIES):
+        if isinstance(iri, ox.NamedNode):
+            imports.setdefault(iri.value, set()).update({text(imported)} if imported else set())
+            places.setdefault(iri.value, set()).add(text(where) if where else None)
+    graph.scene = _scene(endpoint.url, scene, imports)
+    if None not in places[graph.scene]:
+        wanted = [graph.scene, f"{graph.scene.rstrip('#/')}.reach"]
+        for name in wanted:
+            wanted += sorted(imports.get(name, set()) - set(wanted))
+        endpoint.graphs = tuple(sorted({place for name in wanted for place in places.get(name, ()) if place}))
+    return graph
+
+
+def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
+    """Return the scene that was asked for, or the only ontology that no other imports."""
+    if scene is not None:
+        if scene not in imports:
+            raise KnowledgeError(
+                f"{url}: there is no ontology <{scene}> (there are: {', '.join(sorted(imports)) or 'none'})"
+            )
+        return scene
+    own = {iri: group for iri, group in imports.items() if not iri.endswith(SATELLITES)}
+    imported = {iri for group in own.values() for iri in group}
+    found = sorted(iri for iri in own if own[iri] and iri not in imported)
+    if len(found) != 1:
+        what = f"there are several scenes ({', '.join(found)}); choose one by --scene" if found else "there is no scene"
+        raise KnowledgeError(f"{url}: {what}")
+    return found[0]
+
+
+def _complete(query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> str:
+    """Return a query that needs nothing else: with its prefixes before it and its bindings behind it."""
+    head = "\n".join(f"PREFIX {prefix}: {ox.NamedNode(namespace)}" for prefix, namespace in prefixes.items())
+    values = f"\nVALUES ({' '.join(f'?{name}' for name in bindings)}) {{ ({_iris(bindings)}) }}" if bindings else ""
+    return f"{head}\n{query}{values}"
+
+
+def _iris(bindings: Mapping[str, str]) -> str:
+    return " ".join(str(ox.NamedNode(iri)) for iri in bindings.values())
+
+
+def _refusal(status: int, message: str) -> str:
+    said = f" It says: {message.strip()[:300]}" if message.strip() else ""
+    if status == 400:
+        return f"the query is not SPARQL 1.1 for this store.{said}"
+    if status in (401, 403):
+        return f"it wants another authentication (status {status}); set {AUTHORIZATION}, e.g. to 'Bearer …'"
+    if status in (404, 405):
+        return f"no SPARQL endpoint is there (status {status}); its address often ends in /query or /sparql"
+    if status in BUSY:
+        return f"the server is busy (status {status}), also after some waiting.{said}"
+    return f"the server failed (status {status}).{said}"
+
+
+def _short(error: object) -> str:
+    return re.sub(r"^<[^>]*>: |^\w+\([^)]*\): ", "", str(error)).strip() or type(error).__name__
+
+
+# -------------------------------------------------------------------------------------------------------------- on disk
+
+
+def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
+    """Load a scene into an Oxigraph store on disk, or find it there as it was loaded, if no file of it has changed.
+
+    Parameters
+    ----------
+    source : str or Path
+        As in `reasoner.graph.knowledge.load`.
+    folder : Path
+        Of the store; made if missing. One process at a time can use it.
+
+    Raises
+    ------
+    KnowledgeError
+        As `reasoner.graph.knowledge.load`; or the folder is in use or is no store.
+    """
+    try:
+        store = ox.Store(str(folder))
+    except OSError as error:
+        raise KnowledgeError(
+            f"{folder}: can't be used as a store, perhaps since another process does: {error}"
+        ) from error
+    path = scene_file(source)
+    stamps = ox.NamedNode(STAMP)
+    found = {q.subject.value: q.object.value for q in store.quads_for_pattern(None, stamps, None, stamps)}  # type: ignore[union-attr]
+    files = {iri: Path(stamp.rsplit("\t", 2)[0]) for iri, stamp in found.items()}
+    scene = next((iri for iri, file in files.items() if file == path), None)
+    if scene is not None and all(_stamp(file) == found[iri] for iri, file in files.items()):
+        graph = KnowledgeGraph(
+            scene, store, {scene: path, **{i: f for i, f in files.items() if not i.startswith(BASE)}}
+        )
+        for file in graph.files.values():
+            read_prefixes(graph, file)
+        return graph
+    store.clear()
+    graph = load(path, store)
+    reach = path.with_name(f"{path.stem}.reach.ttl")
+    stamped = {**graph.files, BASE + "reach": reach}
+    store.extend(
+        ox.Quad(ox.NamedNode(iri), stamps, ox.Literal(_stamp(file)), stamps) for iri, file in sorted(stamped.items())
+    )
+    store.flush()
+    return graph
+
+
+def _stamp(file: Path) -> str:
+    """Return path, size and time of change of a file: what tells that it is another one."""
+    if not file.is_file():
+        return f"{file}\t0\t0"
+    state = file.stat()
+    return f"{file}\t{state.st_size}\t{state.st_mtime_ns}"

@@ -1,0 +1,197 @@
+"""The confabulation memory on disk: knowledge links as annotated axioms of a Turtle file that imports the scene.
+
+Each link is a triple ``quantified behaviour :associatedWith situated object instance`` and an ``owl:Axiom`` that annotates it with
+``:probability``. Protégé opens the file and shows the number beside the assertion. The file is the memory's own: no file that
+people edit is ever rewritten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from decimal import Decimal
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, text
+from reasoner.memory.counts_file import Lines, lines
+from reasoner.memory.links import Links
+from reasoner.names import Names
+from reasoner.symbols import FALSE, TRUE, Symbol
+
+ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
+ASSERTED = """
+SELECT DISTINCT ?node ?property ?value WHERE {
+  VALUES ?kind { :GroundBehavior :SituatedObjectInstance :Counter } ?node a ?kind ; ?property ?value
+} ORDER BY ?node ?property ?value"""
+ANNOTATED = """
+SELECT ?behavior ?fact ?probability WHERE {
+  ?behavior a :GroundBehavior .
+  ?axiom owl:annotatedProperty :associatedWith ; owl:annotatedSource ?behavior ; owl:annotatedTarget ?fact ;
+    :probability ?probability .
+} ORDER BY ?behavior ?fact"""
+
+
+def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
+    """Read the links of a memory file.
+
+    Parameters
+    ----------
+    path : Path
+    names : Names
+        The scene's names; links about terms that it doesn't have are kept under their last part.
+    found : Lines, optional
+        What `memory_lines` found in the file, if it was read before.
+
+    Raises
+    ------
+    KnowledgeError
+        The file isn't Turtle, or a link lacks its behaviour or fact; the message says which.
+    """
+    graph = _graph(path, found)
+    nodes: dict[str, dict[str, str]] = {}
+    for subject, predicate, value in graph.select(ASSERTED):
+        nodes.setdefault(text(subject), {})[text(predicate).removeprefix(CORE)] = text(value)
+    links = Links()
+    for behavior, fact, probability in graph.select(ANNOTATED):
+        try:
+            source, target = nodes[text(behavior)], nodes[text(fact)]
+            conclusion = (names.short(source["behavior"]), _arguments(source, names))
+            symbol = Symbol(names.short(target["situationType"]), _arguments(target, names))
+            table = links.tables.setdefault(conclusion, {}).setdefault(symbol, {})
+            table[names.short(target["value"])] = float(text(probability))
+        except (KeyError, ValueError) as error:
+            raise KnowledgeError(f"{path}: the link {text(behavior)} → {text(fact)} isn't whole: {error}") from error
+    return links
+
+
+def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
+    """Return the scene that a memory file imports, and short names for the terms that it speaks of; `found` as in `load_links`.
+
+    Raises
+    ------
+    KnowledgeError
+        The file is missing, isn't Turtle, or imports no scene.
+    """
+    graph = _graph(path, found)
+    scenes = [
+        text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")
+    ]
+    if not scenes:
+        raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
+    terms = [text(row[2]) for row in graph.select(ASSERTED) if isinstance(row[2], ox.NamedNode)]
+    return scenes[0], Names(terms)
+
+
+def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
+    """Write the links to a memory file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    links : Links
+    names : Names
+        The scene's names, to lead back to IRIs.
+    scene : str
+        IRI of the scene, which the file imports.
+    """
+    iri = f"{scene.rstrip('#/')}.memory"
+    prefixes = {**{p: PREFIXES[p] for p in ("owl", "rdfs", "xsd")}, "": CORE, "m": iri + "#"}
+    triples = list(_triples(links, names, scene, iri))
+    write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
+
+
+def links_text(links: Links, names: Names, scene: str) -> str:
+    """Return the links as N-Triples, without the head of a file of their own."""
+    iri = f"{scene.rstrip('#/')}.memory"
+    triples = [t for t in _triples(links, names, scene, iri) if t.subject != ox.NamedNode(iri)]
+    return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
+
+
+def memory_lines(path: Path) -> Lines:
+    """Read a memory file and take it apart.
+
+    Raises
+    ------
+    KnowledgeError
+        It is missing or can't be read as text.
+    """
+    if not path.is_file():
+        raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
+    try:
+        return lines(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+    except OSError as error:
+        raise KnowledgeError(f"{path}: can't be read: {error.strerror or error}") from error
+
+
+def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
+    """Return all of a file but the counts as a graph."""
+    rest = (found or memory_lines(path)).rest
+    graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
+    try:
+        triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
+        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
+    except SyntaxError as error:
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+    return graph
+
+
+def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Triple]:
+    owl, rdf = PREFIXES["owl"], PREFIXES["rdf"]
+
+    def node(name: str) -> ox.NamedNode:
+        return ox.NamedNode(name)
+
+    def of(name: str) -> ox.NamedNode:
+        return node(CORE + name) if name in (TRUE, FALSE) else node(names.iri(name) if name in names else CORE + name)
+
+    def described(subject: ox.NamedNode, kind: str, parts: dict[str, ox.NamedNode]) -> Iterator[ox.Triple]:
+        yield ox.Triple(subject, node(rdf + "type"), node(owl + "NamedIndividual"))
+        yield ox.Triple(subject, node(rdf + "type"), node(CORE + kind))
+        for name, value in parts.items():
+            yield ox.Triple(subject, node(CORE + name), value)
+
+    yield ox.Triple(node(iri), node(rdf + "type"), node(owl + "Ontology"))
+    yield ox.Triple(node(iri), node(owl + "imports"), node(scene))
+    facts: dict[ox.NamedNode, tuple[Symbol, str]] = {}
+    axioms = []
+    for conclusion, symbols in sorted(links.tables.items()):
+        behavior, arguments = conclusion
+        source = node(f"{iri}#{_readable(behavior, *arguments)}")
+        parts = {"behavior": of(behavior), **dict(zip(ARGUMENTS, map(of, arguments), strict=False))}
+        yield from described(source, "GroundBehavior", parts)
+        for symbol, table in sorted(symbols.items()):
+            for value, probability in sorted(table.items()):
+                fact = node(f"{iri}#{_readable(symbol.situation, *symbol.arguments, value)}")
+                facts[fact] = (symbol, value)
+                yield ox.Triple(source, node(CORE + "associatedWith"), fact)
+                axioms.append((source, fact, probability))
+    for fact, (symbol, value) in facts.items():
+        parts = {
+            "situationType": of(symbol.situation),
+            **dict(zip(ARGUMENTS, map(of, symbol.arguments), strict=False)),
+            "value": of(value),
+        }
+        yield from described(fact, "SituatedObjectInstance", parts)
+    for number, (source, fact, probability) in enumerate(axioms):
+        axiom = ox.BlankNode(f"link{number}")
+        yield ox.Triple(axiom, node(rdf + "type"), node(owl + "Axiom"))
+        yield ox.Triple(axiom, node(owl + "annotatedSource"), source)
+        yield ox.Triple(axiom, node(owl + "annotatedProperty"), node(CORE + "associatedWith"))
+        yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
+        # a decimal, since some programs cut doubles to seven digits when they write Turtle
+        decimal = f"{Decimal(repr(probability)):f}"
+        yield ox.Triple(
+            axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(PREFIXES["xsd"] + "decimal"))
+        )
+
+
+def _readable(*words: str) -> str:
+    return ".".join(word.replace(":", "-") for word in words)
+
+
+def _arguments(node: dict[str, str], names: Names) -> tuple[str, ...]:
+    return tuple(names.short(node[name]) for name in ARGUMENTS if name in node)

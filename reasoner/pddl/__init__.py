@@ -1,0 +1,1 @@
+"""PDDL both ways, and planning problems written as Turtle."""

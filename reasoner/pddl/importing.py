@@ -1,0 +1,673 @@
+"""From PDDL to the values of `reasoner.symbols`.
+
+==============================  ================================================================
+in PDDL                         here
+==============================  ================================================================
+type                            class, e.g. ``Truck``
+predicate that never changes    class (one argument), static relation (more)
+predicates of which at most     one functional situation type, e.g. ``AT`` for ``at`` and ``in``;
+one holds of an object          a value of its own where none does
+any other predicate             boolean situation type
+action                          behaviour on level 1, all of whose variables are parameters
+cost that depends on objects    one behaviour per cost
+goal that is no conjunction     the behaviour ``REACH_GOAL``, whose effect is the goal
+==============================  ================================================================
+
+Which predicates exclude one another is found by invariant synthesis: an action that adds one of them for an object
+deletes another, which held, for the same object; and initially at most one holds. Helmert, "Concise finite-domain
+representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for
+inequalities.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import combinations, product
+
+from reasoner.pddl.syntax import Action, Form, Pddl, PddlError, Typed, Word
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+THING = "Thing"
+"""The class of all objects, PDDL's ``object``."""
+REACH_GOAL = "reach-goal"
+COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
+"""For a predicate's number of arguments, which one may be the object and which one the value."""
+MOST_COSTS = 200  # of one action
+WORLD, THE_WORLD = "World", "the_world"
+"""The class, and its only individual, that a predicate without arguments is about."""
+BASE = "https://w3id.org/confab/pddl/"
+
+Atom = tuple[str, ...]
+"""A predicate and its terms."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An atom made true or false, where its condition holds."""
+
+    atom: Atom
+    true: bool
+    when: tuple[Form, ...] = ()
+    variables: tuple[Typed, ...] = ()
+
+
+@dataclass(frozen=True)
+class Part:
+    """A predicate in an invariant: which of its arguments is the object, and which one counts (none: a value by itself)."""
+
+    predicate: str
+    key: int
+    counted: int | None
+
+
+@dataclass(frozen=True)
+class Place:
+    """How a predicate is said here: a situation type with a value of its own, or with the value in some argument."""
+
+    situation: str
+    part: Part | None = None
+    value: str = TRUE
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A problem, and what its names were in PDDL: a behaviour's action, an individual's object, and so on."""
+
+    problem: Problem
+    said: Mapping[str, str]
+
+    def line(self, behavior: str, arguments: Sequence[str]) -> str:
+        """Return a step as plans are written in PDDL; nothing for the step that only says that the goal is reached."""
+        action = self.said.get(behavior, behavior)
+        return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
+
+
+def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
+    """Return the planning problem that a PDDL domain and problem describe.
+
+    Parameters
+    ----------
+    pddl : Pddl
+    scene : str, optional
+        Last part of the scene's IRI; the problem's name if not given.
+    level : int
+        The level of the behaviours: more than 1 leaves room for abstract ones above them.
+
+    Raises
+    ------
+    PddlError
+        An action's cost takes too many different values, or adds up several functions.
+    """
+    table = _Import(pddl, scene or pddl.problem, level)
+    problem = table.problem()
+    return Imported(problem, {ours: theirs.split(" = ")[0] for (_, theirs), ours in table.names.items()})
+
+
+@dataclass
+class _Import:
+    pddl: Pddl
+    scene: str
+    level: int
+    names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to ours
+    taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
+    places: dict[str, Place] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.effects = {name: tuple(_effects(action.effect)) for name, action in self.pddl.actions.items()}
+        self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects}
+        self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
+        self.facts = dict.fromkeys(self.pddl.initial)
+
+    # -------------------------------------------------------------------------------------------------- names
+
+    def name(self, kind: str, pddl_name: str, wanted: str | None = None) -> str:
+        """Return our name for a PDDL name of a kind; no two are the same."""
+        if (kind, pddl_name) not in self.names:
+            text = re.sub(r"[^0-9A-Za-z_]", "_", wanted or pddl_name)
+            while text in self.taken:
+                text += "_"
+            self.taken.add(text)
+            self.names[kind, pddl_name] = text
+        return self.names[kind, pddl_name]
+
+    def kind(self, pddl_type: str) -> str:
+        if pddl_type == "object":
+            return self.name("type", "object", THING)
+        return self.name("type", pddl_type, pddl_type[0].upper() + pddl_type[1:])
+
+    def term(self, word: str) -> str:
+        return "?" + re.sub(r"[^0-9a-z_]", "_", word[1:]) if word.startswith("?") else self.name("object", word)
+
+    # ------------------------------------------------------------------------------------------------ problem
+
+    def problem(self) -> Problem:
+        pddl = self.pddl
+        for kind in pddl.types:
+            self.kind(kind)
+        for thing in pddl.objects:
+            self.name("object", thing)
+        classes: dict[str, tuple[str, ...]] = {
+            self.kind(kind): tuple(self.name("object", o) for o in pddl.of_type(kind)) for kind in pddl.types
+        }
+        parents: dict[str, tuple[str, ...]] = {
+            self.kind(kind): (self.kind(above),) for kind, above in pddl.types.items() if above
+        }
+        relations: dict[str, frozenset[tuple[str, ...]]] = {}
+        for predicate, signature in pddl.predicates.items():
+            if predicate in self.changing or not signature:
+                continue
+            rows = [tuple(self.name("object", w) for w in fact[1:]) for fact in self.facts if fact[0] == predicate]
+            if len(signature) == 1:
+                kind = self.name("static", predicate, predicate[0].upper() + predicate[1:])
+                members = {row[0] for row in rows}
+                classes[kind] = tuple(name for name in classes[self.kind("object")] if name in members)
+                parents[kind] = (self.kind("object"),)
+            else:
+                relations[self.name("static", predicate)] = frozenset(rows)
+        situations = self.situations(classes, parents)
+        behaviors = {b.name: b for name in pddl.actions for b in self.behaviors(name, relations)}
+        initial = self.initial(situations, classes)
+        goal, reach = self.goal(situations)
+        if reach:
+            behaviors[reach.name] = reach
+        if any(s.arguments == (WORLD,) for s in situations.values()):
+            classes[WORLD] = (THE_WORLD,)
+        scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
+        return Problem(scene, Domain(situations, behaviors), classes, relations, initial, goal, parents)
+
+    def situations(
+        self, classes: dict[str, tuple[str, ...]], parents: dict[str, tuple[str, ...]]
+    ) -> dict[str, SituationType]:
+        """Return the situation types, invariants first, and say in `places` where each predicate went."""
+        found: dict[str, SituationType] = {}
+        for parts in self.invariants():
+            name = self.name("situation", "+".join(p.predicate for p in parts), parts[0].predicate.upper())
+            own = []
+            for part in parts:
+                signature = self.pddl.predicates[part.predicate]
+                if part.counted is None:
+                    value = self.name("value", part.predicate, f"{part.predicate}_")
+                    own.append(value)
+                    self.places[part.predicate] = Place(name, part, value)
+                else:
+                    kind = self.kind(signature[part.counted].type)
+                    parents[kind] = (*parents.get(kind, ()), name)
+                    self.places[part.predicate] = Place(name, part)
+            none = self.name("value", name, f"no_{parts[0].predicate}")
+            own.append(none)
+            classes[name] = tuple(own)
+            key = self.common([self.pddl.predicates[p.predicate][p.key].type for p in parts])
+            found[name] = SituationType(name, (self.kind(key),), name, default=none)
+        for kind, above in parents.items():  # the values of a situation type are its class
+            for name in above:
+                if name in found:
+                    classes[name] = tuple(dict.fromkeys((*classes[kind], *classes[name])))
+        order = {self.name("object", thing): i for i, thing in enumerate(self.pddl.objects)}
+        for name in found:  # objects in declared order, then the values that are no objects
+            classes[name] = tuple(sorted(classes[name], key=lambda member: order.get(member, len(order))))
+        for predicate, signature in self.pddl.predicates.items():
+            if predicate in self.places or (predicate not in self.changing and signature):
+                continue
+            name = self.name("situation", predicate, predicate.upper())
+            arguments = tuple(self.kind(one.type) for one in signature) or (WORLD,)
+            found[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
+            self.places[predicate] = Place(name)
+        return found
+
+    def common(self, kinds: Sequence[str]) -> str:
+        """Return the lowest type above all of some."""
+        return next(kind for kind in self.pddl.above(kinds[0]) if all(kind in self.pddl.above(k) for k in kinds))
+
+    def initial(
+        self, situations: Mapping[str, SituationType], classes: Mapping[str, tuple[str, ...]]
+    ) -> dict[Symbol, str]:
+        found = {
+            Symbol(s.name, (name,)): s.default or FALSE
+            for s in situations.values()
+            if not s.boolean
+            for name in classes[s.arguments[0]]
+        }
+        for fact in self.facts:
+            if fact[0] in self.places:
+                condition = self.atom(fact)
+                found[Symbol(condition.situation, condition.arguments)] = condition.value
+        return found
+
+    def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
+        """Return the goal, and the behaviour that reaches it if it isn't a conjunction of facts."""
+        found: dict[Symbol, str] = {}
+        if self.pddl.goal is None:
+            return found, None
+        parts = list(_conjuncts(self.pddl.goal))
+        for part in parts:
+            plain = part.items[1] if part.head == "not" else part
+            if not isinstance(plain, Form) or plain.head not in self.places:
+                break
+            condition = self.atom(_words(plain))
+            functional = not situations[condition.situation].boolean
+            symbol = Symbol(condition.situation, condition.arguments)
+            value = FALSE if part.head == "not" else condition.value
+            if (functional and part.head == "not") or found.setdefault(symbol, value) != value:
+                break
+        else:
+            return found, None
+        name = self.name("situation", "goal reached", "GOAL_REACHED")
+        situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
+        action, variables = Action(REACH_GOAL, (), self.pddl.goal, None, Word("", 0, 0)), _Variables(self)
+        conditions = tuple(c for part in parts for c in variables.condition(part, {}))
+        effect = ValueEffect(name, (THE_WORLD,), TRUE)
+        reach = Behavior(self.name("action", action.name, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
+        return {Symbol(name, (THE_WORLD,)): TRUE}, reach
+
+    # --------------------------------------------------------------------------------------------- invariants
+
+    def invariants(self) -> list[tuple[Part, ...]]:
+        """Return disjoint invariants: tuples of parts, of which at most one fact holds for an object."""
+        candidates: list[tuple[Part, ...]] = [
+            (Part(predicate, key, counted),)
+            for predicate, signature in self.pddl.predicates.items()
+            if predicate in self.changing
+            for key, counted in COUNTED.get(len(signature), ())
+        ]
+        proved: list[tuple[Part, ...]] = []
+        seen = set(candidates)
+        while candidates:
+            parts = candidates.pop(0)
+            extra = self.unbalanced(parts)
+            if extra is None:
+                proved.append(parts)
+            for part in extra or ():
+                larger = tuple(sorted((*parts, part), key=lambda p: p.predicate))
+                if larger not in seen and len(seen) < 300 and len({p.predicate for p in larger}) == len(larger):
+                    seen.add(larger)
+                    candidates.append(larger)
+        proved = [parts for parts in proved if self.at_most_one(parts) and any(p.counted is not None for p in parts)]
+        proved = [parts for parts in proved if self.distinguishable(parts)]
+        proved.sort(key=lambda parts: (-len(parts), sum(p.key for p in parts), [p.predicate for p in parts]))
+        used: set[str] = set()
+        found = []
+        for parts in proved:
+            if not used & {p.predicate for p in parts}:
+                used |= {p.predicate for p in parts}
+                order = {predicate: i for i, predicate in enumerate(self.pddl.predicates)}
+                found.append(tuple(sorted(parts, key=lambda p: (p.counted is None, order[p.predicate]))))
+        return found
+
+    def at_most_one(self, parts: Sequence[Part]) -> bool:
+        """Return whether initially at most one fact of the parts holds of each object."""
+        of = {part.predicate: part for part in parts}
+        count = Counter(fact[1 + of[fact[0]].key] for fact in self.facts if fact[0] in of)
+        return all(number == 1 for number in count.values())
+
+    def distinguishable(self, parts: Sequence[Part]) -> bool:
+        """Return whether object and value together tell which predicate they belong to, wherever one is mentioned."""
+        counted = [p for p in parts if p.counted is not None]
+        of = {p.predicate: p for p in counted}
+        for predicate, domains in self.mentioned:
+            for other in counted:
+                if predicate in of and other.predicate != predicate:
+                    part = of[predicate]
+                    keys = domains[part.key] & self.possible[other.predicate][other.key]
+                    values = domains[part.counted or 0] & self.possible[other.predicate][other.counted or 0]
+                    if keys and values:
+                        return False
+        return True
+
+    @cached_property
+    def possible(self) -> dict[str, list[frozenset[str]]]:
+        """For each argument of a predicate, the objects with which it may ever hold."""
+        found = {name: [set[str]() for _ in signature] for name, signature in self.pddl.predicates.items()}
+        for fact in self.facts:
+            for position, thing in enumerate(fact[1:]):
+                found[fact[0]][position].add(thing)
+        for name, action in self.pddl.actions.items():
+            for effect in self.effects[name]:
+                own = {v.name: self.sets[v.type] for v in effect.variables}
+                for position, term in enumerate(effect.atom[1:]):
+                    found[effect.atom[0]][position] |= own.get(term) or self.domain_of(action, term)
+        return {name: [frozenset(things) for things in positions] for name, positions in found.items()}
+
+    @cached_property
+    def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
+        """Every atom in a condition, an effect or the goal: its predicate, and the objects each term may stand for."""
+        found = []
+        for _name, action in self.pddl.actions.items():
+            forms = [form for form in (action.precondition, action.effect) if form]
+            for atom, own in [pair for form in forms for pair in self.atoms_in(form, {})]:
+                found.append((atom[0], [own.get(t) or self.domain_of(action, t) for t in atom[1:]]))
+        if self.pddl.goal:
+            for atom, own in self.atoms_in(self.pddl.goal, {}):
+                found.append((atom[0], [own.get(t, frozenset({t})) for t in atom[1:]]))
+        return found
+
+    def atoms_in(self, form: Form, own: dict[str, frozenset[str]]) -> list[tuple[Atom, dict[str, frozenset[str]]]]:
+        """Return the atoms of a formula, each with the objects of the quantified variables around it."""
+        if form.head in ("exists", "forall"):
+            own = own | {t.name: self.sets[t.type] for t in _typed(form.items[1])}  # type: ignore[arg-type]
+        elif form.head in self.pddl.predicates:
+            return [(_words(form), own)]
+        return [found for item in form.items[1:] if isinstance(item, Form) for found in self.atoms_in(item, own)]
+
+    def domain_of(self, action: Action, term: str) -> frozenset[str]:
+        """Return the objects that a term of an action may stand for, by its type and static predicates of one argument."""
+        if not term.startswith("?"):
+            return frozenset({term})
+        kind = next((p.type for p in action.parameters if p.name == term), "object")
+        domain = self.sets[kind]
+        for form in _conjuncts(action.precondition):
+            words = _words(form) if form.head in self.pddl.predicates else ()
+            if len(words) == 2 and words[1] == term and words[0] not in self.changing:
+                domain &= {fact[1] for fact in self.facts if fact[0] == words[0]}
+        return domain
+
+    def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
+        """Return None if every action keeps "at most one", else parts that might mend it (none: nothing can)."""
+        of = {part.predicate: part for part in parts}
+        for name, action in self.pddl.actions.items():
+            effects = self.effects[name]
+            adds = [e for e in effects if e.true and e.atom[0] in of]
+            needed = {_words(form) for form in _conjuncts(action.precondition) if form.head not in ("not", "or", "=")}
+            for one, other in combinations(adds, 2):
+                same_key = self.may_be_one(
+                    action, one.atom[1 + of[one.atom[0]].key], other.atom[1 + of[other.atom[0]].key]
+                )
+                if one.atom != other.atom and same_key:
+                    return []
+            spent: set[Atom] = set()
+            for add in adds:
+                key = add.atom[1 + of[add.atom[0]].key]
+                if add.variables and not {t for t in add.atom if t in [v.name for v in add.variables]} <= {key}:
+                    return []
+                held = needed | {_words(f) for form in add.when for f in _conjuncts(form)}
+                if add.atom in held:
+                    continue
+                deleted = [
+                    e.atom
+                    for e in effects
+                    if not e.true
+                    and e.atom in held
+                    and e.atom not in spent
+                    and e.atom != add.atom
+                    and (not e.when or e.when == add.when)
+                    and e.variables in ((), add.variables)
+                ]
+                match = next((a for a in deleted if a[0] in of and a[1 + of[a[0]].key] == key), None)
+                if match:
+                    spent.add(match)
+                    continue
+                return [
+                    Part(atom[0], position, counted)
+                    for atom in deleted
+                    if atom[0] not in of and len(atom) <= 3
+                    for position, term in enumerate(atom[1:])
+                    if term == key
+                    for counted in ([None] if len(atom) == 2 else [1 - position])
+                ]
+        return None
+
+    def may_be_one(self, action: Action, one: str, other: str) -> bool:
+        """Return whether two terms of an action may stand for the same object."""
+        if one == other:
+            return True
+        for form in _conjuncts(action.precondition):
+            inner = form.items[1] if form.head == "not" else form
+            if form is not inner and isinstance(inner, Form) and {*_words(inner)} == {"=", one, other}:
+                return False
+        return bool(self.domain_of(action, one) & self.domain_of(action, other))
+
+    # ---------------------------------------------------------------------------------------------- behaviours
+
+    def atom(self, atom: Atom) -> ValueCondition:
+        """Return the value condition that a changing atom is."""
+        place, terms = self.places[atom[0]], [self.term(t) for t in atom[1:]]
+        if place.part is None:
+            return ValueCondition(place.situation, tuple(terms) or (THE_WORLD,), TRUE)
+        value = place.value if place.part.counted is None else terms[place.part.counted]
+        return ValueCondition(place.situation, (terms[place.part.key],), value)
+
+    def behaviors(self, name: str, relations: dict[str, frozenset[tuple[str, ...]]]) -> Iterator[Behavior]:
+        """Yield the behaviour of an action: one, or one per cost."""
+        action, variables = self.pddl.actions[name], _Variables(self)
+        types = {p.name: p.type for p in action.parameters}
+        parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
+        conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form, types))
+        conditions = tuple(dict.fromkeys(conditions))
+        effects = self.value_effects(name, variables, types, conditions)
+        behavior = Behavior(self.name("action", name, name.upper()), self.level, parameters, (), conditions, effects)
+        constant, functions = 0.0, []
+        for amount in _increases(action.effect):
+            if isinstance(amount, Word):
+                constant += float(amount.text)
+            else:
+                functions.append(_words(amount))
+        if not self.pddl.minimize and not functions and not constant:
+            constant = 1.0
+        if not functions:
+            yield replace(behavior, cost=constant)
+            return
+        if len(functions) > 1:
+            raise PddlError(f"action '{name}': a cost that adds up several functions is not supported")
+        function, terms = functions[0][0], tuple(self.term(t) for t in functions[0][1:])
+        by_cost = defaultdict(set)
+        for words, number in self.pddl.numbers.items():
+            if words[0] == function:
+                by_cost[number].add(tuple(self.name("object", w) for w in words[1:]))
+        if len(by_cost) > MOST_COSTS:
+            raise PddlError(f"action '{name}': its cost {function} takes {len(by_cost)} values, more than {MOST_COSTS}")
+        for number, rows in sorted(by_cost.items()):
+            if not terms:
+                yield replace(behavior, cost=constant + number)
+                return
+            text = f"{number:g}".replace(".", "_").replace("-", "minus_")
+            relation = self.name("static", f"{function} = {number}", f"{function}_is_{text}")
+            relations[relation] = frozenset(rows)
+            more = RelationCondition(relation, terms)
+            own = self.name("action", f"{name} = {number}", f"{name}_at_{text}".upper())
+            yield replace(behavior, name=own, preconditions=(*conditions, more), cost=constant + number)
+
+    def value_effects(
+        self, name: str, variables: _Variables, types: Mapping[str, str], conditions: Sequence[Condition]
+    ) -> tuple[ValueEffect, ...]:
+        """Return an action's effects, those that end something first."""
+        ends: list[ValueEffect] = []
+        begins: list[ValueEffect] = []
+        effects = self.effects[name]
+        for effect, named in ((e, n) for e in effects for n in self.instances(e)):
+            inner = {**types, **{v.name: v.type for v in effect.variables}}
+            when = tuple(
+                c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, inner, named)
+            )
+            at = self.atom(effect.atom)
+            put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
+            at = replace(at, arguments=put[:-1], value=put[-1])
+            place = self.places[effect.atom[0]]
+            if effect.true:
+                begins.append(ValueEffect(at.situation, at.arguments, at.value, when))
+            elif place.part is None:
+                ends.append(ValueEffect(at.situation, at.arguments, FALSE, when))
+            elif not self.replaced(effect, effects):
+                known = at in conditions or at in when
+                none = self.names["value", place.situation]
+                ends.append(ValueEffect(at.situation, at.arguments, none, when if known else (*when, at)))
+        return tuple(dict.fromkeys((*ends, *begins)))
+
+    def instances(self, effect: Effect) -> Iterator[dict[str, str]]:
+        """Yield each way to put individuals in for the variables that an effect is quantified over."""
+        names = [self.term(v.name) for v in effect.variables]
+        things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
+        yield from (dict(zip(names, row, strict=True)) for row in product(*things))
+
+    def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
+        """Return whether another effect gives the same symbol a new value whenever this one ends its value."""
+        symbol = replace(self.atom(end.atom), value="")
+        return any(
+            e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol
+            and e.when in ((), end.when) and e.variables in ((), end.variables)
+            for e in effects
+        )  # fmt: skip
+
+
+@dataclass
+class _Variables:
+    """The variables of one behaviour that aren't its parameters, each with a name of its own."""
+
+    table: _Import
+    kinds: dict[str, str] = field(default_factory=dict)
+
+    def renamed(self, typed: Sequence[Typed]) -> dict[str, str]:
+        found = {}
+        for one in typed:
+            name = f"?w_{self.table.term(one.name)[1:]}"
+            while name in self.kinds:
+                name += "_"
+            self.kinds[name] = self.table.kind(one.type)
+            found[self.table.term(one.name)] = name
+        return found
+
+    def condition(
+        self, form: Form, types: Mapping[str, str], named: Mapping[str, str] | None = None, negated: bool = False
+    ) -> Iterator[Condition]:
+        """Yield the conditions whose conjunction a formula is."""
+        table, named = self.table, named or {}
+        head, rest = form.head, [item for item in form.items[1:] if isinstance(item, Form)]
+        if head == "not":
+            yield from self.condition(rest[0], types, named, not negated)
+        elif head == "and" and not negated:
+            for part in rest:
+                yield from self.condition(part, types, named)
+        elif head == "and":
+            yield AnyOf((tuple(c for part in rest for c in self.condition(part, types, named)),), True)
+        elif head in ("or", "imply"):
+            groups = [
+                tuple(self.condition(part, types, named, head == "imply" and i == 0)) for i, part in enumerate(rest)
+            ]
+            yield AnyOf(tuple(groups), negated)
+        elif head in ("exists", "forall"):
+            typed = _typed(form.items[1])  # type: ignore[arg-type]
+            inner = dict(named) | self.renamed(typed)
+            flip = head == "forall"
+            conditions = tuple(
+                self.condition(rest[1], {**types, **{t.name: t.type for t in typed}}, inner, negated=flip)
+            )
+            for one in reversed(typed[1:]):
+                conditions = (Witness(inner[table.term(one.name)], table.kind(one.type), conditions),)
+            first = typed[0] if typed else None
+            if first is None:
+                yield AnyOf((conditions,), negated is not flip)
+            else:
+                yield Witness(inner[table.term(first.name)], table.kind(first.type), conditions, negated is not flip)
+        else:
+            yield from self.literal(_words(form), types, named, negated)
+
+    def literal(
+        self, atom: Atom, types: Mapping[str, str], named: Mapping[str, str], negated: bool
+    ) -> Iterator[Condition]:
+        table = self.table
+
+        def put(terms: Sequence[str]) -> tuple[str, ...]:
+            return tuple(named.get(t, t) for t in terms)
+
+        if atom[0] == "=":
+            yield EqualityCondition(put([table.term(atom[1])])[0], put([table.term(atom[2])])[0], negated)
+        elif atom[0] in table.places:
+            at = table.atom(atom)
+            found = ValueCondition(at.situation, put(at.arguments), put([at.value])[0], negated)
+            declared = table.pddl.predicates[atom[0]]
+            wider = [
+                ClassCondition(put([table.term(t)])[0], table.kind(d.type))
+                for t, d in zip(atom[1:], declared, strict=True)
+                if t in types and d.type not in table.pddl.above(types[t])
+            ]
+            if wider and negated:
+                yield AnyOf(((replace(found, negated=False), *wider),), True)
+            else:
+                yield found
+                yield from wider
+        elif len(atom) == 2:
+            yield ClassCondition(put([table.term(atom[1])])[0], table.names["static", atom[0]], negated)
+        else:
+            relation = table.names["static", atom[0]]
+            yield RelationCondition(relation, put([table.term(t) for t in atom[1:]]), negated)
+
+
+def _typed(form: Form) -> list[Typed]:
+    """Return the variables of a quantifier, which have been checked before."""
+    found: list[Typed] = []
+    waiting: list[Word] = []
+    items = [w for w in form.items if isinstance(w, Word)]
+    position = 0
+    while position < len(items):
+        if items[position].text == "-":
+            found += [Typed(w.text, items[position + 1].text, w) for w in waiting]
+            waiting, position = [], position + 2
+        else:
+            waiting.append(items[position])
+            position += 1
+    return [*found, *(Typed(w.text, "object", w) for w in waiting)]
+
+
+def _words(form: Form) -> Atom:
+    return tuple(item.text for item in form.items if isinstance(item, Word))
+
+
+def _conjuncts(form: Form | None) -> Iterator[Form]:
+    if form is None:
+        return
+    if form.head == "and":
+        for item in form.items[1:]:
+            assert isinstance(item, Form)
+            yield from _conjuncts(item)
+    elif form.items:
+        yield form
+
+
+def _effects(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Effect]:
+    if form is None or not form.items:
+        return
+    rest = [item for item in form.items[1:] if isinstance(item, Form)]
+    if form.head == "and":
+        for item in rest:
+            yield from _effects(item, when, variables)
+    elif form.head == "when":
+        yield from _effects(rest[1], (*when, rest[0]), variables)
+    elif form.head == "forall":
+        yield from _effects(rest[1], when, (*variables, *_typed(rest[0])))
+    elif form.head == "not":
+        yield Effect(_words(rest[0]), False, when, variables)
+    elif form.head != "increase":
+        yield Effect(_words(form), True, when, variables)
+
+
+def _increases(form: Form | None) -> Iterator[Word | Form]:
+    """Yield the amounts by which an effect increases the total cost."""
+    if form is not None and form.head == "increase":
+        yield form.items[2]
+    elif form is not None and form.head == "and":
+        for item in form.items[1:]:
+            if isinstance(item, Form):
+                yield from _increases(item)
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^0-9A-Za-z_.-]", "-", text)

@@ -1,0 +1,311 @@
+"""A planning problem written as a scene in Turtle: what `reasoner.reading.problem` reads back as the same problem.
+
+Domain and scene go into one file. Every condition and effect is an individual with an IRI of its own, so that Protégé
+shows and edits it. Effects are numbered in the order in which they are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Fact,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+
+HEADER = """\
+@prefix :        <{scene}#> .
+@prefix c:       <https://w3id.org/confab/core#> .
+@prefix owl:     <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs:    <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix skos:    <http://www.w3.org/2004/02/skos/core#> .
+@prefix dcterms: <http://purl.org/dc/terms/> .
+
+<{scene}> a owl:Ontology ;
+  owl:imports <https://w3id.org/confab/core> ;
+  owl:versionIRI <{scene}/1> ;
+  c:symbolicOnly true ;
+  dcterms:title {title}@en ;
+  dcterms:description {description}@en .
+"""
+CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
+Said = Mapping[str, str]
+"""What a name is called where it comes from: written as its label."""
+
+
+def turtle(problem: Problem, title: str, description: str, labels: Said | None = None) -> str:
+    """Return a scene file with everything that a problem says.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its names become the local names of IRIs in the namespace of its scene.
+    title, description : str
+    labels : mapping of name to label, optional
+        A name without one is its own label.
+    """
+    writer = _Writer(problem, dict(labels or {}))
+    header = HEADER.format(scene=problem.scene, title=_quoted(title), description=_quoted(description))
+    return header + "\n".join(writer.lines()) + "\n"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+    return f'"{escaped}"'
+
+
+@dataclass
+class _Writer:
+    problem: Problem
+    labels: dict[str, str]
+    nodes: list[str] = field(default_factory=list)  # of the behaviour being written
+    terms: dict[str, str] = field(default_factory=dict)  # its terms' IRIs
+    where: str = ""
+
+    def lines(self) -> Iterator[str]:
+        domain = self.problem.domain
+        yield _banner("Objects")
+        yield from self.classes()
+        yield _banner("Situation types and relations")
+        for situation in domain.situations.values():
+            yield from self.situation(situation)
+        yield from self.relations()
+        yield _banner("Behaviours")
+        for index, behavior in enumerate(domain.behaviors.values(), start=1):
+            yield from self.behavior(index, behavior)
+        yield _banner("The scene")
+        yield from self.individuals()
+        yield from self.facts()
+        yield _banner("What is wanted")
+        yield from self.task()
+
+    def iri(self, name: str) -> str:
+        if name in (TRUE, FALSE) or name in CORE_CLASSES:
+            return f"c:{name}"
+        return f":{name}"
+
+    def node(self, name: str, kinds: str, text: str, *pairs: tuple[str, str | Sequence[str]]) -> str:
+        """Return one subject with its label, its definition if any, and its properties."""
+        said = [f"{self.iri(name)} a {kinds} ; rdfs:label {_quoted(self.labels.get(name, name))}@en"]
+        if text:
+            said.append(f"skos:definition {_quoted(text)}@en")
+        for key, values in pairs:
+            found = [values] if isinstance(values, str) else list(values)
+            if found:
+                said.append(f"{key} {', '.join(found)}")
+        return " ;\n  ".join(said) + " ."
+
+    def classes(self) -> Iterator[str]:
+        situations = self.problem.domain.situations
+        for kind in self.problem.classes:
+            if kind in CORE_CLASSES or kind in situations or "|" in kind:
+                continue
+            above = [self.iri(k) for k in self.problem.parents.get(kind, ())]
+            if all(k in situations for k in self.problem.parents.get(kind, ())):
+                above.insert(0, "c:Object")
+            own = [self.iri(s.name) for s in situations.values() if s.arguments == (kind,)]
+            text = f"A thing that the domain calls {self.labels.get(kind, kind)}."
+            pairs = (("rdfs:subClassOf", above), ("c:hasSituationType", own))
+            yield self.node(kind, "owl:Class, owl:NamedIndividual", text, *pairs)
+
+    def situation(self, one: SituationType) -> Iterator[str]:
+        single = len(one.arguments) == 1
+        pairs: list[tuple[str, str | Sequence[str]]] = []
+        if one.level != 1:
+            pairs.append(("c:fromLevel", str(one.level)))
+        for key, value in (("c:restValue", one.rest), ("c:defaultValue", one.default)):
+            if (
+                value is not None
+                and not (one.boolean and value == FALSE)
+                and not (key == "c:defaultValue" and value == one.rest)
+            ):
+                pairs.append((key, self.iri(value)))
+        if not single:
+            pairs.append(("c:parameter", [f":{one.name}.{i}" for i in range(1, len(one.arguments) + 1)]))
+        if single and not one.boolean:
+            pairs.append(("c:valueProperty", f":{one.name}.value"))
+        said = "Whether it holds." if one.boolean else "Which of its values holds."
+        yield self.node(one.name, "owl:Class, owl:NamedIndividual, c:SituationType", said, *pairs)
+        if single and not one.boolean:
+            yield self.node(
+                f"{one.name}.value",
+                "owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual",
+                f"Relates an object to its value of {one.name}.",
+                ("rdfs:domain", self.iri(one.arguments[0])),
+                ("rdfs:range", self.iri(one.name)),
+            )
+        if not single:
+            for i, kind in enumerate(one.arguments, start=1):
+                yield self.term(f"{one.name}.{i}", "c:Parameter", i, kind)
+
+    def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
+        said = [f":{name} a owl:NamedIndividual, {kind_of_term}"]
+        said += [f"c:index {index}"] if index is not None else []
+        return " ; ".join([*said, f"c:termType {self.iri(kind)}"]) + " ."
+
+    def relations(self) -> Iterator[str]:
+        for relation, tuples in self.problem.relations.items():
+            binary = all(len(row) == 2 for row in tuples)
+            kinds = (
+                "owl:ObjectProperty, owl:NamedIndividual, c:Relation" if binary else "owl:NamedIndividual, c:Relation"
+            )
+            yield self.node(relation, kinds, "Holds or not, whatever is done.")
+
+    def behavior(self, index: int, one: Behavior) -> Iterator[str]:
+        self.where, self.nodes = one.name, []
+        self.terms = {t.name: f":{one.name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
+        conditions = [self.condition(c) for c in one.preconditions]
+        effects = []
+        for position, effect in enumerate(one.effects, start=1):
+            when = [self.condition(c) for c in effect.when]
+            iri = f":{one.name}.effect{position:03}"
+            at = self.value(Symbol(effect.situation, effect.arguments), effect.value)
+            self.nodes.append(f"{iri} a owl:NamedIndividual, c:ValueEffect ; {at}{_some('c:when', when)} .")
+            effects.append(iri)
+        cost = [] if one.cost == 1 else [f"{one.cost:f}"]
+        yield self.node(
+            one.name,
+            "owl:NamedIndividual, c:Behavior",
+            f"The behaviour {self.labels.get(one.name, one.name)}.",
+            ("c:level", str(one.level)),
+            ("c:index", str(index)),
+            ("c:cost", cost),
+            ("c:parameter", [self.terms[p.name] for p in one.parameters]),
+            ("c:precondition", conditions),
+            ("c:postcondition", effects),
+        )
+        for i, parameter in enumerate(one.parameters, start=1):
+            yield self.term(self.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
+        for variable in one.variables:
+            yield self.term(self.terms[variable.name][1:], "c:Variable", None, variable.kind)
+        yield from self.nodes
+
+    def put(self, term: str) -> str:
+        return self.terms.get(term) or self.iri(term)
+
+    def value(self, symbol: Symbol, value: str) -> str:
+        """Return the properties that state a value of a symbol, also one with variables in it."""
+        said = [f"c:situationType {self.iri(symbol.situation)}", *self.arguments(symbol.arguments)]
+        if not (self.problem.domain.situations[symbol.situation].boolean and value == TRUE):
+            said.append(f"c:value {self.put(value)}")
+        return " ; ".join(said)
+
+    def arguments(self, terms: Sequence[str]) -> list[str]:
+        names = ("c:about", *(f"c:argument{i}" for i in range(2, 10)))
+        return [f"{name} {self.put(term)}" for name, term in zip(names, terms, strict=False)]
+
+    def condition(self, one: Condition) -> str:
+        """Write a condition and those inside it; return its IRI."""
+        position = len(self.nodes)
+        self.nodes.append("")
+        iri = f":{self.where}.condition{position:03}"
+        no = " ; c:negated true" if one.negated else ""
+        match one:
+            case ValueCondition(situation, arguments, value):
+                said = f"c:ValueCondition ; {self.value(Symbol(situation, arguments), value)}"
+            case RelationCondition(relation, terms):
+                last = [f"c:value {self.put(terms[-1])}"] if len(terms) > 1 else []
+                parts = [*self.arguments(terms[:-1] if last else terms), *last]
+                said = f"c:RelationCondition ; c:relation {self.iri(relation)} ; {' ; '.join(parts)}"
+            case ClassCondition(term, kind):
+                said = f"c:ClassCondition ; c:about {self.put(term)} ; c:ofClass {self.iri(kind)}"
+            case EqualityCondition(left, right):
+                said = f"c:EqualityCondition ; c:about {self.put(left)} ; c:value {self.put(right)}"
+            case Witness(variable, kind, conditions):
+                self.terms[variable] = f":{self.where}.{variable[1:]}"
+                self.nodes.append(self.term(self.terms[variable][1:], "c:Variable", None, kind))
+                inner = [self.condition(c) for c in conditions]
+                said = f"c:Witness ; c:witness {self.terms[variable]}{_some('c:condition', inner)}"
+            case AnyOf(alternatives):
+                groups = [self.group(group) for group in alternatives]
+                said = f"c:AnyOf{_some('c:alternative', groups)}"
+        self.nodes[position] = f"{iri} a owl:NamedIndividual, {said}{no} ."
+        return iri
+
+    def group(self, conditions: Sequence[Condition]) -> str:
+        if len(conditions) == 1:
+            return self.condition(conditions[0])
+        position = len(self.nodes)
+        self.nodes.append("")
+        inner = [self.condition(c) for c in conditions]
+        iri = f":{self.where}.condition{position:03}"
+        self.nodes[position] = f"{iri} a owl:NamedIndividual, c:AllOf{_some('c:condition', inner)} ."
+        return iri
+
+    def individuals(self) -> Iterator[str]:
+        """Yield every individual with the lowest of its classes, in the order in which the classes list them."""
+        classes = self.problem.classes
+        order = [name for kind in classes if kind not in CORE_CLASSES for name in classes[kind]]
+        names = [name for name in dict.fromkeys(order) if name not in (TRUE, FALSE)]
+        above = {kind: set(self.above(kind)) - {kind} for kind in classes}
+        of: dict[str, list[str]] = {name: [] for name in names}
+        for kind, members in classes.items():
+            if "|" in kind or (kind in CORE_CLASSES and kind not in ("Hand", "Robot")):
+                continue
+            for name in members:
+                if name in of:
+                    of[name].append(kind)
+        for index, name in enumerate(names, start=1):
+            kinds = [k for k in of[name] if not any(k in above[other] for other in of[name])]
+            said = ", ".join(["owl:NamedIndividual", *map(self.iri, kinds)])
+            label = _quoted(self.labels.get(name, name))
+            yield f"{self.iri(name)} a {said} ; c:index {index} ; rdfs:label {label}@en ."
+        if len(names) > 1:
+            different = " ".join(sorted(map(self.iri, names)))  # the OWL API, and so Protégé, saves them in this order
+            yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {different} ) ] ."
+
+    def above(self, kind: str) -> Iterator[str]:
+        yield kind
+        for parent in self.problem.parents.get(kind, ()):
+            yield from self.above(parent)
+
+    def facts(self) -> Iterator[str]:
+        situations, number = self.problem.domain.situations, 0
+        for symbol, value in self.problem.initial.items():
+            situation = situations[symbol.situation]
+            if value in (situation.default, situation.rest) or (situation.boolean and value == FALSE):
+                continue
+            if len(symbol.arguments) == 1 and not situation.boolean:
+                yield f"{self.iri(symbol.arguments[0])} :{situation.name}.value {self.iri(value)} ."
+            else:
+                number += 1
+                yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {self.value(symbol, value)} ."
+        for relation, tuples in self.problem.relations.items():
+            binary = all(len(row) == 2 for row in tuples)
+            for row in sorted(tuples):
+                if binary:
+                    yield f"{self.iri(row[0])} {self.iri(relation)} {self.iri(row[1])} ."
+                    continue
+                number += 1
+                last = [f"c:value {self.iri(row[-1])}"] if len(row) > 1 else []
+                parts = " ; ".join([*self.arguments(row[:-1] if last else row), *last])
+                kinds = "owl:NamedIndividual, c:SituatedObjectInstance"
+                yield f":fact{number} a {kinds} ; c:relation {self.iri(relation)} ; {parts} ."
+
+    def task(self) -> Iterator[str]:
+        goals = [Fact(symbol, value) for symbol, value in self.problem.goal.items()]
+        iris = [f":goal{i}" for i in range(1, len(goals) + 1)]
+        yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{_some("c:goal", iris)} .'
+        for iri, fact in zip(iris, goals, strict=True):
+            yield f"{iri} a owl:NamedIndividual, c:ValueCondition ; {self.value(fact.symbol, fact.value)} ."
+
+
+def _some(key: str, values: Sequence[str]) -> str:
+    return f" ; {key} {', '.join(values)}" if values else ""
+
+
+def _banner(text: str) -> str:
+    return f"\n{'#' * 65}  {text}\n"

@@ -1,0 +1,252 @@
+"""Situated affordances: which behaviours which object affords here, asked of the graph by SPARQL.
+
+A state is written into a named graph of its own (`SITUATION`), one fact for each symbol, with defaults filled in. A behaviour's
+preconditions become graph patterns on it:
+
+=========================  ===================================================================
+condition                  pattern
+=========================  ===================================================================
+`ValueCondition`           ``GRAPH <urn:confab:graph:situation> { ?cup k:location ?l }``
+`RelationCondition`        ``?hand k:canReach ?l``, static, on what is asserted and inferred
+`ClassCondition`           ``?cup a/rdfs:subClassOf* k:Cup``
+`Witness`, `AnyOf`         ``FILTER EXISTS { … }``, joined by ``||``
+negated                    ``FILTER NOT EXISTS { … }``
+=========================  ===================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import BASE, CORE, SCENE, KnowledgeGraph, text
+from reasoner.reading.problem import Reading
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Fact,
+    RelationCondition,
+    State,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+SITUATION = BASE + "situation"
+ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
+VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
+RELATION_PROPERTIES = (
+    "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
+)
+TYPE = ox.NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type")
+
+
+@dataclass(frozen=True, order=True)
+class Affordance:
+    """What an object affords in a situation.
+
+    Attributes
+    ----------
+    object : str
+    behavior : str
+    arguments : tuple of str
+        Of the behaviour, the object among them.
+    situation : tuple of Fact
+        The facts that its preconditions name and that hold.
+    effect : tuple of Fact
+        What would hold afterwards.
+    """
+
+    object: str
+    behavior: str
+    arguments: tuple[str, ...]
+    situation: tuple[Fact, ...]
+    effect: tuple[Fact, ...]
+
+
+def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
+    """Write a state into the graph `SITUATION`, in place of what was there; the initial state if none is given."""
+    name, iri = ox.NamedNode(SITUATION), reading.names.iri
+    properties = dict(_pairs(graph, VALUE_PROPERTIES))
+    graph.store.clear_graph(name)
+    for number, (symbol, value) in enumerate((state or reading.problem.initial).items()):
+        if value == FALSE:
+            continue
+        prop = properties.get(iri(symbol.situation))
+        arguments = [ox.NamedNode(iri(argument)) for argument in symbol.arguments]
+        if prop and len(arguments) + (value != TRUE) == 2:
+            tail = arguments[1] if value == TRUE else ox.NamedNode(iri(value))
+            graph.store.add(ox.Quad(arguments[0], ox.NamedNode(prop), tail, name))
+            continue
+        node = ox.BlankNode(f"fact{number}")
+        parts = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": ox.NamedNode(iri(symbol.situation))}
+        parts |= {} if value == TRUE else {"value": ox.NamedNode(iri(value))}
+        graph.store.extend(ox.Quad(node, ox.NamedNode(CORE + part), term, name) for part, term in parts.items())
+        graph.store.add(ox.Quad(node, TYPE, ox.NamedNode(CORE + "SituatedObjectInstance"), name))
+
+
+def applicable_query(
+    graph: KnowledgeGraph, reading: Reading, behavior: Behavior, when: Sequence[Condition] = ()
+) -> str:
+    """Return the SPARQL query whose rows are the arguments and variables with which a behaviour can be done.
+
+    It asks the graph `SITUATION`, which `write_situation` fills. `when` are conditions that hold in addition.
+    """
+    return _Writer(graph, reading).query(behavior, when)
+
+
+def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> list[Affordance]:
+    """Return what every object affords in a state (the initial one if none is given), in order.
+
+    Examples
+    --------
+    >>> from reasoner.graph.knowledge import load
+    >>> from reasoner.graph.inference import infer
+    >>> from reasoner.reading.problem import read
+    >>> graph = load("living-room")
+    >>> _ = infer(graph)
+    >>> for found in affordances(graph, read(graph)):
+    ...     print(found.object, found.behavior, *found.effect)
+    bread2 EAT bread2 REST_OF_FOOD eaten
+    cup1 CLEAR_AWAY cup1 PLACE counter_right
+    """
+    write_situation(graph, reading, state)
+    writer = _Writer(graph, reading)
+    found = []
+    for behavior in reading.problem.domain.behaviors.values():
+        for bindings in writer.rows(behavior):
+            arguments = tuple(bindings[parameter.name] for parameter in behavior.parameters)
+            situation = tuple(sorted(_facts(behavior.preconditions, bindings)))
+            effect = tuple(sorted(writer.effects(behavior, arguments, bindings)))
+            about = {fact.symbol.arguments[0] for fact in (*situation, *effect)}
+            objects = [o for o in dict.fromkeys(arguments) if o in about]
+            found += [Affordance(o, behavior.name, arguments, situation, effect) for o in objects]
+    return sorted(found)
+
+
+def _pairs(graph: KnowledgeGraph, query: str) -> Iterator[tuple[str, str]]:
+    return ((text(one), text(other)) for one, other in graph.select(query, SCENE))
+
+
+def _facts(conditions: Sequence[Condition], bindings: dict[str, str]) -> Iterator[Fact]:
+    """Yield the facts that positive value conditions name."""
+    for condition in conditions:
+        if isinstance(condition, ValueCondition) and not condition.negated:
+            yield _fact(condition, bindings)
+
+
+def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
+    arguments = tuple(bindings.get(argument, argument) for argument in said.arguments)
+    return Fact(Symbol(said.situation, arguments), bindings.get(said.value, said.value))
+
+
+class _Writer:
+    """Writes conditions as SPARQL patterns."""
+
+    def __init__(self, graph: KnowledgeGraph, reading: Reading) -> None:
+        self.graph, self.reading = graph, reading
+        self.properties = dict(_pairs(graph, VALUE_PROPERTIES))
+        self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
+
+    def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
+        """Yield what the parameters and variables stand for, once for each way in which a behaviour can be done."""
+        names = self.names(behavior, when)
+        for row in self.graph.select(self.query(behavior, when), SCENE):
+            yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
+
+    def effects(self, behavior: Behavior, arguments: tuple[str, ...], bindings: dict[str, str]) -> Iterator[Fact]:
+        """Yield what holds after a behaviour, conditional effects included."""
+        for effect in behavior.effects:
+            if not effect.when:
+                yield _fact(effect, bindings)
+                continue
+            for row in self.rows(behavior, effect.when):
+                if tuple(row[parameter.name] for parameter in behavior.parameters) == arguments:
+                    yield _fact(effect, row)
+
+    def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
+        """Return the terms that a query binds: parameters in their order, then what value conditions determine."""
+        found = dict.fromkeys(parameter.name for parameter in behavior.parameters)
+        for condition in (*behavior.preconditions, *when):
+            if isinstance(condition, ValueCondition) and not condition.negated and condition.value.startswith("?"):
+                found[condition.value] = None
+        return list(found)
+
+    def query(self, behavior: Behavior, when: Sequence[Condition] = ()) -> str:
+        names = self.names(behavior, when)
+        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        conditions = (*behavior.preconditions, *when)
+        lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
+        lines += [line for condition in conditions for line in self.pattern(condition)]
+        head = f"# {behavior.name}: where its preconditions hold in the graph {SITUATION}\n"
+        chosen = " ".join(names) or "(1 AS ?once)"
+        order = " ".join(names)
+        body = "\n".join(f"  {line}" for line in lines)
+        return f"{head}SELECT DISTINCT {chosen} WHERE {{\n{body}\n}}" + (f" ORDER BY {order}" if order else "")
+
+    def typed(self, name: str, kind: str) -> str:
+        if kind in self.reading.names:
+            return f"{name} a owl:NamedIndividual ; a/rdfs:subClassOf* <{self.reading.names.iri(kind)}> ."
+        parts = " UNION ".join(
+            f"{{ {name} a/rdfs:subClassOf* <{self.reading.names.iri(part)}> }}" for part in kind.split("|")
+        )
+        return parts + f" {name} a owl:NamedIndividual ."
+
+    def term(self, name: str) -> str:
+        return name if name.startswith("?") else f"<{self.reading.names.iri(name)}>"
+
+    def pattern(self, condition: Condition) -> Iterator[str]:
+        """Yield the lines of one condition."""
+        if condition.negated:
+            inner = " ".join(self.positive(condition))
+            yield f"FILTER NOT EXISTS {{ {inner} }}"
+        elif isinstance(condition, Witness):
+            yield f"FILTER EXISTS {{ {' '.join(self.positive(condition))} }}"
+        else:
+            yield from self.positive(condition)
+
+    def positive(self, condition: Condition) -> Iterator[str]:
+        """Yield the lines that say a condition without its negation."""
+        match condition:
+            case ValueCondition(situation, arguments, value):
+                yield self.value(situation, arguments, value)
+            case RelationCondition(relation, arguments):
+                yield self.relation(relation, arguments)
+            case ClassCondition(term, kind):
+                yield self.typed(self.term(term), kind)
+            case EqualityCondition(left, right):
+                yield f"FILTER({self.term(left)} = {self.term(right)})"
+            case Witness(variable, kind, conditions):
+                for inner in conditions:
+                    yield from self.pattern(inner)
+                yield self.typed(variable, kind)
+            case AnyOf(alternatives):
+                groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)
+                yield "FILTER(" + " || ".join(f"EXISTS {{ {group} }}" for group in groups) + ")"
+
+    def value(self, situation: str, arguments: tuple[str, ...], value: str) -> str:
+        if value == FALSE:
+            return f"FILTER NOT EXISTS {{ {self.value(situation, arguments, TRUE)} }}"
+        terms = [self.term(argument) for argument in (*arguments, *([] if value == TRUE else [value]))]
+        prop = self.properties.get(self.reading.names.iri(situation))
+        if prop and len(terms) == 2:
+            return f"GRAPH <{SITUATION}> {{ {terms[0]} <{prop}> {terms[1]} }}"
+        parts = [f":{name} {self.term(argument)}" for name, argument in zip(ARGUMENTS, arguments, strict=False)]
+        parts += [] if value == TRUE else [f":value {terms[-1]}"]
+        said = " ; ".join([f":situationType <{self.reading.names.iri(situation)}>", *parts])
+        return f"GRAPH <{SITUATION}> {{ [] {said} }}"
+
+    def relation(self, relation: str, arguments: tuple[str, ...]) -> str:
+        iri, terms = self.reading.names.iri(relation), [self.term(argument) for argument in arguments]
+        if iri in self.relations and len(terms) == 2:
+            return f"{terms[0]} <{iri}> {terms[1]} ."
+        parts = [f":{name} {term}" for name, term in zip(ARGUMENTS, terms, strict=False)]
+        return f"[] a :SituatedObjectInstance ; :relation <{iri}> ; {' ; '.join(parts)} ."

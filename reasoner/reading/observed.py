@@ -1,0 +1,106 @@
+"""What was seen in the world, as facts of the graph: a file of its own, beside the scene that people edit.
+
+Each fact is a situated object instance, an individual with object, situation type and value. It isn't the property assertion that
+the scene makes: a scene that says where a cup was, and a file that says where it was seen, don't contradict each other. A planning
+call that starts from what was observed puts these values in place of the scene's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into, text
+from reasoner.names import Names
+from reasoner.reading.problem import Reading
+from reasoner.symbols import State, Symbol
+
+ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
+FACTS = """
+SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property"""
+
+
+def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
+    """Write an observed state as situated object instances.
+
+    Parameters
+    ----------
+    path : Path
+    state : State
+        As perceived.
+    names : Names
+        The scene's names, to lead back to IRIs.
+    scene : str
+        IRI of the scene, which the file imports.
+    """
+    prefixes = {"owl": PREFIXES["owl"], "": CORE, "s": observed_iri(scene) + "#"}
+    write_whole(path, ox.serialize(_triples(state, names, scene), format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
+
+
+def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
+    """Put an observed state into the graph `observed`, in place of what was there."""
+    target = ox.NamedNode(BASE + "observed")
+    graph.store.clear_graph(target)
+    triples = _triples(state, names, graph.scene)
+    graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
+
+
+def load_observed(path: Path, reading: Reading) -> Reading:
+    """Return a reading whose initial state is what a file says was observed, where it says something.
+
+    Raises
+    ------
+    KnowledgeError
+        The file is missing or no Turtle, or speaks of what the scene doesn't have.
+    """
+    if not path.is_file():
+        raise KnowledgeError(f"{path}: no such file of observed facts; 'confab run' and 'confab execute' write one")
+    graph = KnowledgeGraph("")
+    read_into(graph, path, "observed")
+    nodes: dict[str, dict[str, str]] = {}
+    for fact, predicate, value in graph.select(FACTS):
+        nodes.setdefault(text(fact), {})[text(predicate).removeprefix(CORE)] = reading.names.short(text(value))
+    if not nodes:
+        raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
+    seen = {_symbol(iri, node, reading.problem.initial, path): node["value"] for iri, node in nodes.items()}
+    return Reading(replace(reading.problem, initial={**reading.problem.initial, **seen}), reading.names)
+
+
+def observed_iri(scene: str) -> str:
+    """Return the IRI of the ontology of what was observed in a scene."""
+    return f"{scene.rstrip('#/')}.observed"
+
+
+def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symbol:
+    arguments = tuple(node[name] for name in ARGUMENTS if name in node)
+    symbol = Symbol(node.get("situationType", ""), arguments)
+    if symbol not in known or "value" not in node:
+        raise KnowledgeError(
+            f"{path}: <{iri}> speaks of {symbol}, which the scene doesn't have; observe this scene anew"
+        )
+    return symbol
+
+
+def _triples(state: State, names: Names, scene: str) -> list[ox.Triple]:
+    iri, owl, kind = observed_iri(scene), PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
+    triples = [
+        ox.Triple(ox.NamedNode(iri), kind, ox.NamedNode(owl + "Ontology")),
+        ox.Triple(ox.NamedNode(iri), ox.NamedNode(owl + "imports"), ox.NamedNode(scene)),
+    ]
+    for symbol, value in sorted(state.items()):
+        local = ".".join((*symbol.arguments[:1], symbol.situation, *symbol.arguments[1:])).replace(":", "-")
+        fact = ox.NamedNode(f"{iri}#{local}")
+        parts = {
+            "situationType": symbol.situation,
+            **dict(zip(ARGUMENTS, symbol.arguments, strict=False)),
+            "value": value,
+        }
+        triples.append(ox.Triple(fact, kind, ox.NamedNode(owl + "NamedIndividual")))
+        triples.append(ox.Triple(fact, kind, ox.NamedNode(CORE + "SituatedObjectInstance")))
+        for name, term in parts.items():
+            triples.append(ox.Triple(fact, ox.NamedNode(CORE + name), ox.NamedNode(names.iri(term))))
+    return triples

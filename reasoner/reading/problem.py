@@ -1,0 +1,610 @@
+"""From the knowledge graph to the values of `reasoner.symbols`: what is there, what can be done, what holds, what is wanted.
+
+The graph is read in a few large queries; their rows become nodes (subject → property → values), and the nodes become values:
+
+============================  ==============================================
+in the ontology               in `reasoner.symbols`
+============================  ==============================================
+``:SituationType``            `SituationType`
+``:Behavior``                 `Behavior`, its terms starting with ``?``
+``:AbsenceCondition``         a negated `Witness`
+``x valueProperty v``         the value of `Symbol` in `Problem.initial`
+``:goal`` of the ``:Task``    `Problem.goal`
+============================  ==============================================
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+from reasoner.graph.knowledge import CORE, SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
+from reasoner.names import Names, local_name, nearest
+from reasoner.reading.definitions import EXPRESSIONS, Definitions
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
+KINDS = (
+    "SituationType",
+    "Behavior",
+    "Term",
+    "Condition",
+    "Effect",
+    "Level",
+    "Task",
+    "Relation",
+)  # of the schema's nodes
+
+SCHEMA = f"""
+SELECT DISTINCT ?part ?node ?property ?value WHERE {{
+  {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}
+    ?node a/rdfs:subClassOf* ?kind ; ?property ?value . BIND("node" AS ?part) }}
+  UNION {{ ?node rdfs:subClassOf ?value . FILTER(isIRI(?node) && isIRI(?value))
+    FILTER NOT EXISTS {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }} ?node rdfs:subClassOf* ?kind }}
+    BIND("class" AS ?part) BIND(rdfs:subClassOf AS ?property) }}
+  UNION {{ ?node :hasSituationType ?value . BIND("owner" AS ?part) BIND(:hasSituationType AS ?property) }}
+  UNION {{ ?node :valueProperty ?property . FILTER NOT EXISTS {{ ?property a owl:FunctionalProperty }}
+    BIND("pair" AS ?part) BIND(?property AS ?value) }}
+  UNION {{ ?node :fromLevel ?value . BIND("level" AS ?part) BIND(:fromLevel AS ?property) }}
+  UNION {{ ?node a :SituatedObjectInstance ; ?property ?value .
+    FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
+  UNION {{ {{ SELECT ?node WHERE {{ ?node a :SituatedObjectInstance ; :about ?object }} LIMIT 1 }}
+    BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
+  UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
+}} ORDER BY ?part ?node ?property ?value"""
+"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own."""
+MEMBERS = """
+SELECT DISTINCT ?individual ?class ?index WHERE {
+  ?individual a owl:NamedIndividual, ?class .
+  FILTER(isIRI(?class) && !STRSTARTS(STR(?class), STR(owl:)))
+  OPTIONAL { ?individual :index ?index }
+} ORDER BY ?individual ?class"""
+FACTS = """
+SELECT DISTINCT ?subject ?property ?object WHERE {
+  { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation }
+  ?subject ?property ?object .
+} ORDER BY ?subject ?property ?object"""
+TUPLES = """
+SELECT DISTINCT ?fact ?property ?value WHERE {
+  ?fact a :SituatedObjectInstance ; ?property ?value
+} ORDER BY ?fact ?property ?value"""
+
+Node = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A scene as the planner takes it, with the table that leads from its names back to IRIs.
+
+    `whole` tells whether all individuals of the scene are in it, or those only that its task can need
+    (`reasoner.reading.relevance`).
+    """
+
+    problem: Problem
+    names: Names
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class Schema:
+    """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
+
+    `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
+    property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody;
+    `expressions` are the definitions of classes.
+    """
+
+    nodes: Mapping[str, Node]
+    supers: Mapping[str, Sequence[str]]
+    owners: Sequence[tuple[str, str]]
+    pairs: frozenset[str]
+    from_levels: Mapping[str, int]
+    facts: Mapping[str, Node]
+    tuples: bool
+    expressions: Mapping[str, Node]
+
+
+@dataclass(frozen=True)
+class Individuals:
+    """What is said of individuals, as IRIs.
+
+    `members` are individual, class and index; `facts` the triples of value properties and relations; `tuples` the facts that
+    are nodes of their own; `namesakes` what else ends like one of them, so that their names are those of the whole scene.
+    """
+
+    members: Sequence[tuple[str, str, int]]
+    facts: Sequence[tuple[str, str, str]]
+    tuples: Mapping[str, Node]
+    namesakes: Collection[str] = ()
+
+
+def read(graph: KnowledgeGraph) -> Reading:
+    """Read the planning problem out of a knowledge graph, with every individual that it has.
+
+    Raises
+    ------
+    KnowledgeError
+        An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
+    """
+    members = [(text(who), text(kind), _number(index)) for who, kind, index in graph.select(MEMBERS, SCENE)]
+    facts = [_triple(row) for row in graph.select(FACTS, SCENE)]
+    tuples = _nodes(_triple(row) for row in graph.select(TUPLES, SCENE))
+    return reading_of(graph.scene, read_schema(graph), Individuals(members, facts, tuples))
+
+
+def read_schema(graph: KnowledgeGraph) -> Schema:
+    """Read what doesn't depend on how many individuals there are, in one query."""
+    parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+    for row in graph.select(SCHEMA, SCENE):
+        parts[text(row[0])].append(_triple(row[1:]))
+    return Schema(
+        nodes=_nodes(parts["node"]),
+        supers=_superclasses((sub, sup) for sub, _, sup in parts["class"]),
+        owners=[(kind, situation) for kind, _, situation in parts["owner"]],
+        pairs=frozenset(situation for situation, _, _ in parts["pair"]),
+        from_levels={value: int(level) for value, _, level in parts["level"]},
+        facts=_nodes(parts["fact"]),
+        tuples=bool(parts["tuples"]),
+        expressions=_nodes(parts["expression"]),
+    )
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A schema as values, for some individuals: everything of a problem but its facts and its goal.
+
+    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values.
+    """
+
+    schema: _Schema
+    domain: Domain
+    classes: dict[str, tuple[str, ...]]
+    parents: dict[str, tuple[str, ...]]
+    properties: dict[str, tuple[str, bool]]
+
+
+def frame(schema: Schema, members: Sequence[tuple[str, str, int]], namesakes: Collection[str] = ()) -> Frame:
+    """Return the behaviours and situation types as values, and the classes of some individuals."""
+    nodes, supers = schema.nodes, schema.supers
+    instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
+    terms = {iri for iri, node in nodes.items() if _is(node, "Parameter", "Variable")}
+    named = {iri for iri, node in nodes.items() if _is(node, "SituationType", "Behavior", "Relation", "ReachRelation")}
+    names = Names(
+        named
+        | {iri for iri in namesakes if iri not in nodes}
+        | {i for i, _, _ in instances}
+        | {k for _, k, _ in instances}
+        | {s for pair in supers.items() for s in (pair[0], *pair[1])}
+        | {kind for node in nodes.values() for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())}
+    )
+    definitions = Definitions(schema.expressions, _value_properties(schema), names)
+    parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
+    classes, parents = _classes(instances, supers, names)
+    situations, properties = _situations(parts, schema.owners, classes)
+    behaviors = sorted(_ordered(parts.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
+    domain = Domain(
+        situations={s.name: s for s in situations},
+        behaviors={names.short(iri): parts.behavior(iri) for iri in behaviors},
+        first_ids={parts.number(iri, "level"): parts.number(iri, "firstId", 0) for iri in parts.of_kind("Level")},
+    )
+    return Frame(parts, domain, classes, parents, properties)
+
+
+def reading_of(scene: str, schema: Schema, individuals: Individuals, whole: bool = True) -> Reading:
+    """Return the planning problem of some individuals."""
+    known = frame(schema, individuals.members, individuals.namesakes)
+    names = known.schema.names
+    tuples = {**individuals.tuples, **schema.facts}
+    relations, stated = _facts(individuals.facts, tuples, known.properties, known.domain, names)
+    initial = _initial(known.domain, known.classes, stated, names)
+    levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
+    problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
+    return Reading(_with_goal(problem, known.schema), names, whole)
+
+
+def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
+    """Return the problem with some goals replaced, each written like ``cup2 LOCATION location8``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind, the object doesn't have the situation type, or two goals exclude each other.
+    """
+    problem = reading.problem
+    given: dict[Symbol, str] = {}
+    for fact in goals:
+        symbol, value = parse_fact(problem, fact)
+        if given.setdefault(symbol, value) != value:
+            raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
+    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())))
+
+
+def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
+    """Return symbol and value of a fact written as ``object SITUATION [argument …] value``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind; the message has the nearest known name.
+    """
+    words = fact.split()
+    individuals = {name for members in problem.classes.values() for name in members}
+    if len(words) < 2:
+        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
+    about, name, *rest = words
+    if about not in individuals:
+        raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
+    if name not in problem.domain.situations:
+        known = problem.domain.situations
+        raise KnowledgeError(
+            f"unknown situation type '{name}' in '{fact}'{nearest(name, known)} (known: {', '.join(known)})"
+        )
+    situation = problem.domain.situations[name]
+    if situation.boolean and len(rest) == len(situation.arguments) - 1:
+        rest.append(TRUE)
+    if len(rest) != len(situation.arguments):
+        raise KnowledgeError(f"'{fact}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
+    for kind, word in zip((*situation.arguments[1:], situation.range), rest, strict=True):
+        if word not in individuals and word not in (TRUE, FALSE):
+            raise KnowledgeError(
+                f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
+            )
+        if word not in problem.classes.get(kind, ()):
+            raise KnowledgeError(
+                f"'{fact}': {word} is no value of {name}; values: {_some(problem.classes.get(kind, ()))}"
+            )
+    symbol = Symbol(name, (about, *rest[:-1]))
+    if about not in problem.classes.get(situation.arguments[0], ()):
+        raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
+    return symbol, rest[-1]
+
+
+# ------------------------------------------------------------------------------------------------------- from rows to nodes
+
+
+def _nodes(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
+    nodes: dict[str, dict[str, list[str]]] = {}
+    for subject, predicate, value in triples:
+        nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
+    return nodes
+
+
+def _triple(row: Row) -> tuple[str, str, str]:
+    subject, predicate, value = map(text, row)
+    return subject, predicate, value
+
+
+def _number(term: Term) -> int:
+    return FIRST_INDEX_OF_NONE if term is None else int(text(term))
+
+
+def _is(node: Node, *kinds: str) -> bool:
+    types = node["http://www.w3.org/1999/02/22-rdf-syntax-ns#type"]
+    return any(CORE + kind in types for kind in kinds)
+
+
+def _ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> list[str]:
+    """Return nodes by their index, then by name."""
+
+    def key(iri: str) -> tuple[int, str]:
+        index = nodes[iri].get(CORE + "index")
+        return (int(index[0]) if index else FIRST_INDEX_OF_NONE, names.short(iri))
+
+    return sorted(iris, key=key)
+
+
+def _superclasses(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    supers: dict[str, list[str]] = defaultdict(list)
+    for sub, sup in pairs:
+        if sub != sup:
+            supers[sub].append(sup)
+    return dict(supers)
+
+
+def _classes(
+    instances: Sequence[tuple[str, str, int]], supers: Mapping[str, Sequence[str]], names: Names
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Return the individuals of each class in declared order, superclasses included, and each class's direct superclasses."""
+    above: dict[str, frozenset[str]] = {}
+
+    def closure(kind: str) -> frozenset[str]:
+        if kind not in above:
+            found, waiting = {kind}, [kind]
+            while waiting:
+                for sup in supers.get(waiting.pop(), ()):
+                    if sup not in found:
+                        found.add(sup)
+                        waiting.append(sup)
+            above[kind] = frozenset(found)
+        return above[kind]
+
+    members: dict[str, dict[str, int]] = defaultdict(dict)
+    for individual, kind, index in instances:
+        for sup in closure(kind):
+            members[names.short(sup)][names.short(individual)] = index
+    for kind in {*supers, *(s for group in supers.values() for s in group)}:
+        members.setdefault(names.short(kind), {})
+    classes = {
+        kind: tuple(sorted(group, key=lambda name: (group[name], name))) for kind, group in sorted(members.items())
+    }
+    return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
+
+
+# ------------------------------------------------------------------------------------------------------ from nodes to values
+
+
+@dataclass(frozen=True)
+class _Schema:
+    """The nodes of behaviours, conditions and situation types, read as values."""
+
+    nodes: Mapping[str, Node]
+    names: Names
+    terms: set[str]
+    pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
+    definitions: Definitions
+
+    def of_kind(self, kind: str) -> list[str]:
+        return [iri for iri, node in self.nodes.items() if _is(node, kind)]
+
+    def values(self, iri: str, name: str) -> Sequence[str]:
+        return self.nodes.get(iri, {}).get(CORE + name, ())
+
+    def one(self, iri: str, name: str) -> str:
+        found = self.values(iri, name)
+        if len(found) != 1:
+            raise KnowledgeError(f"<{iri}>: wanted one :{name}, found {len(found)}; state it in the ontology")
+        return found[0]
+
+    def number(self, iri: str, name: str, default: int | None = None) -> int:
+        found = self.values(iri, name)
+        return default if not found and default is not None else int(self.one(iri, name))
+
+    def flag(self, iri: str, name: str) -> bool:
+        return list(self.values(iri, name)) in (["true"], ["1"])
+
+    def term(self, iri: str) -> str:
+        """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
+        return "?" + local_name(iri).rsplit(".", 1)[-1] if iri in self.terms else self.names.short(iri)
+
+    def parameter(self, iri: str) -> Parameter:
+        return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
+
+    def membership(self, iri: str) -> tuple[Condition, ...]:
+        """Return what the type of a term asks of it, if that is a class defined by situations."""
+        return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
+
+    def arguments(self, iri: str) -> tuple[str, ...]:
+        names = ("about", *(f"argument{position}" for position in range(2, 10)))
+        return tuple(self.term(value) for name in names for value in self.values(iri, name)[:1])
+
+    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+        situation = self.one(iri, "situationType")
+        arguments = self.arguments(iri)
+        value = [self.term(v) for v in self.values(iri, "value")]
+        if situation in self.pairs:
+            arguments, value = (*arguments, *value), []
+        return self.names.short(situation), arguments, value[0] if value else TRUE
+
+    def condition(self, iri: str) -> Condition:
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
+        node, negated = self.nodes[iri], self.flag(iri, "negated")
+        if _is(node, "ValueCondition"):
+            return ValueCondition(*self.situation_and_value(iri), negated)
+        if _is(node, "RelationCondition"):
+            arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
+            return RelationCondition(self.names.short(self.one(iri, "relation")), arguments, negated)
+        if _is(node, "ClassCondition"):
+            return self.definitions.condition(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
+        if _is(node, "EqualityCondition"):
+            return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
+        if _is(node, "AbsenceCondition"):
+            name, _, value = self.situation_and_value(iri)
+            anyone, kind = "?anyone", self.one(iri, "ofClass")
+            inner = (ValueCondition(name, (anyone,), value), *self.definitions.beyond_base(anyone, kind))
+            return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not negated)
+        if _is(node, "Witness"):
+            sought = self.one(iri, "witness")
+            variable, inner = self.parameter(sought), (*self.conditions(iri, "condition"), *self.membership(sought))
+            return Witness(variable.name, variable.kind, inner, negated)
+        if _is(node, "AnyOf"):
+            groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
+            return AnyOf(tuple(groups), negated)
+        raise KnowledgeError(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+
+    def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
+        return tuple(self.condition(value) for value in self.values(iri, name))
+
+    def group(self, iri: str) -> tuple[Condition, ...]:
+        if iri in self.nodes and _is(self.nodes[iri], "AllOf"):
+            return self.conditions(iri, "condition")
+        return (self.condition(iri),)
+
+    def effect(self, iri: str) -> ValueEffect:
+        situation, arguments, value = self.situation_and_value(iri)
+        if self.flag(iri, "negated"):
+            value = FALSE
+        return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
+
+    def behavior(self, iri: str) -> Behavior:
+        parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
+        used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
+        cost = self.values(iri, "cost")
+        return Behavior(
+            name=self.names.short(iri),
+            level=self.number(iri, "level"),
+            parameters=parameters,
+            variables=tuple(map(self.parameter, used)),
+            preconditions=(
+                *self.conditions(iri, "precondition"),
+                *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
+            ),
+            effects=tuple(self.effect(value) for value in self.values(iri, "postcondition")),
+            cost=float(cost[0]) if cost else 1.0,
+        )
+
+    def terms_below(self, iri: str) -> set[str]:
+        """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
+        found: set[str] = set()
+        bound: set[str] = set()
+        waiting, seen = [iri], {iri}
+        while waiting:
+            node = waiting.pop()
+            bound.update(self.values(node, "witness"))
+            for values in self.nodes.get(node, {}).values():
+                for value in values:
+                    if value in self.terms:
+                        found.add(value)
+                    elif value in self.nodes and value not in seen and _is_part(self.nodes[value]):
+                        seen.add(value)
+                        waiting.append(value)
+        return found - bound
+
+
+def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
+    """Return the situation type of each value property, and whether it is functional."""
+    return {
+        prop: (iri, iri not in schema.pairs)
+        for iri, node in schema.nodes.items()
+        for prop in node.get(CORE + "valueProperty", ())
+    }
+
+
+def _is_part(node: Node) -> bool:
+    return not _is(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level")
+
+
+def _situations(
+    schema: _Schema, owners: Sequence[tuple[str, str]], classes: dict[str, tuple[str, ...]]
+) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
+    """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
+    found, properties = [], {}
+    for iri in sorted(schema.of_kind("SituationType"), key=schema.names.short):
+        name = schema.names.short(iri)
+        owning = [schema.names.short(kind) for kind, situation in owners if situation == iri]
+        parameters = [
+            schema.parameter(p) for p in _ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)
+        ]
+        arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
+        value_property = schema.values(iri, "valueProperty")
+        boolean = set(classes.get(name, ())) <= {TRUE, FALSE}
+        if iri in schema.pairs:
+            arguments, boolean = (*arguments, name), True
+        for iri_of_property in value_property:
+            properties[iri_of_property] = (name, iri in schema.pairs)
+        rest = schema.values(iri, "restValue")
+        default = schema.values(iri, "defaultValue") or rest
+        found.append(
+            SituationType(
+                name=name,
+                arguments=arguments,
+                range="Truth" if boolean else name,
+                level=schema.number(iri, "fromLevel", 1),
+                rest=schema.term(rest[0]) if rest else None,
+                default=schema.term(default[0]) if default else (FALSE if boolean else None),
+                boolean=boolean,
+            )
+        )
+    return found, properties
+
+
+def _union(kinds: Sequence[str], classes: dict[str, tuple[str, ...]]) -> str:
+    """Return the class of all individuals of several classes, made if there is more than one."""
+    name = "|".join(kinds)
+    if name not in classes:
+        classes[name] = tuple(dict.fromkeys(member for kind in kinds for member in classes.get(kind, ())))
+    return name
+
+
+def _facts(
+    rows: Iterable[tuple[str, ...]],
+    tuples: Mapping[str, Node],
+    properties: Mapping[str, tuple[str, bool]],
+    domain: Domain,
+    names: Names,
+) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
+    """Return the static relations, and the values that the scene states of each symbol."""
+    relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+    stated: dict[Symbol, set[str]] = defaultdict(set)
+    for subject, predicate, value in rows:
+        pair = (names.short(subject), names.short(value))
+        if predicate not in properties:
+            relations[names.short(predicate)].add(pair)
+            continue
+        situation, boolean = properties[predicate]
+        if boolean:
+            stated[Symbol(situation, pair)].add(TRUE)
+        else:
+            stated[Symbol(situation, pair[:1])].add(pair[1])
+    facts = _Schema(tuples, names, set(), set(), Definitions({}, {}, names))
+    for iri, node in tuples.items():
+        if CORE + "relation" in node:
+            tail = [names.short(v) for v in facts.values(iri, "value")]
+            relations[names.short(facts.one(iri, "relation"))].add((*facts.arguments(iri), *tail))
+        else:
+            values = facts.values(iri, "value")
+            symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
+            stated[symbol].add(names.short(values[0]) if values else TRUE)
+    for symbol in stated:
+        if symbol.situation not in domain.situations:
+            raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+    return {name: frozenset(pairs) for name, pairs in sorted(relations.items())}, stated
+
+
+def _initial(
+    domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
+) -> dict[Symbol, str]:
+    initial = {}
+    for situation in domain.situations.values():
+        if situation.boolean:
+            continue
+        for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
+            symbol = Symbol(situation.name, arguments)
+            values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
+            if len(values) != 1:
+                what = f"several values ({', '.join(values)})" if values else "no value"
+                raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
+            initial[symbol] = values[0]
+    initial |= {s: v for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE}
+    return initial
+
+
+def _with_goal(problem: Problem, schema: _Schema) -> Problem:
+    goal: dict[Symbol, str] = {}
+    for task in schema.of_kind("Task"):
+        for iri in schema.values(task, "goal"):
+            wanted = schema.condition(iri)
+            if not isinstance(wanted, ValueCondition):
+                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition")
+            symbol = Symbol(wanted.situation, wanted.arguments)
+            value = FALSE if wanted.negated and wanted.value == TRUE else wanted.value
+            if goal.setdefault(symbol, value) != value:
+                raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
+            if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
+                raise KnowledgeError(
+                    f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
+                )
+    return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _some(names: Sequence[str], most: int = 12) -> str:
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

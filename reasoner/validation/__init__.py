@@ -1,0 +1,1 @@
+"""What is wrong in an ontology: where, why, and what to do."""

