@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 import ontology
-from reasoner.embodiment.reading import EmbodimentError, read_embodiment
 from reasoner.embodiment import measures
+from reasoner.embodiment.reading import EmbodimentError, read_embodiment
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name

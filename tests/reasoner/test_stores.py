@@ -13,7 +13,8 @@ import pytest
 
 from planner.paper.hierarchy import plan
 from reasoner.generate import write_scene
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, stores
+from reasoner.graph import stores
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
 from reasoner.graph.stores import Endpoint, connect, on_disk
 from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise
