@@ -165,7 +165,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Behavior:
-    """A lifted behaviour. `skill` names what executes it, on the primitive level."""
+    """A lifted behaviour. `skill` names what executes it, on the primitive level.
+
+    Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
+    binding makes both false and true is true, as in PDDL.
+    """
 
     name: str
     level: int
@@ -175,6 +179,10 @@ class Behavior:
     effects: tuple[ValueEffect, ...] = ()
     cost: float = 1.0
     skill: str | None = None
+
+    def __post_init__(self) -> None:
+        """Put the effects in order."""
+        object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda effect: effect.value != FALSE)))
 
 
 @dataclass(frozen=True, order=True)

@@ -77,8 +77,7 @@ def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed
     """
     kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
     parameters = tuple(parameter.name for parameter in behavior.parameters)
-    # What becomes false does so first: an action that makes the same thing true and false makes it true, as in PDDL.
-    effects = list(enumerate(sorted(behavior.effects, key=lambda effect: effect.value != FALSE)))
+    effects = list(enumerate(behavior.effects))
     compile_ = _Compiler(situations, changed, kinds)
     base = compile_.schema(behavior, parameters, behavior.preconditions, tuple(e for e in effects if not e[1].when))
     found = [base]

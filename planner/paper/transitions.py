@@ -96,10 +96,7 @@ class Model:
         parameters = tuple(parameter.name for parameter in behavior.parameters)
         bound = set(parameters)
         tests = self._conjunction(behavior.preconditions, bound, kinds, behavior.name)
-        ordered = sorted(
-            behavior.effects, key=lambda effect: effect.value != FALSE
-        )  # what becomes true wins, as in PDDL
-        effects = [self._effect(effect, set(bound), kinds, behavior.name) for effect in ordered]
+        effects = [self._effect(effect, set(bound), kinds, behavior.name) for effect in behavior.effects]
         return parameters, tests, effects
 
     def _conjunction(
