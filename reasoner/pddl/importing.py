@@ -454,6 +454,9 @@ class _Import:
         conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form, types))
         conditions = tuple(dict.fromkeys(conditions))
         effects = self.value_effects(name, variables, types, conditions)
+        used = {word for atom in _words_in(action.precondition, action.effect) for word in atom}
+        unused = [p for p in action.parameters if p.name not in used]
+        conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
         behavior = Behavior(self.name("action", name, name.upper()), self.level, parameters, (), conditions, effects)
         constant, functions = 0.0, []
         for amount in _increases(action.effect):
@@ -629,6 +632,14 @@ def _typed(form: Form) -> list[Typed]:
 
 def _words(form: Form) -> Atom:
     return tuple(item.text for item in form.items if isinstance(item, Word))
+
+
+def _words_in(*forms: Form | None) -> Iterator[Atom]:
+    """Yield the words of all lists in some forms."""
+    for form in forms:
+        if form is not None:
+            yield _words(form)
+            yield from _words_in(*(item for item in form.items if isinstance(item, Form)))
 
 
 def _conjuncts(form: Form | None) -> Iterator[Form]:

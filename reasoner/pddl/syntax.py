@@ -18,19 +18,6 @@ from pathlib import Path
 
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|[^\s();]+|;[^\n]*|\s+")
-REFUSED = {
-    ":durative-actions": "durative actions",
-    ":duration-inequalities": "durative actions",
-    ":continuous-effects": "continuous effects",
-    ":derived-predicates": "derived predicates",
-    ":timed-initial-literals": "timed initial literals",
-    ":preferences": "preferences",
-    ":constraints": "trajectory constraints",
-    ":object-fluents": "object fluents",
-    ":time": "processes and events",
-    ":hierarchy": "HDDL methods",
-    ":htn": "HDDL methods",
-}
 SECTIONS = {
     ":durative-action": "durative actions",
     ":derived": "derived predicates",
@@ -221,9 +208,7 @@ class _Reader:
         actions = []
         for section in self.define(form, "domain"):
             rest = section.items[1:]
-            if section.head == ":requirements":
-                self.requirements(rest)
-            elif section.head == ":types":
+            if section.head == ":types":
                 self.types(rest)
             elif section.head == ":constants":
                 self.objects(rest)
@@ -233,7 +218,7 @@ class _Reader:
                 self.functions(rest)
             elif section.head == ":action":
                 actions.append(section)
-            else:
+            elif section.head != ":requirements":  # what is declared and not used does no harm
                 raise self.fail(section, f"unknown section {section.head} in a domain")
         for action in actions:
             self.action(action)
@@ -244,13 +229,11 @@ class _Reader:
             if section.head in sections:
                 raise self.fail(section, f"a second {section.head}")
             sections[section.head] = section
-            if section.head == ":requirements":
-                self.requirements(section.items[1:])
-            elif section.head == ":objects":
+            if section.head == ":objects":
                 self.objects(section.items[1:])
             elif section.head == ":metric":
                 self.metric(section)
-            elif section.head not in (":domain", ":init", ":goal"):
+            elif section.head not in (":requirements", ":domain", ":init", ":goal"):
                 raise self.fail(section, f"unknown section {section.head} in a problem")
         for wanted in (":init", ":goal"):
             if wanted not in sections:
@@ -266,12 +249,6 @@ class _Reader:
         if goal.items[1].items:
             self.condition(goal.items[1], {})
             self.pddl.goal = goal.items[1]
-
-    def requirements(self, items: Sequence[Word | Form]) -> None:
-        for item in items:
-            word = self.word(item, "a requirement")
-            if word.text in REFUSED:
-                raise self.fail(word, f"{REFUSED[word.text]} are not supported ({word.text})")
 
     def metric(self, form: Form) -> None:
         words = form.items[1:]
