@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -20,11 +19,11 @@ class Names:
 
     def __init__(self, iris: Iterable[str]) -> None:
         by_local = defaultdict(list)
-        for iri in sorted(set(iris)):
+        for iri in set(iris):
             by_local[local_name(iri)].append(iri)
         self._iris: dict[str, str] = {}
         for local, group in by_local.items():
-            for iri in group:
+            for iri in sorted(group):
                 name = local if len(group) == 1 else f"{_ontology_name(iri)}:{local}"
                 self._iris[name if name not in self._iris else iri] = iri
         self._names = {iri: name for name, iri in self._iris.items()}
@@ -37,6 +36,10 @@ class Names:
         """Return the IRI behind a short name; raises `KeyError` if there is none."""
         return self._iris[name]
 
+    def agree(self, other: Names) -> bool:
+        """Tell whether all that has a name here has the same one there."""
+        return all(other._names.get(iri) == name for iri, name in self._names.items())
+
     def __contains__(self, name: object) -> bool:
         """Tell whether some IRI has this short name."""
         return name in self._iris
@@ -44,7 +47,8 @@ class Names:
 
 def local_name(iri: str) -> str:
     """Return what stands behind the last ``#``, ``/`` or ``:`` of an IRI."""
-    return re.split(r"[#/:]", iri.rstrip("#/:"))[-1]
+    iri = iri.rstrip("#/:")
+    return iri[max(iri.rfind("#"), iri.rfind("/"), iri.rfind(":")) + 1 :]
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
@@ -58,4 +62,4 @@ def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
 
 
 def _ontology_name(iri: str) -> str:
-    return local_name(re.split(r"#", iri)[0]) if "#" in iri else local_name(iri.rsplit("/", 1)[0])
+    return local_name(iri.partition("#")[0] if "#" in iri else iri.rpartition("/")[0])

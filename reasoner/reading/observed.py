@@ -67,7 +67,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     if not nodes:
         raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
     seen = {_symbol(iri, node, reading.problem.initial, path): node["value"] for iri, node in nodes.items()}
-    return Reading(replace(reading.problem, initial={**reading.problem.initial, **seen}), reading.names)
+    return replace(reading, problem=replace(reading.problem, initial={**reading.problem.initial, **seen}))
 
 
 def observed_iri(scene: str) -> str:

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from functools import cached_property
+from itertools import chain, product
 
-from reasoner.graph.knowledge import CORE, SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
 from reasoner.names import Names, local_name, nearest
 from reasoner.reading.definitions import EXPRESSIONS, Definitions
 from reasoner.symbols import (
@@ -40,7 +41,9 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
+from reasoner.vocabulary import ARGUMENTS, CORE, TYPE
 
+WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
 KINDS = (
     "SituationType",
@@ -68,26 +71,34 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
     FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
   UNION {{ {{ SELECT ?node WHERE {{ ?node a :SituatedObjectInstance ; :about ?object }} LIMIT 1 }}
     BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
+  UNION {{ ?node a owl:Ontology . BIND("ontology" AS ?part) BIND(rdf:type AS ?property) BIND(owl:Ontology AS ?value) }}
   UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
-}} ORDER BY ?part ?node ?property ?value"""
-"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own."""
+}}"""
+"""What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own.
+
+No query of this module orders its rows: a store takes longer to order them than to find them, and what is made of them is
+ordered where that counts (`_nodes`, `_classes`, `_initial`).
+"""
 MEMBERS = """
 SELECT DISTINCT ?individual ?class ?index WHERE {
   ?individual a owl:NamedIndividual, ?class .
   FILTER(isIRI(?class) && !STRSTARTS(STR(?class), STR(owl:)))
   OPTIONAL { ?individual :index ?index }
-} ORDER BY ?individual ?class"""
+}"""
 FACTS = """
 SELECT DISTINCT ?subject ?property ?object WHERE {
   { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation }
   ?subject ?property ?object .
-} ORDER BY ?subject ?property ?object"""
+}"""
 TUPLES = """
 SELECT DISTINCT ?fact ?property ?value WHERE {
   ?fact a :SituatedObjectInstance ; ?property ?value
-} ORDER BY ?fact ?property ?value"""
+}"""
 
 Node = Mapping[str, Sequence[str]]
+Triple = tuple[str, str, str]
+Member = tuple[str, str, int]
+"""An individual, a class of it, and its index."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +106,12 @@ class Reading:
     """A scene as the planner takes it, with the table that leads from its names back to IRIs.
 
     `whole` tells whether all individuals of the scene are in it, or those only that its task can need
-    (`reasoner.reading.relevance`).
+    (`reasoner.reading.relevance`); `schema` is what it was read by.
     """
 
     problem: Problem
     names: Names
+    schema: Schema
     whole: bool = True
 
 
@@ -109,7 +121,7 @@ class Schema:
 
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
     property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody;
-    `expressions` are the definitions of classes.
+    `expressions` are the definitions of classes, `ontologies` the IRIs of what was loaded.
     """
 
     nodes: Mapping[str, Node]
@@ -120,24 +132,30 @@ class Schema:
     facts: Mapping[str, Node]
     tuples: bool
     expressions: Mapping[str, Node]
+    ontologies: Sequence[str]
+
+    @cached_property
+    def by_kind(self) -> Mapping[str, Sequence[str]]:
+        """The nodes of each class that they are said to be of, in the order of their IRIs."""
+        found: dict[str, list[str]] = defaultdict(list)
+        for iri, node in self.nodes.items():
+            for kind in node[TYPE]:
+                found[kind].append(iri)
+        return found
+
+    def of_kind(self, *kinds: str) -> list[str]:
+        """Return the nodes of some classes of the core."""
+        return [iri for kind in kinds for iri in self.by_kind.get(CORE + kind, ())]
 
 
-@dataclass(frozen=True)
-class Individuals:
-    """What is said of individuals, as IRIs.
-
-    `members` are individual, class and index; `facts` the triples of value properties and relations; `tuples` the facts that
-    are nodes of their own; `namesakes` what else ends like one of them, so that their names are those of the whole scene.
-    """
-
-    members: Sequence[tuple[str, str, int]]
-    facts: Sequence[tuple[str, str, str]]
-    tuples: Mapping[str, Node]
-    namesakes: Collection[str] = ()
-
-
-def read(graph: KnowledgeGraph) -> Reading:
+def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     """Read the planning problem out of a knowledge graph, with every individual that it has.
+
+    Parameters
+    ----------
+    graph : KnowledgeGraph
+    schema : Schema, optional
+        If it was read already.
 
     Raises
     ------
@@ -147,7 +165,8 @@ def read(graph: KnowledgeGraph) -> Reading:
     members = [(text(who), text(kind), _number(index)) for who, kind, index in graph.select(MEMBERS, SCENE)]
     facts = [_triple(row) for row in graph.select(FACTS, SCENE)]
     tuples = _nodes(_triple(row) for row in graph.select(TUPLES, SCENE))
-    return reading_of(graph.scene, read_schema(graph), Individuals(members, facts, tuples))
+    schema = read_schema(graph) if schema is None else schema
+    return reading_of(graph.scene, frame(schema, members), facts, tuples)
 
 
 def read_schema(graph: KnowledgeGraph) -> Schema:
@@ -157,13 +176,14 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         parts[text(row[0])].append(_triple(row[1:]))
     return Schema(
         nodes=_nodes(parts["node"]),
-        supers=_superclasses((sub, sup) for sub, _, sup in parts["class"]),
-        owners=[(kind, situation) for kind, _, situation in parts["owner"]],
+        supers=_superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
+        owners=sorted((kind, situation) for kind, _, situation in parts["owner"]),
         pairs=frozenset(situation for situation, _, _ in parts["pair"]),
         from_levels={value: int(level) for value, _, level in parts["level"]},
         facts=_nodes(parts["fact"]),
         tuples=bool(parts["tuples"]),
         expressions=_nodes(parts["expression"]),
+        ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
     )
 
 
@@ -174,50 +194,82 @@ class Frame:
     `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values.
     """
 
-    schema: _Schema
+    schema: Schema
+    parts: _Schema
     domain: Domain
     classes: dict[str, tuple[str, ...]]
     parents: dict[str, tuple[str, ...]]
     properties: dict[str, tuple[str, bool]]
 
+    @property
+    def names(self) -> Names:
+        """Short names of the schema's terms and of the individuals."""
+        return self.parts.names
 
-def frame(schema: Schema, members: Sequence[tuple[str, str, int]], namesakes: Collection[str] = ()) -> Frame:
-    """Return the behaviours and situation types as values, and the classes of some individuals."""
+
+def frame(
+    schema: Schema,
+    members: Sequence[Member],
+    namesakes: Collection[str] = (),
+    earlier: Frame | None = None,
+) -> Frame:
+    """Return the behaviours and situation types as values, and the classes of some individuals.
+
+    `namesakes` are others that end like one of these, so that their names are those of the whole scene; `earlier` is the frame
+    of fewer individuals, whose behaviours hold as long as the new ones leave the names in them alone.
+    """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
-    terms = {iri for iri, node in nodes.items() if _is(node, "Parameter", "Variable")}
-    named = {iri for iri, node in nodes.items() if _is(node, "SituationType", "Behavior", "Relation", "ReachRelation")}
+    named = schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation")
+    typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
     names = Names(
-        named
-        | {iri for iri in namesakes if iri not in nodes}
-        | {i for i, _, _ in instances}
-        | {k for _, k, _ in instances}
-        | {s for pair in supers.items() for s in (pair[0], *pair[1])}
-        | {kind for node in nodes.values() for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())}
+        {
+            *named,
+            *(iri for iri in namesakes if iri not in nodes),
+            *chain.from_iterable((individual, kind) for individual, kind, _ in instances),
+            *chain.from_iterable((sub, *above) for sub, above in supers.items()),
+            *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
+        }
     )
     definitions = Definitions(schema.expressions, _value_properties(schema), names)
+    terms = set(schema.of_kind("Parameter", "Variable"))
     parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
     classes, parents = _classes(instances, supers, names)
-    situations, properties = _situations(parts, schema.owners, classes)
-    behaviors = sorted(_ordered(parts.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
+    situations, properties = _situations(parts, schema, classes)
+    if earlier is not None and earlier.names.agree(names):
+        behaviors = earlier.domain.behaviors
+    else:
+        ordered = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
+        behaviors = {names.short(iri): parts.behavior(iri) for iri in ordered}
     domain = Domain(
         situations={s.name: s for s in situations},
-        behaviors={names.short(iri): parts.behavior(iri) for iri in behaviors},
-        first_ids={parts.number(iri, "level"): parts.number(iri, "firstId", 0) for iri in parts.of_kind("Level")},
+        behaviors=behaviors,
+        first_ids={parts.number(iri, "level"): parts.number(iri, "firstId", 0) for iri in schema.of_kind("Level")},
     )
-    return Frame(parts, domain, classes, parents, properties)
+    return Frame(schema, parts, domain, classes, parents, properties)
 
 
-def reading_of(scene: str, schema: Schema, individuals: Individuals, whole: bool = True) -> Reading:
-    """Return the planning problem of some individuals."""
-    known = frame(schema, individuals.members, individuals.namesakes)
-    names = known.schema.names
-    tuples = {**individuals.tuples, **schema.facts}
-    relations, stated = _facts(individuals.facts, tuples, known.properties, known.domain, names)
+def reading_of(
+    scene: str, known: Frame, facts: Iterable[Triple], tuples: Mapping[str, Node], whole: bool = True
+) -> Reading:
+    """Return the planning problem of a frame's individuals.
+
+    Parameters
+    ----------
+    scene : str
+    known : Frame
+    facts : triples of IRIs
+        Of value properties and relations, between the individuals.
+    tuples : mapping of IRI to node
+        Facts that are nodes of their own.
+    whole : bool
+    """
+    schema, names = known.schema, known.names
+    relations, stated = _facts(facts, {**tuples, **schema.facts}, known.properties, known.domain, names)
     initial = _initial(known.domain, known.classes, stated, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
-    return Reading(_with_goal(problem, known.schema), names, whole)
+    return Reading(_with_goal(problem, known), names, schema, whole)
 
 
 def with_goals(reading: Reading, goals: Iterable[str]) -> Problem:
@@ -281,10 +333,15 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 
 
 def _nodes(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
+    """Return what is said of each subject: the subjects in order, and the values of each property."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for subject, predicate, value in triples:
         nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
-    return nodes
+    for node in nodes.values():
+        for values in node.values():
+            if len(values) > 1:
+                values.sort()
+    return dict(sorted(nodes.items()))
 
 
 def _triple(row: Row) -> tuple[str, str, str]:
@@ -297,7 +354,7 @@ def _number(term: Term) -> int:
 
 
 def _is(node: Node, *kinds: str) -> bool:
-    types = node["http://www.w3.org/1999/02/22-rdf-syntax-ns#type"]
+    types = node[TYPE]
     return any(CORE + kind in types for kind in kinds)
 
 
@@ -320,7 +377,7 @@ def _superclasses(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
 
 
 def _classes(
-    instances: Sequence[tuple[str, str, int]], supers: Mapping[str, Sequence[str]], names: Names
+    instances: Sequence[Member], supers: Mapping[str, Sequence[str]], names: Names
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
     """Return the individuals of each class in declared order, superclasses included, and each class's direct superclasses."""
     above: dict[str, frozenset[str]] = {}
@@ -336,15 +393,18 @@ def _classes(
             above[kind] = frozenset(found)
         return above[kind]
 
-    members: dict[str, dict[str, int]] = defaultdict(dict)
+    of: dict[str, set[str]] = defaultdict(set)
+    place: dict[str, int] = {}
     for individual, kind, index in instances:
-        for sup in closure(kind):
-            members[names.short(sup)][names.short(individual)] = index
-    for kind in {*supers, *(s for group in supers.values() for s in group)}:
-        members.setdefault(names.short(kind), {})
-    classes = {
-        kind: tuple(sorted(group, key=lambda name: (group[name], name))) for kind, group in sorted(members.items())
-    }
+        of[individual] |= closure(kind)
+        place[individual] = min(index, place.get(individual, index))
+    members: dict[str, list[str]] = {kind: [] for kind in {*supers, *chain.from_iterable(supers.values())}}
+    for _, name, kinds in sorted(
+        (place[individual], names.short(individual), kinds) for individual, kinds in of.items()
+    ):
+        for kind in kinds:
+            members.setdefault(kind, []).append(name)
+    classes = {name: tuple(members[kind]) for name, kind in sorted((names.short(kind), kind) for kind in members)}
     return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
 
 
@@ -360,9 +420,6 @@ class _Schema:
     terms: set[str]
     pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
     definitions: Definitions
-
-    def of_kind(self, kind: str) -> list[str]:
-        return [iri for iri, node in self.nodes.items() if _is(node, kind)]
 
     def values(self, iri: str, name: str) -> Sequence[str]:
         return self.nodes.get(iri, {}).get(CORE + name, ())
@@ -392,8 +449,7 @@ class _Schema:
         return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
 
     def arguments(self, iri: str) -> tuple[str, ...]:
-        names = ("about", *(f"argument{position}" for position in range(2, 10)))
-        return tuple(self.term(value) for name in names for value in self.values(iri, name)[:1])
+        return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
 
     def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
         """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
@@ -484,8 +540,8 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
     """Return the situation type of each value property, and whether it is functional."""
     return {
         prop: (iri, iri not in schema.pairs)
-        for iri, node in schema.nodes.items()
-        for prop in node.get(CORE + "valueProperty", ())
+        for iri in schema.of_kind("SituationType")
+        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
     }
 
 
@@ -494,13 +550,13 @@ def _is_part(node: Node) -> bool:
 
 
 def _situations(
-    schema: _Schema, owners: Sequence[tuple[str, str]], classes: dict[str, tuple[str, ...]]
+    schema: _Schema, read: Schema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
     """Return the situation types by name, and for each value property its situation type and whether it is boolean."""
     found, properties = [], {}
-    for iri in sorted(schema.of_kind("SituationType"), key=schema.names.short):
+    for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)
-        owning = [schema.names.short(kind) for kind, situation in owners if situation == iri]
+        owning = [schema.names.short(kind) for kind, situation in read.owners if situation == iri]
         parameters = [
             schema.parameter(p) for p in _ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)
         ]
@@ -584,13 +640,14 @@ def _initial(
                 what = f"several values ({', '.join(values)})" if values else "no value"
                 raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
             initial[symbol] = values[0]
-    initial |= {s: v for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE}
+    true = [s for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE]
+    initial |= dict.fromkeys(sorted(true), TRUE)
     return initial
 
 
-def _with_goal(problem: Problem, schema: _Schema) -> Problem:
-    goal: dict[Symbol, str] = {}
-    for task in schema.of_kind("Task"):
+def _with_goal(problem: Problem, known: Frame) -> Problem:
+    schema, goal = known.parts, dict[Symbol, str]()
+    for task in known.schema.of_kind("Task"):
         for iri in schema.values(task, "goal"):
             wanted = schema.condition(iri)
             if not isinstance(wanted, ValueCondition):

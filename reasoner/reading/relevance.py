@@ -14,21 +14,24 @@ docs/quantification.md, the test in tests/reasoner/test_recognition.py). Two ste
 
 from __future__ import annotations
 
+import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import CORE, PREFIXES, SCENE, KnowledgeGraph, text
+from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from reasoner.names import local_name
 from reasoner.reading.problem import (
     FIRST_INDEX_OF_NONE,
     Frame,
-    Individuals,
+    Member,
     Node,
     Reading,
     Schema,
+    Triple,
     frame,
     read_schema,
     reading_of,
@@ -42,15 +45,15 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
 ROUNDS = 6
 """Queries that follow routes one step each; what lies farther is closed by a property path, of which the last is one."""
-TYPE = PREFIXES["rdf"] + "type"
-ARGUMENTS = (CORE + "about", *(f"{CORE}argument{position}" for position in range(2, 10)), CORE + "value")
+PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
 """What leads from a fact that is a node of its own to the individuals in it."""
+NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
+FACT = CORE + "SituatedObjectInstance"
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps that reach a term is taken
-
-Triple = tuple[str, str, str]
 
 
 @dataclass
@@ -94,28 +97,38 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     """
     schema = read_schema(graph)
     constants = _constants(schema)
-    seeds = _goal_individuals(schema) | _named(graph, goals)
+    seeds = _goal_individuals(schema) | _named(graph, schema, goals)
     search = _Search(graph, schema)
-    search.visit(seeds | constants, Routes())
-    bounds = routes(frame(schema, search.members()), schema, [goal.split()[1] for goal in goals if " " in goal.strip()])
-    search.close(seeds | constants, constants, bounds)
-    read = search.individuals(bounds)
-    return reading_of(graph.scene, schema, replace(read, namesakes=_namesakes(graph, read.members)), whole=False)
+    fresh = search.visit(seeds | constants)
+    lifted = frame(schema, [member for member in search.members() if member[0] in constants])
+    bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])
+    search.close(fresh, constants, bounds)
+    members = search.members()
+    known = frame(schema, members, _namesakes(graph, schema, members), lifted)
+    return reading_of(graph.scene, known, search.facts(known), search.tuples(), whole=False)
 
 
 # ------------------------------------------------------------------------------------------------- 1. what leads to what
 
 
-def routes(known: Frame, schema: Schema, more_situations: Iterable[str] = ()) -> Routes:
+def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """Return how to reach, from what the goal names, everything that a behaviour on it can involve.
 
     A behaviour counts if it changes a situation type that counts; then so do those in its conditions and its other effects.
     `looked_up` are the situation types that are followed backward, each with the constants from which it is: a behaviour
     that gives somebody such a value counts from that value on, too.
+
+    Parameters
+    ----------
+    known : Frame
+        Of the constants alone.
+    more_situations : iterable of str
+        Situation types that count besides those of the task's goals.
     """
     found = Routes(forward=set(known.properties))
-    counting = {known.schema.names.short(s) for s in _goal_situations(schema)} | set(more_situations)
+    counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: dict[str, set[str]] = {}
+    spanned = set[tuple[str, int, bool]]()
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
         for behavior in known.domain.behaviors.values():
@@ -123,21 +136,24 @@ def routes(known: Frame, schema: Schema, more_situations: Iterable[str] = ()) ->
                 continue
             counting |= {effect.situation for effect in behavior.effects}
             kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
-            for effect in behavior.effects:
-                starts = [set(effect.arguments)]
+            for number, effect in enumerate(behavior.effects):
+                starts = {False: set(effect.arguments)}
                 if effect.situation in looked_up and (
                     effect.value.startswith("?") or effect.value in looked_up[effect.situation]
                 ):
-                    starts.append({effect.value})
+                    starts[True] = {effect.value}
                 scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
                 counting |= {c.situation for s in scopes for c in s.conditions if isinstance(c, ValueCondition)}
                 own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, effect.value}
                 own &= kinds.keys()
-                for start in starts:
+                for from_value, start in starts.items():
+                    if (behavior.name, number, from_value) in spanned:
+                        continue
+                    spanned.add((behavior.name, number, from_value))
                     # What must not hold, or need not, leads to nothing that the behaviour itself is done with.
-                    _span(scopes[0], start, own, known, schema, found, looked_up)
+                    _span(scopes[0], start, own, known, found, looked_up)
                     for scope in scopes[1:]:
-                        _span(scope, start | own, set(), known, schema, found, looked_up)
+                        _span(scope, start | own, set(), known, found, looked_up)
     return found
 
 
@@ -178,12 +194,11 @@ def _span(
     start: set[str],
     more: set[str],
     known: Frame,
-    schema: Schema,
     found: Routes,
     looked_up: dict[str, set[str]],
 ) -> None:
     """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
-    steps = [step for condition in scope.conditions for step in _steps(condition, scope, known, schema)]
+    steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = {t for c in scope.conditions for t in _terms(c)} | more
     waiting = (in_use | {t for t in start if t.startswith("?")}) - start
     reached = set(start) | {t for t in in_use if not t.startswith("?")}
@@ -192,14 +207,14 @@ def _span(
         usable = [step for step in steps if step.source in reached and step.target in waiting]
         if not usable:
             lost = min(waiting)
-            found.classes.add(known.schema.names.iri(scope.kinds[lost]))
+            found.classes.add(known.names.iri(scope.kinds[lost]))
             waiting.remove(lost)
             reached.add(lost)
             continue
         step = min(usable, key=lambda s: (s.cost, s.source, s.target))
         found.forward |= step.forward
         for name in step.backward:
-            found.backward.setdefault(name, set()).update(known.schema.names.iri(c) for c in step.constants)
+            found.backward.setdefault(name, set()).update(known.names.iri(c) for c in step.constants)
         if step.looks_up:
             looked_up.setdefault(step.looks_up, set()).update(step.constants)
         waiting.remove(step.target)
@@ -219,9 +234,9 @@ class _Step:
     looks_up: str | None = None
 
 
-def _steps(condition: Condition, scope: _Scope, known: Frame, schema: Schema) -> Iterator[_Step]:
+def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
     """Yield the steps that a positive condition allows."""
-    names = known.schema.names
+    names, schema = known.names, known.schema
     if isinstance(condition, RelationCondition) and not condition.negated:
         iri = names.iri(condition.relation)
         terms = condition.arguments
@@ -232,11 +247,11 @@ def _steps(condition: Condition, scope: _Scope, known: Frame, schema: Schema) ->
     elif isinstance(condition, ValueCondition) and not condition.negated and condition.value != FALSE:
         situation = known.domain.situations[condition.situation]
         terms = condition.arguments if condition.value == TRUE else (*condition.arguments, condition.value)
-        if len(terms) != 2 or condition.situation not in {name for name, _ in known.properties.values()}:
+        properties = frozenset(p for p, (name, _) in known.properties.items() if name == condition.situation)
+        if len(terms) != 2 or not properties:
             yield from _steps_by_nodes(terms, True, schema, condition.situation)
             return
         subject, value = terms
-        properties = frozenset(p for p, (name, _) in known.properties.items() if name == condition.situation)
         yield _Step(subject, value, FREE)
         kind = scope.kinds.get(value)
         constants = frozenset({value}) if kind is None else frozenset(known.classes.get(kind, ()))
@@ -259,7 +274,7 @@ def _steps_by_nodes(terms: Sequence[str], only: bool, schema: Schema, situation:
                     source,
                     target,
                     RELATION if first else BACKWARD,
-                    backward=frozenset() if first else frozenset(ARGUMENTS[1:]),
+                    backward=frozenset() if first else frozenset(PLACES[1:]),
                     looks_up=None if first else situation,
                 )
 
@@ -278,21 +293,29 @@ def _terms(condition: Condition) -> set[str]:
 
 
 class _Search:
-    """What was read of the individuals so far."""
+    """What was read of the individuals so far.
+
+    Attributes
+    ----------
+    said : mapping of individual to property to values
+        All that is said of those in `seen`, and what was found backward of others.
+    seen : set of individuals
+    """
 
     def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
         self.graph, self.schema = graph, schema
-        self.triples: dict[Triple, None] = {}
+        self.said: defaultdict[str, defaultdict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self.seen: set[str] = set()
 
-    def visit(self, individuals: set[str], bounds: Routes, back: Mapping[str, set[str]] | None = None) -> list[Triple]:
-        """Read what is said of some individuals, and by whom they are named over the properties in `back`."""
-        values = _values(individuals)
-        parts = [f"{{ VALUES ?s {{ {values} }} ?s ?p ?o }}"] if individuals else []
+    def visit(
+        self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
+    ) -> list[Triple]:
+        """Read what is said of some individuals and of those of some classes, and by whom others are named backward."""
+        parts = [f"{{ VALUES ?s {{ {_values(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, whom in (back or {}).items():
             if not whom:
                 continue
-            if name in ARGUMENTS:
+            if name in PLACES:
                 parts.append(
                     f"{{ VALUES ?x {{ {_values(whom)} }} ?s <{name}> ?x ; ?p ?o . ?s a :SituatedObjectInstance }}"
                 )
@@ -300,22 +323,25 @@ class _Search:
                 parts.append(
                     f"{{ SELECT ?s (<{name}> AS ?p) ?o WHERE {{ VALUES ?o {{ {_values(whom)} }} ?s <{name}> ?o }} }}"
                 )
-        for kind in sorted(bounds.classes):
+        for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
-        rows = self._ask("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }\nORDER BY ?s ?p ?o")
-        self.seen |= individuals
+        rows = []
+        for s, p, o in self.graph.select("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
+            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode):
+                row = (s.value, text(p), text(o))
+                rows.append(row)
+                self.said[row[0]][row[1]].add(row[2])
+        kinds = self._below(classes)
+        self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
         return rows
 
-    def close(self, seeds: set[str], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes from the seeds until nothing new comes, by rounds and then by one property path."""
-        fresh = list(self.triples)
-        reached, asked = set(seeds), set[str]()
+    def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
+        """Follow the routes from what was read first until nothing new comes, by rounds and then by one property path."""
+        reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):
             self._follow(fresh, bounds, reached)
             new = reached - asked
-            if not new and not classes:
-                return
             back = {name: {x for x in new if x not in constants or x in own} for name, own in bounds.backward.items()}
             if self.schema.tuples:
                 back.setdefault(CORE + "about", new)
@@ -323,7 +349,7 @@ class _Search:
             asked |= new
             if not unread and not classes and not any(back.values()):
                 return
-            fresh = self.visit(unread, Routes(classes=classes), back)
+            fresh = self.visit(unread, back, classes)
             classes = set()
         self._follow(fresh, bounds, reached)
         if reached - asked:
@@ -331,24 +357,25 @@ class _Search:
 
     def _follow(self, triples: Iterable[Triple], bounds: Routes, reached: set[str]) -> None:
         """Add to `reached` where some triples lead."""
+        kinds = self._below(bounds.classes)
         facts = set[str]()
+        backward = bounds.backward.keys() - {*PLACES}
+        nodes, forward = self.schema.nodes, bounds.forward
         for s, p, o in triples:
-            if s in self.schema.nodes:
+            if s in nodes:
                 continue
-            if p in bounds.forward:
-                reached |= {s, o}
-            elif p in bounds.backward and p not in ARGUMENTS:
+            if p in forward:
                 reached.add(s)
-            elif p == TYPE and o == CORE + "SituatedObjectInstance":
-                facts.add(s)
-            elif p == TYPE and o in bounds.classes | self._below(bounds.classes):
-                reached.add(s)
-        for s, p, o in triples:
-            if s in facts and p in ARGUMENTS:
                 reached.add(o)
+            elif p in backward or (p == TYPE and o in kinds):
+                reached.add(s)
+            elif p == TYPE and o == FACT:
+                facts.add(s)
+        for s in facts:
+            reached.update(o for p in PLACES for o in self.said[s].get(p, ()))
 
-    def _below(self, classes: set[str]) -> set[str]:
-        """Return the subclasses of some classes."""
+    def _below(self, classes: Iterable[str]) -> set[str]:
+        """Return some classes with their subclasses."""
         found, before = set(classes), -1
         while before != (before := len(found)):
             found |= {sub for sub, above in self.schema.supers.items() if found & set(above)}
@@ -356,83 +383,88 @@ class _Search:
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
         """Read everything that the routes reach from a frontier; a path can't tell constants, so it may be more."""
-        ways = [f"<{p}>" for p in sorted(bounds.forward)] + [
-            f"^<{p}>" for p in sorted({*bounds.backward} - {*ARGUMENTS})
-        ]
+        ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
-            node = "|".join(f"<{p}>" for p in ARGUMENTS)
+            node = "|".join(f"<{p}>" for p in PLACES)
             ways.append(f"(^({node})/({node}))")
         rows = self.graph.select(
             f"SELECT DISTINCT ?x WHERE {{ VALUES ?seed {{ {_values(frontier)} }} ?seed ({'|'.join(ways)})* ?x "
-            "FILTER(isIRI(?x)) } ORDER BY ?x",
+            "FILTER(isIRI(?x)) }",
             SCENE,
         )
-        far = {text(x) for (x,) in rows} - set(self.schema.nodes)
-        self.visit(far - self.seen, Routes(), {CORE + "about": far} if self.schema.tuples else None)
+        far = {text(x) for (x,) in rows} - self.schema.nodes.keys()
+        self.visit(far - self.seen, {CORE + "about": far} if self.schema.tuples else None)
 
-    def _ask(self, query: str) -> list[Triple]:
-        rows = []
-        for s, p, o in self.graph.select(query, SCENE):
-            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode):
-                rows.append((s.value, text(p), text(o)))
-        self.triples.update(dict.fromkeys(rows))
-        return rows
+    def members(self) -> list[Member]:
+        """Return what was read as individuals of classes."""
+        found = []
+        for s in self.seen:
+            said: Mapping[str, set[str]] = self.said.get(s, {})
+            if INDIVIDUAL in said.get(TYPE, ()):
+                index = min(map(int, said.get(CORE + "index", ())), default=FIRST_INDEX_OF_NONE)
+                found += [(s, o, index) for o in said[TYPE] if not o.startswith(OWL)]
+        return found
 
-    def members(self) -> list[tuple[str, str, int]]:
-        """Return individual, class and index of what was read."""
-        named = {s for s, p, o in self.triples if p == TYPE and o == PREFIXES["owl"] + "NamedIndividual"}
-        indices = {s: int(o) for s, p, o in self.triples if p == CORE + "index"}
-        return [
-            (s, o, indices.get(s, FIRST_INDEX_OF_NONE))
-            for s, p, o in self.triples
-            if p == TYPE and s in named and s in self.seen and not o.startswith(PREFIXES["owl"])
-        ]
+    def facts(self, known: Frame) -> Iterator[Triple]:
+        """Yield the values and relations that were read, between individuals whose own triples were read."""
+        wanted = known.properties.keys() | self.schema.nodes.keys()
+        for s in self.seen:
+            for p, values in self.said.get(s, {}).items():
+                if p in wanted:
+                    yield from ((s, p, o) for o in values if o in self.seen)
 
-    def individuals(self, bounds: Routes) -> Individuals:
-        """Return what was read, for those individuals only whose own triples were read."""
-        nodes: dict[str, dict[str, list[str]]] = {}
-        for s, p, o in self.triples:
-            if s not in self.schema.nodes:
-                nodes.setdefault(s, {}).setdefault(p, []).append(o)
-        facts: dict[str, Node] = {
-            s: node
-            for s, node in nodes.items()
-            if CORE + "SituatedObjectInstance" in node.get(TYPE, ())
-            and all(o in self.seen for p in ARGUMENTS for o in node.get(p, ()) if o not in self.schema.nodes)
+    def tuples(self) -> dict[str, Node]:
+        """Return the facts that are nodes of their own, as far as all individuals in them were read."""
+        if not self.schema.tuples:
+            return {}
+        nodes = self.schema.nodes
+        return {
+            s: {p: sorted(values) for p, values in said.items()}
+            for s, said in sorted(self.said.items())
+            if s not in nodes
+            and FACT in said.get(TYPE, ())
+            and all(o in self.seen for p in PLACES for o in said.get(p, ()) if o not in nodes)
         }
-        relations = {iri for iri, node in self.schema.nodes.items() if CORE + "valueProperty" not in node}
-        wanted = bounds.forward | relations
-        triples = [(s, p, o) for s, p, o in self.triples if p in wanted and s in self.seen and o in self.seen]
-        return Individuals(self.members(), sorted(triples), facts)
 
 
-def _namesakes(graph: KnowledgeGraph, members: Sequence[tuple[str, str, int]]) -> set[str]:
-    """Return what ends like an individual or class of a part of the scene, in the namespace of any of its ontologies."""
-    terms = {iri for individual, kind, _ in members for iri in (individual, kind)}
+def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
+    """Return what ends like an individual or class of a part of the scene, in the namespace of any of its ontologies.
+
+    Each IRI that it can be is looked up by itself: no row is read of anything else.
+    """
+    terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
-    spaces = {iri.removesuffix(local_name(iri)) for iri in terms}
-    query = f"""
-      SELECT DISTINCT ?x WHERE {{
-        VALUES ?ending {{ {" ".join(str(ox.Literal(ending)) for ending in sorted(endings))} }}
-        {{ ?ontology a owl:Ontology . VALUES ?mark {{ "#" "/" }} BIND(CONCAT(STR(?ontology), ?mark) AS ?space) }}
-        UNION {{ VALUES ?space {{ {" ".join(str(ox.Literal(space)) for space in sorted(spaces))} }} }}
-        BIND(IRI(CONCAT(?space, ?ending)) AS ?x)
-        FILTER(EXISTS {{ ?x a owl:NamedIndividual }} || EXISTS {{ ?member a ?x, owl:NamedIndividual }})
-      }} ORDER BY ?x"""
-    return {text(x) for (x,) in graph.select(query, SCENE)} if endings else set()
+    candidates = {space + ending for space in _spaces(schema, terms) for ending in endings} - terms
+    if not candidates:
+        return set()
+    rows = graph.select(
+        f"SELECT ?x WHERE {{ VALUES ?x {{ {_values(candidates)} }} "
+        "FILTER(EXISTS { ?x a owl:NamedIndividual } || EXISTS { ?member a ?x }) }",
+        SCENE,
+    )
+    return {text(x) for (x,) in rows}
+
+
+def _spaces(schema: Schema, terms: Iterable[str]) -> set[str]:
+    """Return the namespaces of some terms, and those of the ontologies in which none of them is."""
+    found = {iri.removesuffix(local_name(iri)) for iri in terms if ":" in iri}
+    for ontology in schema.ontologies:
+        both = {ontology.rstrip("#/") + mark for mark in "#/"}
+        found |= set() if both & found else both
+    return found
 
 
 def _values(iris: Iterable[str]) -> str:
-    """Return IRIs as they stand in a VALUES clause; what isn't an IRI is refused by `NamedNode`."""
-    return " ".join(str(ox.NamedNode(iri)) for iri in sorted(iris))
+    """Return IRIs as they stand in a VALUES clause; what people wrote and is no IRI is left out."""
+    return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
 
 
 def _constants(schema: Schema) -> set[str]:
     """Return what the schema names: in conditions, effects and definitions of classes, and as rest and default values."""
     goals = _goal_conditions(schema)
-    names = (*ARGUMENTS, CORE + "restValue", CORE + "defaultValue")
+    names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
     found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
-    named = (PREFIXES["owl"] + "hasValue", PREFIXES["rdf"] + "first")
+    named = (OWL + "hasValue", RDF + "first")
     found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}
     return (found - set(schema.nodes)) | {CORE + "true", CORE + "false"}
 
@@ -449,18 +481,31 @@ def _goal_individuals(schema: Schema) -> set[str]:
     """Return what the goals and the facts about nobody name."""
     goals = [schema.nodes.get(iri, {}) for iri in _goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
-    return {v for node in nodes for name in ARGUMENTS for v in node.get(name, ()) if v not in schema.nodes}
+    return {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}
 
 
-def _named(graph: KnowledgeGraph, goals: Sequence[str]) -> set[str]:
-    """Return the individuals that the words of goals can mean, by their short names."""
+def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:
+    """Return the individuals that the words of goals can mean, by their short names.
+
+    They are looked up in the namespaces that are known; if one isn't found there, among all individuals.
+    """
     words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split()}
     if not words:
         return set()
+    spaces = _spaces(schema, chain(schema.nodes, schema.supers, _goal_individuals(schema))) | {*graph.prefixes.values()}
     rows = graph.select(
-        "SELECT DISTINCT ?x WHERE { ?x a owl:NamedIndividual . "
-        f"VALUES ?word {{ {' '.join(str(ox.Literal(word)) for word in sorted(words))} }} "
-        'FILTER(STRENDS(STR(?x), ?word)) FILTER(REPLACE(STR(?x), "^.*[#/:]", "") = ?word) } ORDER BY ?x',
+        f"SELECT ?x WHERE {{ VALUES ?x {{ {_values(space + word for space in spaces for word in words)} }} "
+        "FILTER EXISTS { ?x a owl:NamedIndividual } }",
         SCENE,
     )
-    return {text(x) for (x,) in rows}
+    found = {text(x) for (x,) in rows}
+    terms = {local_name(iri) for iri in (*found, *schema.nodes, *schema.supers)} | {TRUE, FALSE}
+    if lost := words - terms:
+        rows = graph.select(
+            "SELECT DISTINCT ?x WHERE { ?x a owl:NamedIndividual . "
+            f"VALUES ?word {{ {' '.join(str(ox.Literal(word)) for word in sorted(lost))} }} "
+            'FILTER(STRENDS(STR(?x), ?word)) FILTER(REPLACE(STR(?x), "^.*[#/:]", "") = ?word) }',
+            SCENE,
+        )
+        found |= {text(x) for (x,) in rows}
+    return found

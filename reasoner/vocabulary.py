@@ -1,0 +1,24 @@
+"""The words of the ontology that Python knows: namespaces, and the terms that several modules name."""
+
+from __future__ import annotations
+
+CORE = "https://w3id.org/confab/core#"
+EMBODIMENT = "https://w3id.org/confab/embodiment#"
+EPISODES = "https://w3id.org/confab/episodes#"
+MEMORY = "https://w3id.org/confab/memory#"
+OWL = "http://www.w3.org/2002/07/owl#"
+PROV = "http://www.w3.org/ns/prov#"
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+SHACL = "http://www.w3.org/ns/shacl#"
+SKOS = "http://www.w3.org/2004/02/skos/core#"
+XSD = "http://www.w3.org/2001/XMLSchema#"
+PREFIXES = {"": CORE, "owl": OWL, "rdf": RDF, "rdfs": RDFS, "skos": SKOS, "xsd": XSD}
+"""What every query may use."""
+
+TYPE = RDF + "type"
+INDIVIDUAL = OWL + "NamedIndividual"
+ONTOLOGY = OWL + "Ontology"
+LABEL = RDFS + "label"
+ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
+"""The properties by which conditions, effects and facts name their arguments, in order; the value comes behind them."""
