@@ -1,8 +1,8 @@
 """What can be reached, counted by a program that shares no code with the planner: the truth that random tables are held against.
 
-It reads behaviours by way of the validator's interpreter alone (`planner.validation.successor`), and asks that one only once for
-every combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which
-arrays of states descend.
+It reads behaviours by way of the checker's interpreter alone (`planner.validation.Rules`), and asks that one only once for every
+combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which arrays
+of states descend.
 
 code    a state as one integer, a field of bits per symbol
 tree    dictionary from a value of the symbol that was looked at to a tree; a leaf is what is assigned, or None (not applicable)
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.validation import successor
+from planner.validation import Facts, Rules
 from reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
 
 Codes = NDArray[np.uint64]
@@ -38,19 +38,25 @@ class Truth:
     shortest: int | None
 
 
-class Asked(dict[Symbol, str]):
-    """A state that notes what is looked at. What its copies hold is `None`, so that every assignment to a copy shows."""
+class Asked(Facts):
+    """A state that notes what is looked at."""
 
-    def __init__(self, values: dict[Symbol, str]) -> None:
-        super().__init__(dict.fromkeys(values))  # type: ignore[arg-type]
-        self.values_, self.looked = values, dict[Symbol, str]()
+    def __init__(self, problem: Problem, values: dict[Symbol, str]) -> None:
+        super().__init__(problem, values)
+        self.values, self.looked = values, dict[Symbol, str]()
 
-    def get(self, symbol: Symbol, default: Any = None) -> Any:
+    def value(self, situation: str, arguments: tuple[str, ...]) -> str | None:
         """Return a symbol's value, and note it."""
-        if symbol not in self.values_:
-            return default
-        self.looked.setdefault(symbol, self.values_[symbol])
-        return self.values_[symbol]
+        symbol = Symbol(situation, arguments)
+        if symbol in self.values:
+            self.looked.setdefault(symbol, self.values[symbol])
+        return super().value(situation, arguments)
+
+    def holders(self, situation: str, value: str) -> Iterator[tuple[str, ...]]:
+        """Yield the arguments of the symbols with a value, each noted when it is looked at."""
+        for symbol in self.values:
+            if symbol.situation == situation and self.value(situation, symbol.arguments) == value:
+                yield symbol.arguments
 
 
 @dataclass
@@ -98,6 +104,7 @@ class World:
             for ordered in [replace(behavior, preconditions=tuple(sorted(behavior.preconditions, key=_breadth)))]
             for arguments in product(*(problem.classes.get(p.kind, ()) for p in behavior.parameters))
         ]
+        self.rules = Rules(problem)
         self.trees: list[Any] = [UNSEEN] * len(self.steps)
 
     def field(self, codes: Codes, symbol: int) -> NDArray[np.int64]:
@@ -167,17 +174,15 @@ class World:
     def grown(self, number: int, tree: Any, code: np.uint64) -> Any:
         """Ask the interpreter about one state, and return the tree with its answer."""
         ranks = [(int(code) >> shift) & mask for shift, mask in self.places]
-        asked = Asked({s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
-        behavior, arguments = self.steps[number]
-        after = successor(self.problem, behavior, arguments, asked)
+        asked = Asked(self.problem, {s: self.values[i][ranks[i]] for i, s in enumerate(self.symbols)} | self.fixed)
+        changes = self.rules.changes(*self.steps[number], asked)
         leaf = None
-        if after is not None:
+        if changes is not None:
             kept, given = 2**64 - 1, 0
-            for symbol, value in after.items():
-                if value is not None and symbol in self.number:
-                    i = self.number[symbol]
-                    kept &= ~(int(self.widths[i]) << int(self.shifts[i]))
-                    given |= self.ranks[i][value] << int(self.shifts[i])
+            for situation, arguments, value in changes:
+                i = self.number[Symbol(situation, arguments)]
+                mask = int(self.widths[i]) << int(self.shifts[i])
+                kept, given = kept & ~mask, given & ~mask | self.ranks[i][value] << int(self.shifts[i])
             leaf = np.uint64(kept), np.uint64(given)
         path = [self.number[symbol] for symbol in asked.looked if symbol in self.number]
         root: Any = leaf

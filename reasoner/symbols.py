@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
 from typing import TypeAlias
 
 TRUE = "true"
@@ -253,24 +255,56 @@ class Problem:
         members = self.classes.get(self.domain.situations[symbol.situation].range, ())
         return tuple(value for value in members if self.value_levels.get(value, 1) <= level)
 
+    def first_level(self, symbol: Symbol) -> int:
+        """Return the first level on which a symbol exists: its situation type, and the individuals that it is about."""
+        individuals = (self.value_levels.get(argument, 1) for argument in symbol.arguments)
+        return max(self.domain.situations[symbol.situation].level, *individuals)
+
+    def sees(self, level: int, symbol: Symbol, value: str) -> bool:
+        """Return whether a level knows both a symbol and the value that it has."""
+        return self.first_level(symbol) <= level and self.value_levels.get(value, 1) <= level
+
+    def goal_on(self, level: int) -> dict[Symbol, str]:
+        """Return the goal for plans of one level: with it, what the level knows and finds at rest is at rest in the end."""
+        rests = {s.name: s.rest for s in self.domain.situations.values() if s.rest is not None}
+        found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation) and self.first_level(s) <= level}
+        return {**found, **self.goal}
+
+    def members(self, kind: str) -> frozenset[str]:
+        """Return the individuals of a class as a set."""
+        return self._members.get(kind, frozenset())
+
+    @cached_property
+    def _members(self) -> Mapping[str, frozenset[str]]:
+        return {kind: frozenset(members) for kind, members in self.classes.items()}
+
     def id_of(self, behavior: str, arguments: tuple[str, ...]) -> int:
         """Return the ID of a quantified behaviour without enumerating the others.
 
         Behaviours count in declared order, then parameters in theirs, then individuals in theirs (PAPER.md section 4).
         """
-        level = self.domain.behaviors[behavior].level
-        number = self.domain.first_ids.get(level, 0)
-        for other in self.domain.at_level(level):
-            rank, size = 0, 1
-            for position, parameter in enumerate(other.parameters):
-                members = self.classes.get(parameter.kind, ())
-                size *= len(members)
-                if other.name == behavior:
-                    rank = rank * len(members) + members.index(arguments[position])
-            if other.name == behavior:
-                return number + rank
-            number += size
-        raise KeyError(behavior)
+        number, kinds = self._numbers[behavior]
+        rank = 0
+        for kind, argument in zip(kinds, arguments, strict=True):
+            ranks = self._ranks[kind]
+            rank = rank * len(ranks) + ranks[argument]
+        return number + rank
+
+    @cached_property
+    def _numbers(self) -> Mapping[str, tuple[int, tuple[str, ...]]]:
+        """For each behaviour its first ID, and the classes of its parameters."""
+        found = {}
+        for level in self.domain.levels:
+            number = self.domain.first_ids.get(level, 0)
+            for behavior in self.domain.at_level(level):
+                kinds = tuple(parameter.kind for parameter in behavior.parameters)
+                found[behavior.name] = number, kinds
+                number += prod(len(self.classes.get(kind, ())) for kind in kinds)
+        return found
+
+    @cached_property
+    def _ranks(self) -> Mapping[str, Mapping[str, int]]:
+        return {kind: {member: i for i, member in enumerate(members)} for kind, members in self.classes.items()}
 
 
 def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:

@@ -62,7 +62,7 @@ def plan_level(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        In place of the problem's own.
+        In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
     limits : Limits
         The time includes grounding.
     prefer : function of a task to a function of a state and its preferred operators, optional
@@ -76,6 +76,7 @@ def plan_level(
     began = perf_counter()
     deadline = None if limits.seconds is None else began + limits.seconds
     level = problem.domain.levels[-1] if level is None else level
+    goal = problem.goal_on(level) if goal is None else goal
     try:
         task = ground(problem, level, initial, goal, deadline=deadline)
     except (TooLargeError, OutOfTimeError) as error:

@@ -1,8 +1,10 @@
 """The hierarchical planner: search on the most abstract level, then refine each behaviour on the level below, down to primitives.
 
-The goal of a refinement is the complete state after the behaviour that is refined, with the rest values of the symbols that
-the lower level adds (hands empty; hands raised and upright). A behaviour that can't be refined where it stands is forbidden
-there, and the level above is searched again. When a level has no plan at all, the level below is given the goal itself.
+What a refinement has to reach is in docs/levels.md: what the refined behaviour says of all that its level sees, and what the lower
+level adds at rest if it was touched (hands empty; hands raised and upright). The next behaviour begins in the state in which
+that one's refinement ended. What came of a behaviour in a state is remembered; if it can't be refined there, or leaves the rest
+of the plan undoable, the level above is searched again with that known. When a level has no plan at all, the level below is
+given the goal itself.
 """
 
 from __future__ import annotations
@@ -10,24 +12,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import TypeAlias
 
-from planner.hierarchical.operators import Program
-from planner.hierarchical.state import Table, key_of
-from planner.hierarchical.subplans import Segments
-from planner.hierarchical.unsolvability import contested, unattainable
-from planner.paper.astar import Found, Goal, a_star
+from planner.paper.astar import Found, Goal, a_star, mismatches
 from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step
 from reasoner.memory.links import Links
 from reasoner.symbols import GroundBehavior, Problem
 
-Forbidden = set[tuple[Values, GroundBehavior]]
+SETTLED, UNSETTLED = "settled", "unsettled"
+"""Whether a symbol that wasn't at rest in the beginning is at rest or still untouched: see `Target`."""
+
+Refined: TypeAlias = "tuple[Step, Values] | None"
+"""A behaviour with its refinement and the state that it really leads to; None if it has no refinement."""
 
 
 @dataclass
 class Call:
-    """One planning call: the compiled problem, what guides it, and what it has counted."""
+    """One planning call: the compiled problem, what guides it, and what it has found out and counted."""
 
     model: Model
     grounds: Mapping[int, tuple[GroundBehavior, ...]]
@@ -36,7 +39,7 @@ class Call:
     limits: Limits
     deadline: float | None
     counts: dict[int, Counts] = field(default_factory=dict)
-    forbidden: Forbidden = field(default_factory=set)
+    known: dict[tuple[Values, GroundBehavior], Refined] = field(default_factory=dict)
     fallbacks: int = 0
     gave_up: bool = False
 
@@ -68,20 +71,13 @@ def plan(
     begin = perf_counter()
     levels = problem.domain.levels
     call = _call(problem, levels, links, constants, limits, grounds)
-    start, goal = call.model.values(problem.initial), _goal(call.model)
-    proof = impossible(problem)
     steps = None
-    for level in levels if proof is None else ():
-        steps = solve(call, level, start, goal)
+    for level in levels:
+        steps = task(call, level)
         if steps is not None or call.gave_up:
             break
         call.fallbacks += level != levels[-1]
-    seconds = perf_counter() - begin
-    if steps is not None:
-        tree = Plan(tuple(_numbered(steps)))
-        return Outcome(Status.SOLVED, tree, None, call.counts, call.fallbacks, seconds)
-    status = Status.GAVE_UP if call.gave_up else Status.UNSOLVABLE
-    return Outcome(status, None, proof or _reason(status, limits, levels), call.counts, call.fallbacks, seconds)
+    return _outcome(call, steps, perf_counter() - begin)
 
 
 def flat(
@@ -94,12 +90,7 @@ def flat(
     """Search one level alone with the same f, without the hierarchy: what the hierarchy is measured against."""
     begin = perf_counter()
     call = _call(problem, (level,), links, constants, limits, None)
-    steps = solve(call, level, call.model.values(problem.initial), _goal(call.model))
-    seconds = perf_counter() - begin
-    if steps is not None:
-        return Outcome(Status.SOLVED, Plan(tuple(_numbered(steps))), None, call.counts, 0, seconds)
-    status = Status.GAVE_UP if call.gave_up else Status.UNSOLVABLE
-    return Outcome(status, None, _reason(status, limits, (level,)), call.counts, 0, seconds)
+    return _outcome(call, task(call, level), perf_counter() - begin)
 
 
 def _call(
@@ -121,82 +112,121 @@ def _call(
     )
 
 
-def _goal(model: Model) -> Goal:
-    return {i: model.problem.goal[symbol] for i, symbol in enumerate(model.symbols) if symbol in model.problem.goal}
+def task(call: Call, level: int) -> list[Step] | None:
+    """Return steps of one level, refined down to primitives, to the goal; None if there are none that can all be refined."""
+    problem, start = call.model.problem, call.model.values(call.model.problem.initial)
+    goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
+    found = solve(call, level, start, target(call.model, 0, level, start, goal))
+    return None if found is None else found[0]
 
 
-def impossible(problem: Problem) -> Reason | None:
-    """Return a proof that there is no plan, if one is cheap (`planner.hierarchical.unsolvability`)."""
-    goal = {(symbol.situation, key_of(symbol.arguments)): value for symbol, value in problem.goal.items()}
-    segments = Segments(Program(problem), Table(problem.domain.situations, problem.initial), goal)
-    return unattainable(segments) or contested(segments)
+@dataclass(frozen=True)
+class Target:
+    """What steps of a level have to lead to.
+
+    `values` have to hold in the end. `restless` are symbols that weren't at rest in the beginning, with their rest values:
+    they may stay as they are, but once touched have to come to rest.
+    """
+
+    values: Goal
+    restless: Goal
+
+    def marks(self, before: Values, after: Values, marks: tuple[str, ...]) -> tuple[str, ...]:
+        """Return for each restless symbol whether it is settled after a step, from what it was before."""
+        return tuple(
+            SETTLED if after[i] == rest else mark if after[i] == before[i] else UNSETTLED
+            for (i, rest), mark in zip(self.restless.items(), marks, strict=True)
+        )
+
+    def reached(self, state: Values, marks: tuple[str, ...]) -> bool:
+        """Whether a state will do."""
+        return not mismatches(state, self.values) and UNSETTLED not in marks
 
 
-def solve(call: Call, level: int, start: Values, goal: Goal) -> list[Step] | None:
-    """Return steps of one level, refined down to primitives, or None if there are none that can all be refined.
+def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
+    """Return what steps of a level have to lead to: what is said above it, and rest in what the level adds."""
+    values, restless = dict(said), dict[int, str]()
+    for i, symbol in enumerate(model.symbols):
+        rest = model.problem.domain.situations[symbol.situation].rest
+        if rest is not None and i not in said and above < model.first_levels[i] <= level:
+            (values if before[i] == rest else restless)[i] = rest
+    return Target(values, restless)
 
-    Each pass either succeeds or forbids one behaviour in one state, of which there are finitely many.
+
+def solve(call: Call, level: int, start: Values, wanted: Target) -> tuple[list[Step], Values] | None:
+    """Return refined steps of one level with the state that they lead to, or None if there are none.
+
+    Each pass either succeeds or finds out what one behaviour comes to in one state, of which there are finitely many.
     """
     while True:
-        found = search(call, level, start, goal)
+        found = search(call, level, start, wanted)
         if found.status is not Status.SOLVED:
             call.gave_up |= found.status is Status.GAVE_UP
             return None
         steps: list[Step] = []
-        state = start
+        state, marks = start, (SETTLED,) * len(wanted.restless)
         for applied, rank in zip(found.path, found.ranks, strict=True):
-            step = refine(call, level, state, applied)
-            if step is None:
-                call.forbidden.add((state, applied.ground))
+            refined = refine(call, level, state, applied.ground)
+            if refined is None:
                 break
-            steps.append(replace(step, rank=rank))
-            state = applied.after
+            steps.append(replace(refined[0], rank=rank))
+            marks = wanted.marks(state, refined[1], marks)
+            state = refined[1]
         else:
-            return steps
+            if wanted.reached(state, marks):
+                return steps, state
         if call.gave_up:
             return None
 
 
-def refine(call: Call, level: int, state: Values, applied: Applied) -> Step | None:
-    """Return a behaviour as a step with its refinement below it, or None if the level below can't do it from this state."""
-    below = [other for other in call.grounds if other > level]
-    steps: list[Step] | None = []
-    if below:
-        steps = solve(call, below[0], state, refinement_goal(call.model, level, below[0], applied.after))
-    if steps is None:
+def refine(call: Call, level: int, state: Values, ground: GroundBehavior) -> Refined:
+    """Return a behaviour as a step with its refinement below it, and where that leads; None if it can't be done in this state."""
+    if (state, ground) in call.known:
+        return call.known[state, ground]
+    applied = call.model.apply(ground, state)
+    if applied is None:
         return None
-    g = applied.ground
-    return Step((), g.id, level, g.behavior, g.arguments, applied.bindings, None, tuple(steps))
+    step = Step((), ground.id, level, ground.behavior, ground.arguments, applied.bindings)
+    below = next((other for other in call.grounds if other > level), None)
+    if below is None:
+        return step, applied.after
+    model, problem = call.model, call.model.problem
+    said = {
+        i: value
+        for i, value in enumerate(applied.after)
+        if value != state[i] or problem.sees(level, model.symbols[i], value)
+    }
+    found = solve(call, below, state, target(model, level, below, state, said))
+    call.known[state, ground] = None if found is None else (replace(step, steps=tuple(found[0])), found[1])
+    return call.known[state, ground]
 
 
-def refinement_goal(model: Model, level: int, below: int, after: Values) -> Goal:
-    """Return the complete state after a behaviour, as its level knows it, and rest in what the level below adds."""
-    goal = {}
-    for i, symbol in enumerate(model.symbols):
-        situation = model.problem.domain.situations[symbol.situation]
-        if situation.level <= level:
-            goal[i] = after[i]
-        elif situation.level <= below and situation.rest is not None:
-            goal[i] = situation.rest
-    return goal
+def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
+    """Search one level with eq. (5), over the behaviours that can be refined as far as that is known.
 
-
-def search(call: Call, level: int, start: Values, goal: Goal) -> Found:
-    """Search one level with eq. (5), over the behaviours that aren't forbidden where they would be done."""
-    grounds = call.grounds[level]
+    The states searched are those of the model with the marks of the target behind.
+    """
+    grounds, size = call.grounds[level], len(start)
     behaviors = call.model.problem.domain.behaviors
+    rank = ranker(call, level)
 
     def successors(state: Values) -> Iterable[Applied]:
-        for applied in call.model.successors(grounds, state):
-            if (state, applied.ground) not in call.forbidden:
-                yield applied
+        base, marks = state[:size], state[size:]
+        for applied in call.model.successors(grounds, base):
+            after = applied.after
+            if (base, applied.ground) in call.known:
+                refined = call.known[base, applied.ground]
+                if refined is None:
+                    continue
+                after = refined[1]
+            yield Applied(applied.ground, applied.bindings, after + wanted.marks(base, after, marks))
 
     found = a_star(
-        start=start,
-        goal=goal,
+        start=start + (SETTLED,) * len(wanted.restless),
+        goal={**wanted.values, **{size + j: SETTLED for j in range(len(wanted.restless))}},
         successors=successors,
         cost=lambda applied: behaviors[applied.ground.behavior].cost,
-        rank=ranker(call, level),
+        rank=lambda state: rank(state[:size]),
         bonus=call.constants.bonus,
         limits=call.limits,
         deadline=call.deadline,
@@ -232,8 +262,15 @@ def _numbered(steps: Iterable[Step], above: tuple[int, ...] = ()) -> Iterable[St
         yield replace(step, path=path, steps=tuple(_numbered(step.steps, path)))
 
 
-def _reason(status: Status, limits: Limits, levels: tuple[int, ...]) -> Reason:
-    if status is Status.GAVE_UP:
-        limit = f"{limits.expansions} expansions in one search"
-        return Reason(f"stopped at the limit of {limit}" + (f" or {limits.seconds} s" if limits.seconds else ""))
-    return Reason(f"no state with the goal's facts can be reached; all states of level {levels[-1]} were tried")
+def _outcome(call: Call, steps: list[Step] | None, seconds: float) -> Outcome:
+    if steps is not None:
+        return Outcome(Status.SOLVED, Plan(tuple(_numbered(steps))), None, call.counts, call.fallbacks, seconds)
+    limits, levels = call.limits, tuple(call.grounds)
+    if call.gave_up:
+        seconds_too = f" or {limits.seconds} s" if limits.seconds else ""
+        reason = Reason(f"stopped at the limit of {limits.expansions} expansions in one search{seconds_too}")
+        return Outcome(Status.GAVE_UP, None, reason, call.counts, call.fallbacks, seconds)
+    rests = any(kind.rest is not None for kind in call.model.problem.domain.situations.values())
+    what = "no state in which the goal holds" + (" and what was touched is at rest" if rests else "")
+    reason = Reason(f"{what} can be reached; all states of level {levels[-1]} were tried")
+    return Outcome(Status.UNSOLVABLE, None, reason, call.counts, call.fallbacks, seconds)

@@ -59,6 +59,7 @@ class Model:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.symbols = _symbols(problem)
+        self.first_levels = tuple(map(problem.first_level, self.symbols))
         self.index = {(s.situation, s.arguments): i for i, s in enumerate(self.symbols)}
         self._compiled = {name: self._compile(b) for name, b in problem.domain.behaviors.items()}
 

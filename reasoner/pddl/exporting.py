@@ -67,13 +67,13 @@ def to_pddl(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        In place of the problem's own.
+        In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
     """
     level = problem.domain.levels[-1] if level is None else level
     found = replace(
         problem,
         initial=problem.initial if initial is None else initial,
-        goal=problem.goal if goal is None else goal,
+        goal=problem.goal_on(level) if goal is None else goal,
     )
     return _Export(found, level).exported()
 
