@@ -173,6 +173,10 @@ class Facts:
         value = self._values[situation].get(arguments)
         return FALSE if value is None and self.exists(situation, arguments) else value
 
+    def state(self) -> dict[Symbol, str]:
+        """Return what is stated now."""
+        return {Symbol(name, key): value for name, values in self._values.items() for key, value in values.items()}
+
     def exists(self, situation: str, arguments: Arguments) -> bool:
         """Return whether there is such a symbol: it is stated, or boolean and about individuals of the right classes."""
         if arguments in self._values[situation]:
@@ -242,6 +246,12 @@ class Rules:
                 if facts.exists(effect.situation, key):
                     found.append((effect.situation, key, inner.get(effect.value, effect.value)))
         return found
+
+    def satisfied(
+        self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
+    ) -> Bindings | None:
+        """Return a way to put individuals in for the other variables of conditions with which all hold, or None."""
+        return _first(self.conjunction(conditions, set(terms), kinds), facts, terms)
 
     def _behavior(self, behavior: Behavior) -> tuple[list[Part], list[tuple[list[Part], ValueEffect]]]:
         kinds = {p.name: p.kind for p in (*behavior.parameters, *behavior.variables)}

@@ -1,13 +1,17 @@
 """What a plan of several levels means (docs/levels.md): the planners and the checker agree on it, case by case."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import pytest
 
+from planner.grounded.best_first import plan_level
+from planner.levels import levels_left
 from planner.paper.hierarchy import plan as paper
 from planner.plan import Outcome, Plan, Status
 from planner.validation import successor, validate
 from reasoner.symbols import FALSE, Problem, Symbol
+from tests.planner.families import tabletop
 from tests.planner.small import CASES, Case
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper}
@@ -37,3 +41,39 @@ def test_each_case_has_its_plan(case: Callable[[], Case], mode: str) -> None:
     end = after(wanted.problem, outcome.plan)
     assert {symbol: end.get(symbol, FALSE) for symbol in wanted.afterwards} == wanted.afterwards
     assert all(end[symbol] != value for symbol, value in wanted.never.items())
+
+
+def served(filled: str, to: str) -> Problem:
+    """Return the paper's table with a drink in cup1 and the wish to have that cup elsewhere."""
+    problem = tabletop()
+    initial = {**problem.initial, Symbol("BEVERAGE", ("cup1",)): filled}
+    return replace(problem, initial=initial, goal={Symbol("LOCATION", ("cup1",)): to})
+
+
+def test_where_a_level_is_left_what_only_that_level_asks_is_named() -> None:
+    problem = served("beverage1", "location7")
+    outcome = paper(problem)
+    assert outcome.plan is not None
+    assert outcome.fallbacks == 1
+    (left,) = levels_left(problem, outcome.plan)
+    assert (left.level, left.first, left.last) == (1, (0,), (1,))
+    (broken,) = left.broken
+    assert broken.step == (1, 1)
+    assert str(broken) == (
+        "cup1 LOCATION location7: B1_MOVE cup1 location7 asks that (cup1 BEVERAGE no_beverage or cup1 is no Cup)"
+    )
+
+
+def test_where_a_level_is_left_what_it_asks_and_is_kept_is_not_named() -> None:
+    problem = served("no_beverage", "location7")
+    outcome = plan_level(problem, 2)
+    assert outcome.plan is not None
+    (left,) = levels_left(problem, outcome.plan)
+    assert left.broken == ()
+
+
+def test_a_plan_that_leaves_no_level_has_nothing_to_name() -> None:
+    problem = served("no_beverage", "location7")
+    outcome = paper(problem)
+    assert outcome.plan is not None
+    assert levels_left(problem, outcome.plan) == []

@@ -9,7 +9,8 @@ from planner.plan import Plan, Step
 from planner.validation import validate
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
-from reasoner.symbols import Problem
+from reasoner.symbols import Problem, Symbol
+from tests.planner.small import Case, fire_door, tool, van
 
 
 @pytest.fixture(scope="module")
@@ -52,3 +53,60 @@ def test_a_refinement_that_leaves_the_object_in_the_hand_is_found(serving: Probl
 def test_an_argument_of_another_class_is_found(serving: Problem, steps: tuple[Step, ...]) -> None:
     odd = replace(steps[0], arguments=("cup1", "cup2"))
     assert "don't take these arguments" in faults(serving, (odd, *steps[1:]))
+
+
+def solved(case: Case) -> tuple[Step, ...]:
+    found = plan(case.problem).plan
+    assert found is not None
+    return found.steps
+
+
+def refined(step: Step, *names: str) -> Step:
+    """Return a step with only those of its sub-steps."""
+    return replace(step, steps=tuple(below for below in step.steps if below.behavior in names))
+
+
+def test_a_door_that_is_left_open_is_found() -> None:
+    (fetch,) = solved(fire_door())
+    open_ = refined(fetch, "OPEN", "TAKE", "GO", "PUT")
+    assert "touches <door, DOOR> and leaves it open; at rest it is shut" in faults(fire_door().problem, (open_,))
+
+
+def test_a_door_that_a_stretch_below_its_level_leaves_open_is_found() -> None:
+    (fetch,) = solved(fire_door())
+    open_ = refined(fetch, "OPEN", "TAKE", "GO", "PUT").steps
+    said = faults(fire_door().problem, open_)
+    assert "the stretch from 2 OPEN to" in said
+    assert "leaves it open; at rest it is shut" in said
+
+
+def test_a_door_that_was_open_and_is_not_touched_may_stay_open() -> None:
+    problem = replace(fire_door().problem, initial={**fire_door().problem.initial, Symbol("DOOR", ("door",)): "open"})
+    (fetch,) = solved(fire_door())
+    assert faults(problem, (refined(fetch, "TAKE", "GO", "PUT"),)) == ""
+    (shut,) = (step for step in fetch.steps if step.behavior == "SHUT")
+    take, *rest = (step for step in fetch.steps if step.behavior not in ("OPEN", "SHUT"))
+    assert faults(problem, (replace(fetch, steps=(take, shut, *rest)),)) == ""
+
+
+def test_the_next_step_begins_where_the_refinement_of_the_one_before_ended() -> None:
+    case = van()
+    steps = solved(case)
+    alone = solved(replace(case, problem=replace(case.problem, goal={Symbol("AT", ("parcel2",)): "north"})))
+    other = next(i for i, step in enumerate(steps) if step.arguments == ("parcel2", "north"))
+    again = (*steps[:other], alone[0], *steps[other + 1 :])
+    assert faults(case.problem, steps) == ""
+    assert "preconditions don't hold" in faults(case.problem, again)  # the van isn't in the depot any more
+
+
+def test_a_step_without_refinement_among_refined_ones_is_found() -> None:
+    first, *others = solved(van())
+    assert "it isn't refined, and other steps are" in faults(van().problem, (replace(first, steps=()), *others))
+
+
+def test_a_refinement_that_changes_more_than_its_step_says_is_found() -> None:
+    case = tool()
+    first, second = solved(case)
+    assert "leaves <leg2, AT> = mounted, not bin" in faults(
+        case.problem, (replace(first, steps=(*first.steps, *second.steps)), second)
+    )

@@ -1,0 +1,239 @@
+"""What a plan gives up where it leaves a level (docs/levels.md).
+
+Where no plan of a level can be refined, steps of the level below stand in its place. They keep the conditions of their own level;
+what only the level above asks ("a filled cup isn't moved") they may break. Here that is said in the ontology's terms.
+
+A level that is left is imagined to watch: it sees a change where a symbol that it knows comes to another value that it knows. What
+is between two such values (a cup in a hand) is nothing to it. For each change that it sees and that stays, some behaviour of that
+level should have been applicable that makes this change, maybe together with those just before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from planner.plan import Plan, Step
+from planner.validation import Arguments, Bindings, Cell, Facts, Rules, stretches
+from reasoner.symbols import (
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Fact,
+    Problem,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    substituted,
+)
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.
+
+    `step` is the path of the primitive that makes the change. No behaviour: the level has none that could make this change.
+    """
+
+    step: tuple[int, ...]
+    change: Fact
+    behavior: str | None
+    arguments: Arguments
+    conditions: tuple[Condition, ...]
+
+    def __str__(self) -> str:
+        """Return it as a sentence, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 asks that …``."""
+        if self.behavior is None:
+            return f"{self.change}: no behaviour of that level brings it about"
+        return f"{self.change}: {' '.join((self.behavior, *self.arguments))} asks that {_all(self.conditions)}"
+
+
+@dataclass(frozen=True)
+class Left:
+    """A stretch of a plan below a level, from the path of its first step to that of its last, and what it breaks."""
+
+    level: int
+    first: tuple[int, ...]
+    last: tuple[int, ...]
+    broken: tuple[Broken, ...]
+
+
+def levels_left(problem: Problem, plan: Plan) -> list[Left]:
+    """Return where a valid plan leaves a level, and which conditions that only stand on that level are broken there.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        One that `planner.validation.validate` finds nothing wrong with.
+    """
+    return list(_Watch(problem).carried_out(plan.steps, 0))
+
+
+class _Watch:
+    """A plan being carried out, as each level sees it."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.rules = Rules(problem)
+        self.facts = Facts(problem, problem.initial)
+        self.views = {level: Facts(problem, _seen(problem, level)) for level in problem.domain.levels}
+        self.left: dict[int, list[Broken]] = {}  # for each level that is left just now, what is broken so far
+        self.history: dict[int, list[tuple[Cell, str | None]]] = {}  # and what it saw change, with the values before
+
+    def carried_out(self, steps: Sequence[Step], above: int) -> Iterator[Left]:
+        level = next((level for level in self.problem.domain.levels if level > above), above)
+        for part in stretches(steps, level):
+            if part[0].level > level:
+                self.left[level], self.history[level] = [], []
+                yield from self.carried_out(part, level)
+                yield Left(level, part[0].path, part[-1].path, tuple(self.broken(level)))
+            elif part[0].steps:
+                yield from self.carried_out(part[0].steps, level)
+            else:
+                self.step(part[0])
+
+    def broken(self, level: int) -> Iterator[Broken]:
+        """Yield what a stretch that is over has broken; what it changed and changed back doesn't count."""
+        before: dict[Cell, str | None] = {}
+        for cell, old in self.history.pop(level):
+            before.setdefault(cell, old)
+        for one in self.left.pop(level):
+            cell = one.change.symbol.situation, one.change.symbol.arguments
+            if self.views[level].value(*cell) != before[cell]:
+                yield one
+
+    def step(self, step: Step) -> None:
+        behavior = self.problem.domain.behaviors[step.behavior]
+        changes = {(s, key): value for s, key, value in self.rules.changes(behavior, step.arguments, self.facts) or ()}
+        for (situation, arguments), value in changes.items():
+            symbol = Symbol(situation, arguments)
+            for level in self.left:
+                old = self.views[level].value(situation, arguments)
+                if self.problem.sees(level, symbol, value) and old != value:
+                    self.left[level].extend(self.judged(level, step, Fact(symbol, value)))
+                    self.history[level].append(((situation, arguments), old))
+                    self.views[level].put(situation, arguments, value)
+        for (situation, arguments), value in changes.items():
+            self.facts.put(situation, arguments, value)
+            for level, view in self.views.items():
+                if self.problem.sees(level, Symbol(situation, arguments), value):
+                    view.put(situation, arguments, value)
+
+    def judged(self, level: int, step: Step, change: Fact) -> Iterator[Broken]:
+        """Yield what a change breaks, if no behaviour of the level could make it now."""
+        best: Broken | None = None
+        for behavior in self.problem.domain.at_level(level):
+            for effect in behavior.effects:
+                terms = self.unified(behavior, effect, change)
+                if terms is None:
+                    continue
+                if self.could(level, behavior, effect, terms, change):
+                    return
+                found, asked = self.nearest(level, behavior, effect, terms, change.symbol)
+                arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
+                if best is None or len(asked) < len(best.conditions):
+                    best = Broken(step.path, change, behavior.name, arguments, asked)
+        yield best or Broken(step.path, change, None, (), ())
+
+    def unified(self, behavior: Behavior, effect: ValueEffect, change: Fact) -> Bindings | None:
+        """Return what the terms of an effect stand for if it is this change."""
+        kinds, terms = _kinds(behavior), dict[str, str]()
+        if effect.situation != change.symbol.situation:
+            return None
+        for term, given in zip(
+            (*effect.arguments, effect.value), (*change.symbol.arguments, change.value), strict=True
+        ):
+            if terms.setdefault(term, given) != given or (term not in kinds and term != given):
+                return None
+            if term in kinds and given not in self.problem.members(kinds[term]):
+                return None
+        return {term: given for term, given in terms.items() if term in kinds}
+
+    def could(self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, change: Fact) -> bool:
+        """Whether a behaviour could make a change, alone or together with others of its effects made just before."""
+        view = self.views[level]
+        conditions, kinds = (*behavior.preconditions, *effect.when), _kinds(behavior)
+        if self.rules.satisfied(conditions, terms, kinds, view) is not None:
+            return True
+        if self.rules.satisfied(conditions, terms, kinds, self.mixed(level, change.symbol)) is not None:
+            return True
+        made = {(change.symbol.situation, change.symbol.arguments): change.value}
+        undone: dict[Cell, str] = {}
+        possible = False
+        for cell, old in list(reversed(self.history[level]))[: len(behavior.effects) - 1]:
+            now = view.value(*cell)
+            if old is None or now is None:
+                break
+            made.setdefault(cell, now)
+            undone.setdefault(cell, now)
+            view.put(*cell, old)
+            found = self.rules.satisfied(conditions, terms, kinds, view)
+            if found is not None:
+                arguments = tuple(found.get(p.name, "") for p in behavior.parameters)
+                all_ = {(s, key): value for s, key, value in self.rules.changes(behavior, arguments, view) or ()}
+                possible = possible or made.items() <= all_.items()
+        for cell, now in undone.items():
+            view.put(*cell, now)
+        return possible
+
+    def mixed(self, level: int, symbol: Symbol) -> Facts:
+        """Return what holds now, but for the one symbol, which has the value that the level saw last."""
+        values = self.facts.state()
+        seen = self.views[level].value(symbol.situation, symbol.arguments)
+        return Facts(self.problem, values if seen is None else {**values, symbol: seen})
+
+    def nearest(
+        self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, symbol: Symbol
+    ) -> tuple[Bindings, tuple[Condition, ...]]:
+        """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
+        conditions, kinds = (*behavior.preconditions, *effect.when), _kinds(behavior)
+        mixed = self.mixed(level, symbol)
+        for size in range(1, len(conditions) + 1):
+            for without in combinations(range(len(conditions)), size):
+                rest = [c for i, c in enumerate(conditions) if i not in without]
+                for facts in (mixed, self.views[level]):
+                    found = self.rules.satisfied(rest, terms, kinds, facts)
+                    if found is not None:
+                        return found, tuple(substituted(conditions[i], found) for i in without)
+        return terms, ()
+
+
+def _seen(problem: Problem, level: int) -> dict[Symbol, str]:
+    return {symbol: value for symbol, value in problem.initial.items() if problem.sees(level, symbol, value)}
+
+
+def _kinds(behavior: Behavior) -> Mapping[str, str]:
+    return {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+
+
+def _all(conditions: Sequence[Condition]) -> str:
+    return " and ".join(map(said, conditions))
+
+
+def said(condition: Condition) -> str:
+    """Return a condition as people write it.
+
+    >>> said(RelationCondition("canReach", ("left_hand", "location7")))
+    'left_hand canReach location7'
+    >>> said(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "location7"),), negated=True))
+    'there is no Cup ?o with ?o LOCATION location7'
+    """
+    match condition:
+        case ValueCondition(situation, arguments, value, negated):
+            return ("not " if negated else "") + str(Fact(Symbol(situation, arguments), value))
+        case RelationCondition(relation, arguments, negated):
+            return ("not " if negated else "") + " ".join((arguments[0], relation, *arguments[1:]))
+        case ClassCondition(term, kind, negated):
+            return f"{term} is {'no' if negated else 'a'} {kind}"
+        case EqualityCondition(left, right, negated):
+            return f"{left} is {'not ' if negated else ''}{right}"
+        case Witness(variable, kind, conditions, negated):
+            return f"there is {'no' if negated else 'a'} {kind} {variable} with {_all(conditions)}"
+        case AnyOf(alternatives, negated):
+            return ("not " if negated else "") + f"({' or '.join(map(_all, alternatives))})"
