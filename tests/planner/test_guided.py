@@ -134,7 +134,7 @@ def test_one_free_place_and_zones_that_hands_share_are_learned() -> None:
     assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
 
 
-@pytest.mark.xfail(reason="the default mode leaves a level without coming to rest")
+@pytest.mark.xfail(reason="the default mode leaves a level without coming to rest", strict=False)
 def test_a_plan_that_memory_led_to_is_made_shorter_like_any_other() -> None:
     within = problem("random", 20, 20015)
     first, plan = (guided.plan(within, taught(TRAINING), "leading", improve=shapes).plan for shapes in (0, 2))
