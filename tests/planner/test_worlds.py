@@ -1,0 +1,97 @@
+"""Every shipped world is planned without giving a level up, left at rest, and in no more steps than a right answer takes."""
+
+from collections.abc import Mapping
+
+import pytest
+
+import confab
+from planner.plan import Plan, Status
+from planner.validation import successor, validate
+from reasoner.symbols import Problem
+
+SECONDS = 10.0
+
+AT_MOST: Mapping[str, Mapping[int, int]] = {
+    # Small scenes: what level 1 needs, and what its steps need below in the least lucky order that level 1 allows.
+    "assembly-small": {1: 7, 2: 14, 3: 48},
+    "canal-small": {1: 3, 2: 23, 3: 45},
+    "couriers-small": {1: 8, 2: 16},
+    "drawers-small": {1: 2, 2: 20},
+    "house-small": {1: 2, 2: 19, 3: 39},
+    "laboratory-small": {1: 5, 2: 17, 3: 36},
+    "towers-small": {1: 2, 2: 6, 3: 30},
+    # Large scenes, each step refined as shortly as can be. Assembly: a change of tools at every joint (73 and 259 if each tool is
+    # fetched as seldom as the order of parts lets it). Canal: the water is wrong for every boat (297 and 555 if boats go up and
+    # down by turns). Couriers: each parcel alone. The others: one order of the errands, and a fifth more.
+    "assembly-large": {1: 41, 2: 101, 3: 343},
+    "canal-large": {1: 42, 2: 336, 3: 672},
+    "couriers-large": {1: 48, 2: 182},
+    "drawers-large": {1: 9, 2: 130},
+    "house-large": {1: 10, 2: 144, 3: 288},
+    "laboratory-large": {1: 20, 2: 82, 3: 173},
+    "towers-large": {1: 6, 2: 26, 3: 130},
+}
+SMALL = [scene for scene in AT_MOST if scene.endswith("-small")]
+NOT_YET: Mapping[tuple[str, str], str] = {
+    ("assembly-small", "guarded"): "a tool is fetched once too often: 15 / 51",
+    ("couriers-small", "guarded"): "a vehicle drives about between its errands: 8 / 21",
+    ("house-small", "guarded"): "level 1 is given up and a door left open",
+    ("laboratory-small", "guarded"): "level 1 is given up and a lid left up",
+    ("assembly-large", "guarded"): "all levels above the primitives are given up, or none is done in time",
+    ("canal-large", "guarded"): "gives up at the time limit",
+    ("couriers-large", "guarded"): "gives up at the time limit",
+    ("drawers-large", "guarded"): "gives up at the time limit",
+    ("house-large", "guarded"): "level 1 is given up and doors are left open",
+    ("laboratory-large", "guarded"): "level 1 is given up and lids are left up",
+}
+"""Scenes and modes of which no right answer comes yet, and what comes instead."""
+
+
+def cases() -> list[object]:
+    """Return scene and mode of every case: the paper's mode is the truth on small scenes."""
+    pairs = [(scene, "paper") for scene in SMALL] + [(scene, "guarded") for scene in AT_MOST]
+    return [
+        pytest.param(
+            *pair,
+            id="-".join(pair),
+            marks=[pytest.mark.slow] * (pair[0] not in SMALL)
+            + [pytest.mark.xfail(reason=NOT_YET.get(pair, ""), strict=True)] * (pair in NOT_YET),
+        )
+        for pair in pairs
+    ]
+
+
+@pytest.mark.parametrize(("scene", "mode"), cases())
+def test_a_world_is_planned_without_giving_a_level_up_and_left_at_rest(scene: str, mode: str) -> None:
+    result = confab.load(scene).plan(mode=mode, time_limit=SECONDS)
+    assert result.outcome.status is Status.SOLVED, result.outcome.reason
+    assert validate(result.problem, result.plan) == []
+    assert not_at_rest(result.problem, result.plan) == []
+    assert result.outcome.fallbacks == 0
+    if bare := bare_steps(
+        result.problem, result.plan
+    ):  # a stretch may stand in the place of steps above if it is shorter
+        assert len(result.plan.primitives) < max(AT_MOST[scene].items())[1], bare
+    longer = {level: count for level, count in result.plan.length.items() if count > AT_MOST[scene][level]}
+    assert longer == {}, f"wanted at most {AT_MOST[scene]}"
+
+
+def not_at_rest(problem: Problem, plan: Plan) -> list[str]:
+    """Return what has another value than its rest value after the primitives; everything rests at first."""
+    state = dict(problem.initial)
+    for step in plan.primitives:
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
+        assert after is not None, f"{step} can't be done"
+        state = after
+    rest = {name: situation.rest for name, situation in problem.domain.situations.items() if situation.rest}
+    return [f"{symbol} = {value}" for symbol, value in state.items() if value != rest.get(symbol.situation, value)]
+
+
+def bare_steps(problem: Problem, plan: Plan) -> list[str]:
+    """Return steps that stand without a step of the level above, or without steps of the level below."""
+    levels = problem.domain.levels
+    return [
+        str(step)
+        for step in plan.walk()
+        if levels.index(step.level) != len(step.path) - 1 or bool(step.steps) == (step.level == levels[-1])
+    ]
