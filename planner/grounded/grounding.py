@@ -123,7 +123,8 @@ class Reached:
         self.initial = {symbol: value for symbol, value in initial.items() if symbol.situation in self.situations}
         behaviors = problem.domain.at_level(level)
         changed = frozenset(effect.situation for behavior in behaviors for effect in behavior.effects)
-        self.schemas = [s for behavior in behaviors for s in schemas(behavior, problem.domain.situations, changed)]
+        situations, members = problem.domain.situations, problem.members
+        self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
         self.individuals = tuple(dict.fromkeys(self._individuals()))
         self.number = {name: i for i, name in enumerate(self.individuals)}
         self.radix = max(len(self.individuals), 1)

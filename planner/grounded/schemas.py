@@ -10,7 +10,7 @@ in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -60,7 +60,12 @@ class Schema:
     conditional: bool = False
 
 
-def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed: frozenset[str]) -> list[Schema]:
+def schemas(
+    behavior: Behavior,
+    situations: Mapping[str, SituationType],
+    changed: frozenset[str],
+    members: Callable[[str], frozenset[str]],
+) -> list[Schema]:
     """Return the schema of a behaviour, followed by one for each of its conditional effects.
 
     Parameters
@@ -69,6 +74,7 @@ def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed
     situations : mapping of name to SituationType
     changed : set of situation types
         Those that some behaviour of the level changes; the others are static there.
+    members : function of a class to its individuals
 
     Raises
     ------
@@ -78,7 +84,7 @@ def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed
     kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
     parameters = tuple(parameter.name for parameter in behavior.parameters)
     effects = list(enumerate(behavior.effects))
-    compile_ = _Compiler(situations, changed, kinds)
+    compile_ = _Compiler(situations, changed, members, kinds)
     base = compile_.schema(behavior, parameters, behavior.preconditions, tuple(e for e in effects if not e[1].when))
     found = [base]
     for position, effect in effects:
@@ -97,6 +103,7 @@ def schemas(behavior: Behavior, situations: Mapping[str, SituationType], changed
 class _Compiler:
     situations: Mapping[str, SituationType]
     changed: frozenset[str]
+    members: Callable[[str], frozenset[str]]
     kinds: dict[str, str]
 
     def schema(
@@ -145,7 +152,7 @@ class _Compiler:
             elif isinstance(condition, AnyOf) and not condition.negated and len(condition.alternatives) == 1:
                 yield from self._opened(condition.alternatives[0], {}, shared, kinds, fresh)
             elif isinstance(condition, ValueCondition):
-                yield self._plain(condition)
+                yield from self._plain(condition, kinds)
             else:
                 yield condition
 
@@ -166,13 +173,27 @@ class _Compiler:
         yield from (ClassCondition(names[name], kind) for name, kind in own.items())
         yield from self._flat([substituted(c, names) for c in group], shared | set(names.values()), kinds, fresh)
 
-    def _plain(self, condition: ValueCondition) -> ValueCondition:
-        """Return a condition on a boolean symbol as one on its being true."""
-        if not self.situations[condition.situation].boolean:
-            return condition
-        if condition.value not in (TRUE, FALSE):
+    def _plain(self, condition: ValueCondition, kinds: Mapping[str, str]) -> Iterator[Condition]:
+        """Yield a condition on a boolean symbol as one on its being true, and on whether there is that symbol at all."""
+        situation = self.situations[condition.situation]
+        if not situation.boolean or condition.value == TRUE:
+            yield condition
+            return
+        if condition.value != FALSE:
             raise DomainError(f"{condition.situation} is true or false; {condition.value} can't be its value")
-        return replace(condition, value=TRUE, negated=condition.negated is (condition.value == TRUE))
+        true = replace(condition, value=TRUE, negated=False)
+        doubtful = [
+            ClassCondition(term, kind)
+            for term, kind in zip(condition.arguments, situation.arguments, strict=True)
+            if not (self.members(kinds[term]) if term in kinds else frozenset((term,))) <= self.members(kind)
+        ]
+        if not condition.negated:
+            yield replace(true, negated=True)
+            yield from doubtful
+        elif doubtful:
+            yield AnyOf(((true,), *((replace(c, negated=True),) for c in doubtful)))
+        else:
+            yield true
 
     def _atom(self, condition: Condition) -> Iterator[Atom]:
         match condition:

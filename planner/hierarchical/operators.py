@@ -24,6 +24,7 @@ from planner.hierarchical.state import Alike, Change, Key, Table, representative
 from planner.paper.transitions import DomainError, needs
 from reasoner.symbols import (
     FALSE,
+    TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -259,7 +260,7 @@ class Program:
                         text = self._pick(self._adjacent(relation, arguments, term), term, behavior)
                         found.append((self._adjacency(relation, arguments, term), term, text))
                 case ValueCondition(situation, (term,), value, False) if term.startswith("?") and term not in hard:
-                    constant = not value.startswith("?") or value in hard
+                    constant = self._listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):
                         who = f"{_name('who', situation)}.get({_term(value)}, ())"
                         found.append((4.0, term, f"prefer({who}, focus)"))
@@ -362,7 +363,7 @@ class Program:
         for c in condition.conditions:
             match c:
                 case ValueCondition(situation, (only,), value, False) if only == term and value != term:
-                    if value in bound or not value.startswith("?"):
+                    if self._listed(situation, value) and (value in bound or not value.startswith("?")):
                         best = min(best, (1.0, c, f"{_name('who', situation)}.get({_term(value)}, ())"), key=_cost)
                 case RelationCondition(relation, arguments, False) if arguments.count(term) == 1:
                     if not {a for a in arguments if a.startswith("?")} - bound - {term}:
@@ -380,18 +381,19 @@ class Program:
             return f"bool({source})"
         return f"any(({' and '.join(tests)}) for {_term(term)} in {source})"
 
+    def _listed(self, situation: str, value: str) -> bool:
+        """Whether the table lists who has a value: what is false isn't listed, and a variable could be that."""
+        return value == TRUE or not self.domain.situations[situation].boolean
+
     def _look(self, condition: ValueCondition) -> str:
         default = f", {FALSE!r}" if self.domain.situations[condition.situation].boolean else ""
         return f"{_name('now', condition.situation)}.get({_key(condition.arguments)}{default})"
 
     def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
         """Return tests that the symbol exists, where the terms' classes don't already say so."""
-        kind = self.domain.situations[situation]
-        if not kind.boolean:
-            return []
         return [
             self._member(term, wanted)
-            for term, wanted in zip(arguments, kind.arguments, strict=True)
+            for term, wanted in zip(arguments, self.domain.situations[situation].arguments, strict=True)
             if not (term.startswith("?") and self._kind(kinds[term]) <= self._kind(wanted))
         ]
 

@@ -97,14 +97,14 @@ def holds(problem: Problem, state: Facts, condition: Condition, terms: Terms, ki
             found = any(
                 all(holds(problem, state, c, trial, kinds) for c in inner)
                 for m in problem.classes[kind]
-                for trial in bindings(problem, mentioned(inner), kinds, {**terms, variable: m})
+                for trial in bindings(problem, outside(inner), {**kinds, variable: kind}, {**terms, variable: m})
             )
             return found is not negated
         case AnyOf(alternatives, negated):
             found = any(
                 all(holds(problem, state, c, trial, kinds) for c in group)
                 for group in alternatives
-                for trial in bindings(problem, mentioned(group), kinds, terms)
+                for trial in bindings(problem, outside(group), kinds, terms)
             )
             return found is not negated
 

@@ -1,0 +1,155 @@
+"""One language of conditions and effects: every evaluator says the same of what is applicable and of what comes after."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.grounded.grounding import ground as grounded
+from planner.grounded.state_space import Space
+from planner.grounded.task import Task
+from planner.hierarchical.operators import Program
+from planner.hierarchical.state import Table
+from planner.paper.transitions import Model, ground
+from planner.validation import successor
+from reasoner.symbols import FALSE, AnyOf, Condition, Fact, Problem, Symbol, Witness
+from tests.planner import naive
+from worlds.language import language
+
+After = Mapping[tuple[str, tuple[str, ...]], frozenset[Fact]]
+"""What holds after each behaviour that is applicable; what is false isn't listed."""
+
+
+def facts(state: Mapping[Symbol, str]) -> frozenset[Fact]:
+    return frozenset(Fact(symbol, value) for symbol, value in state.items() if value != FALSE)
+
+
+def by_naive(problem: Problem) -> After:
+    state = naive.complete(problem)
+    return {
+        (behavior.name, arguments): facts(after)
+        for behavior in problem.domain.behaviors.values()
+        for arguments, after in naive.results(problem, behavior, state)
+    }
+
+
+def by_validation(problem: Problem) -> After:
+    found = {}
+    for behavior in problem.domain.behaviors.values():
+        for arguments in product(*(problem.classes[p.kind] for p in behavior.parameters)):
+            after = successor(problem, behavior, arguments, problem.initial)
+            if after is not None:
+                found[behavior.name, arguments] = facts(after)
+    return found
+
+
+def by_paper(problem: Problem) -> After:
+    model = Model(problem)
+    done = ((g, model.apply(g, model.values(problem.initial))) for g in ground(problem, 1))
+    return {(g.behavior, g.arguments): facts(model.state(applied.after)) for g, applied in done if applied is not None}
+
+
+def by_operators(problem: Problem) -> After:
+    found = {}
+    program = Program(problem)
+    for behavior in problem.domain.behaviors.values():
+        for arguments in product(*(problem.classes[p.kind] for p in behavior.parameters)):
+            table = Table(problem.domain.situations, problem.initial)
+            done = program.bind(table, {}).forward[behavior.name](*arguments)
+            if done is not None:
+                for change in done[1]:
+                    table.put(*change)
+                found[behavior.name, arguments] = facts(table.state())
+    return found
+
+
+def by_task(problem: Problem) -> After:
+    task = grounded(problem)
+    assert isinstance(task, Task)
+    found = {}
+    for number in range(len(task)):
+        after = task.applied(task.initial, number)
+        if after is not None:
+            behavior, arguments, _ = task.describe(number)
+            found[behavior, arguments] = facts(task.values(after))
+    return found
+
+
+def by_space(problem: Problem) -> After:
+    space = Space(problem, 1)
+    found = {}
+    start = np.zeros(1, np.uint64)
+    for operator in space.operators:
+        before = space._applicable(operator, start)
+        if len(before):
+            (code,) = (int(code) for code in space._after(operator, before))
+            state = dict(problem.initial)
+            for symbol, values in space.values.items():
+                rank = code >> space.shift[symbol] & ((1 << space.width[symbol]) - 1)
+                state[symbol] = list(values)[rank]
+            found[operator.behavior, operator.arguments] = facts(state)
+    return found
+
+
+EVALUATORS: dict[str, Callable[[Problem], After]] = {
+    "validation": by_validation,
+    "paper": by_paper,
+    "operators": by_operators,
+    "task": by_task,
+    "space": by_space,
+}
+"""All that read behaviours, but for the naive reading, which they are held against."""
+
+
+@given(seed=st.integers(0, 10**9))
+@settings(max_examples=settings().max_examples * 3)
+def test_every_evaluator_agrees_on_what_is_applicable_and_what_comes_of_it(seed: int) -> None:
+    problem = language(seed)
+    now = facts(problem.initial)
+    truth = by_naive(problem)
+    changing = {done: after for done, after in truth.items() if after != now}
+    for name, evaluator in EVALUATORS.items():
+        found = evaluator(problem)
+        if evaluator is by_task:  # which drops what never changes anything
+            assert {done: after for done, after in found.items() if after != now} == changing, name
+        else:
+            assert found == truth, name
+
+
+def test_random_behaviours_are_of_every_kind() -> None:
+    conditions: Counter[tuple[str, bool, int]] = Counter()
+    conflicts = equal = odd = own = 0
+    for seed in range(400):
+        problem = language(seed)
+        for behavior in problem.domain.behaviors.values():
+            for depth, condition in nested(behavior.preconditions):
+                conditions[type(condition).__name__, condition.negated, depth] += 1
+            places = [(e.situation, e.arguments) for e in behavior.effects]
+            conflicts += len(set(places)) < len(places)
+            own += any(e.when and e.value in {v.name for v in behavior.variables} for e in behavior.effects)
+        for (name, arguments), _ in by_naive(problem).items():
+            equal += len(set(arguments)) < len(arguments)
+            odd += any(a.startswith("shelf") for e in problem.domain.behaviors[name].effects for a in e.arguments[:1])
+    kinds = {
+        (name, negated, depth) for name, negated, depth in conditions if depth < 2 or name not in ("Witness", "AnyOf")
+    }
+    plain = {"ValueCondition", "RelationCondition", "ClassCondition", "EqualityCondition"}
+    assert kinds >= set(product(plain, (False, True), (0, 1, 2))) | set(
+        product(("Witness", "AnyOf"), (False, True), (0, 1))
+    )
+    assert min(conflicts, equal, odd, own) > 20
+
+
+def nested(conditions: Sequence[Condition], depth: int = 0) -> Iterator[tuple[int, Condition]]:
+    """Yield all conditions with how deep they are."""
+    for condition in conditions:
+        yield depth, condition
+        match condition:
+            case Witness(_, _, inner):
+                yield from nested(inner, depth + 1)
+            case AnyOf(alternatives):
+                for group in alternatives:
+                    yield from nested(group, depth + 1)

@@ -1,0 +1,1 @@
+"""Random worlds as values, for tests and benchmarks alike."""

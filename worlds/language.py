@@ -1,0 +1,149 @@
+"""Random behaviours over a few individuals: every kind of condition and effect, nested in one another, over odd symbols.
+
+Among them are effects on one and the same fact, parameters that get the same individual, symbols that don't exist (a place of
+something that has none), special values (`nowhere`), and variables that only a part of a condition determines.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from random import Random
+
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+CLASSES = {
+    "Truth": (FALSE, TRUE),
+    "Cup": ("cup1", "cup2"),
+    "Shelf": ("shelf1", "shelf2"),
+    "Thing": ("cup1", "cup2", "shelf1", "shelf2"),
+    "PLACE": ("shelf1", "shelf2", "cup1", "nowhere"),
+    "COLOR": ("red", "blue"),
+}
+SITUATIONS = {
+    "PLACE": SituationType("PLACE", ("Cup",), "PLACE", rest="nowhere"),
+    "COLOR": SituationType("COLOR", ("Cup", "Shelf"), "COLOR"),
+    "FULL": SituationType("FULL", ("Thing",), "Truth", boolean=True),
+    "NEAR": SituationType("NEAR", ("Cup", "Shelf"), "Truth", boolean=True),
+}
+RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
+DEPTH = 2
+
+
+class Writer:
+    """Writes one random behaviour."""
+
+    def __init__(self, rng: Random) -> None:
+        self.rng = rng
+        self.kinds: dict[str, str] = {}
+
+    def behavior(self, name: str, level: int = 1) -> Behavior:
+        """Return a behaviour in which something determines every variable."""
+        rng = self.rng
+        parameters = [self.fresh(rng.choice(("Cup", "Shelf", "Thing"))) for _ in range(rng.randrange(3))]
+        bound = list(parameters)
+        conditions = self.conditions(bound, rng.randrange(4), DEPTH)
+        effects = []
+        for _ in range(rng.randint(1, 4)):
+            inner = list(bound)
+            when = self.conditions(inner, rng.randint(1, 2), 1) if rng.random() < 0.4 else []
+            effects.append(self.effect(inner, tuple(when)))
+        if rng.random() < 0.5:  # a second effect on the fact of another
+            one = rng.choice(effects)
+            value = {TRUE: FALSE, FALSE: TRUE}.get(one.value) or rng.choice(CLASSES[SITUATIONS[one.situation].range])
+            own = [t for t in (*one.arguments, one.value) if t.startswith("?") and t not in bound]
+            effects.append(ValueEffect(one.situation, one.arguments, value, one.when if own else ()))
+        rng.shuffle(conditions)
+        rng.shuffle(effects)
+        terms = [Parameter(term, self.kinds[term]) for term in self.kinds]
+        return Behavior(
+            name, level, tuple(t for t in terms if t.name in parameters), tuple(t for t in terms if t.name not in parameters),
+            tuple(conditions), tuple(effects),
+        )  # fmt: skip
+
+    def fresh(self, kind: str) -> str:
+        """Return a new variable of a class."""
+        term = f"?{kind.lower()}{len(self.kinds)}"
+        self.kinds[term] = kind
+        return term
+
+    def term(self, bound: list[str]) -> str:
+        """Return a term that is bound, or an individual."""
+        return self.rng.choice(bound) if bound and self.rng.random() < 0.8 else self.rng.choice(CLASSES["Thing"])
+
+    def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
+        """Return a conjunction; `bound` grows by what it determines."""
+        return [self.condition(bound, depth) for _ in range(most)]
+
+    def condition(self, bound: list[str], depth: int) -> Condition:
+        """Return a random condition, with others nested in it to some depth; `bound` grows by what it determines."""
+        rng = self.rng
+        negated = rng.random() < 0.4
+        match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any")):
+            case "binding":
+                situation = rng.choice(("PLACE", "COLOR"))
+                arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
+                kind = "COLOR" if situation == "COLOR" else rng.choice(("Shelf", "PLACE", "Thing"))
+                bound.append(self.fresh(kind))
+                return ValueCondition(situation, arguments, bound[-1])
+            case "relation":
+                relation = rng.choice(sorted(RELATIONS))
+                return RelationCondition(relation, tuple(self.term(bound) for _ in RELATIONS[relation]), negated)
+            case "class":
+                return ClassCondition(self.term(bound), rng.choice(("Cup", "Shelf", "COLOR")), negated)
+            case "equal":
+                return EqualityCondition(self.term(bound), self.term(bound), negated)
+            case "witness" if depth:
+                variable = self.fresh(kind := rng.choice(("Cup", "Shelf", "Thing")))
+                del self.kinds[variable]  # it isn't one of the behaviour's
+                inner = self.conditions([*bound, variable], rng.randint(1, 2), depth - 1)
+                return Witness(variable, kind, tuple(inner), negated)
+            case "any" if depth:
+                groups = [self.conditions(list(bound), rng.randint(1, 2), depth - 1) for _ in range(rng.randint(1, 3))]
+                return AnyOf(tuple(map(tuple, groups)), negated)
+        situation = rng.choice(sorted(SITUATIONS))
+        arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
+        return ValueCondition(situation, arguments, rng.choice(CLASSES[SITUATIONS[situation].range]), negated)
+
+    def effect(self, bound: list[str], when: tuple[Condition, ...]) -> ValueEffect:
+        """Return a random effect on terms that are bound."""
+        rng = self.rng
+        situation = rng.choice(sorted(SITUATIONS))
+        kind = SITUATIONS[situation].range
+        arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
+        values = [t for t in bound if set(CLASSES[self.kinds[t]]) <= set(CLASSES[kind])]
+        value = rng.choice(values) if values and rng.random() < 0.6 else rng.choice(CLASSES[kind])
+        return ValueEffect(situation, arguments, value, when)
+
+
+def language(seed: int, behaviors: int = 2) -> Problem:
+    """Return a problem of one level with random behaviours, a random state and no goal."""
+    rng = Random(seed)
+    made = [Writer(rng).behavior(f"B{i}") for i in range(behaviors)]
+    relations = {
+        name: frozenset(row for row in product(*(CLASSES[kind] for kind in kinds)) if rng.random() < 0.5)
+        for name, kinds in RELATIONS.items()
+    }
+    initial: dict[Symbol, str] = {}
+    for situation in SITUATIONS.values():
+        for arguments in product(*(CLASSES[kind] for kind in situation.arguments)):
+            value = rng.choice(CLASSES[situation.range])
+            if value != FALSE:
+                initial[Symbol(situation.name, arguments)] = value
+    return Problem("random", Domain(SITUATIONS, {b.name: b for b in made}), CLASSES, relations, initial, {})
