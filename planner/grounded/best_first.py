@@ -24,6 +24,7 @@ from planner.grounded.hff import Evaluate
 from planner.grounded.hff_numba import automatic
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
+from planner.grounded.unreachable import blocked
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
 from reasoner.symbols import Problem, State
 
@@ -127,6 +128,8 @@ def search(
             next(searches[1 + turns // SHARE % 2 if turns > ALONE and turns % SHARE == 0 else 0])
         except StopIteration as done:
             if done.value is None:
+                if not counts.expanded:
+                    return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
                 what = f"all {counts.expanded} states that can be reached were searched"
                 return Flat(Status.UNSOLVABLE, (), Reason(f"no plan exists: {what}"), counts)
             if found:

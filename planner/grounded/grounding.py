@@ -746,6 +746,7 @@ class _Assembly:
             problem=reached.problem,
             level=reached.level,
             facts=self.facts,
+            complements={complement: self.facts[bit] for bit, complement in formulas.complements.items()},
             size=formulas.size,
             initial=initial,
             goal=sum(1 << bit for bit in wanted),

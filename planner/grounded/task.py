@@ -53,6 +53,8 @@ class Task:
     level : int
     facts : sequence of Fact
         What the first bits stand for.
+    complements : mapping of bit to Fact
+        The bits that are set where a fact doesn't hold.
     size : int
         Number of bits: facts, their complements, derived ones.
     initial, goal : int
@@ -76,6 +78,7 @@ class Task:
     problem: Problem
     level: int
     facts: Sequence[Fact]
+    complements: Mapping[int, Fact]
     size: int
     initial: int
     goal: int

@@ -12,6 +12,7 @@ from dataclasses import replace
 from planner.grounded.grounding import Reached
 from planner.grounded.joins import TooLargeError
 from planner.grounded.schemas import Atom, Schema
+from planner.grounded.task import Task
 from planner.plan import Reason
 from reasoner.symbols import TRUE, Fact, Symbol
 
@@ -23,6 +24,36 @@ def unreachable(reached: Reached, goal: Fact) -> Reason:
     """Return why a goal is not reachable even if nothing ever becomes false."""
     because, terms = _because(reached, goal, frozenset())
     return Reason(f"{goal} can't be reached: {because}", tuple(dict.fromkeys((*_words(goal), *terms))))
+
+
+def blocked(task: Task) -> Reason:
+    """Return why no plan exists where the goal isn't reachable even if nothing ever becomes false, negated facts included."""
+    reached = task.initial
+    ways = [
+        (sum(1 << bit for bit in need), add) for need, add in zip(task.needs.lists(), task.adds.lists(), strict=True)
+    ]
+    before = -1
+    while before != reached:
+        before = reached
+        for need, add in ways:
+            if reached & need == need:
+                for bit in add:
+                    reached |= 1 << bit
+    wanted, seen, terms = task.goal & ~reached, set(), []
+    said: list[str] = []
+    while wanted and len(said) <= DEPTH:
+        bit = (wanted & -wanted).bit_length() - 1
+        fact = task.facts[bit] if bit < len(task.facts) else task.complements.get(bit)
+        if fact is not None:
+            said.append(str(fact) if bit < len(task.facts) else f"the end of {fact}")
+            terms += _words(fact)
+        seen.add(bit)
+        missing = [need & ~reached for need, add in ways if bit in add]
+        wanted = min(missing, key=int.bit_count, default=0)
+        if any(wanted >> other & 1 for other in seen):
+            break
+    because = "".join(f", which needs {what}" for what in said[1:])
+    return Reason(f"{said[0] if said else 'the goal'} can't be reached{because}", tuple(dict.fromkeys(terms)))
 
 
 def _words(fact: Fact) -> tuple[str, ...]:

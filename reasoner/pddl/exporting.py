@@ -161,6 +161,9 @@ class _Export:
         domain_name = self.name("domain", self.problem.scene.rsplit("/", 2)[-2])
         individuals = self.individuals()
         objects = {self.name("object", o): o for o in individuals}
+        for symbol, value in self.problem.goal.items():  # it may name predicates that no action does
+            if symbol.situation in self.situations:
+                self.predicate(symbol.situation, symbol.arguments, value)
         return Exported(
             domain=self.domain_text(domain_name, texts),
             problem=self.problem_text(domain_name, individuals),
@@ -267,6 +270,10 @@ class _Export:
 
     def absence(self, kind: str, situation: str, value: str, action: _Action, where: list[str]) -> None:
         """Add "no individual of the class has the value"."""
+        if self.situations[situation].boolean:
+            for member in self.problem.classes[kind]:
+                self.condition(ValueCondition(situation, (member,), value, True), action, where)
+            return
         if self.exclusive(kind, situation):
             self.free[kind, situation] = None
             where.append(f"({self.free_name(kind, situation)} {self.term(value)})")
@@ -317,7 +324,7 @@ class _Export:
     def possible(self, action: _Action, term: str) -> frozenset[str]:
         """Return what a term can stand for, everything where that isn't known."""
         known = self.members(action, term)
-        return frozenset().union(*self.sets.values()) if term in known and term.startswith("?") else known
+        return frozenset().union(*self.sets.values()) - self.world if term in known and term.startswith("?") else known
 
     def relation(self, relation: str, arguments: Sequence[str]) -> str:
         name = self.name("predicate", f"relation {relation}", relation)

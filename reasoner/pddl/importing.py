@@ -28,7 +28,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, product
 
-from reasoner.pddl.syntax import Action, Form, Pddl, PddlError, Typed, Word
+from reasoner.pddl.syntax import Action, Form, Pddl, PddlError, Typed, Word, either
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -53,7 +53,7 @@ THING = "Thing"
 REACH_GOAL = "reach-goal"
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
 """For a predicate's number of arguments, which one may be the object and which one the value."""
-MOST_COSTS = 200  # of one action
+MOST_COSTS = 200  # of one action; with more it has their mean
 WORLD, THE_WORLD = "World", "the_world"
 """The class, and its only individual, that a predicate without arguments is about."""
 BASE = "https://w3id.org/confab/pddl/"
@@ -117,7 +117,7 @@ def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
     Raises
     ------
     PddlError
-        An action's cost takes too many different values, or adds up several functions.
+        An action's cost adds up several functions.
     """
     table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
@@ -132,6 +132,7 @@ class _Import:
     names: dict[tuple[str, str], str] = field(default_factory=dict)  # (kind, PDDL name) to ours
     taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
     places: dict[str, Place] = field(default_factory=dict)
+    variables: dict[str, str] = field(default_factory=dict)  # ours to PDDL's
 
     def __post_init__(self) -> None:
         self.effects = {name: tuple(_effects(action.effect)) for name, action in self.pddl.actions.items()}
@@ -157,7 +158,12 @@ class _Import:
         return self.name("type", pddl_type, pddl_type[0].upper() + pddl_type[1:])
 
     def term(self, word: str) -> str:
-        return "?" + re.sub(r"[^0-9a-z_]", "_", word[1:]) if word.startswith("?") else self.name("object", word)
+        if not word.startswith("?"):
+            return self.name("object", word)
+        text = re.sub(r"[^0-9a-z_]", "_", word)[1:]
+        while self.variables.setdefault(f"?{text}", word) != word:  # ?a-1 and ?a_1
+            text += "_"
+        return f"?{text}"
 
     # ------------------------------------------------------------------------------------------------ problem
 
@@ -171,7 +177,7 @@ class _Import:
             self.kind(kind): tuple(self.name("object", o) for o in pddl.of_type(kind)) for kind in pddl.types
         }
         parents: dict[str, tuple[str, ...]] = {
-            self.kind(kind): (self.kind(above),) for kind, above in pddl.types.items() if above
+            self.kind(kind): tuple(map(self.kind, above)) for kind, above in pddl.types.items() if above
         }
         relations: dict[str, frozenset[tuple[str, ...]]] = {}
         for predicate, signature in pddl.predicates.items():
@@ -191,6 +197,8 @@ class _Import:
         goal, reach = self.goal(situations)
         if reach:
             behaviors[reach.name] = reach
+        elif not list(_conjuncts(self.pddl.goal)):
+            initial |= goal
         if any(s.arguments == (WORLD,) for s in situations.values()):
             classes[WORLD] = (THE_WORLD,)
         scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
@@ -205,19 +213,18 @@ class _Import:
             name = self.name("situation", "+".join(p.predicate for p in parts), parts[0].predicate.upper())
             own = []
             for part in parts:
-                signature = self.pddl.predicates[part.predicate]
                 if part.counted is None:
                     value = self.name("value", part.predicate, f"{part.predicate}_")
                     own.append(value)
                     self.places[part.predicate] = Place(name, part, value)
                 else:
-                    kind = self.kind(signature[part.counted].type)
+                    kind = self.kind(self.signatures[part.predicate][part.counted])
                     parents[kind] = (*parents.get(kind, ()), name)
                     self.places[part.predicate] = Place(name, part)
             none = self.name("value", name, f"no_{parts[0].predicate}")
             own.append(none)
             classes[name] = tuple(own)
-            key = self.common([self.pddl.predicates[p.predicate][p.key].type for p in parts])
+            key = self.common([self.signatures[p.predicate][p.key] for p in parts])
             found[name] = SituationType(name, (self.kind(key),), name, default=none)
         for kind, above in parents.items():  # the values of a situation type are its class
             for name in above:
@@ -226,11 +233,11 @@ class _Import:
         order = {self.name("object", thing): i for i, thing in enumerate(self.pddl.objects)}
         for name in found:  # objects in declared order, then the values that are no objects
             classes[name] = tuple(sorted(classes[name], key=lambda member: order.get(member, len(order))))
-        for predicate, signature in self.pddl.predicates.items():
+        for predicate, signature in self.signatures.items():
             if predicate in self.places or (predicate not in self.changing and signature):
                 continue
             name = self.name("situation", predicate, predicate.upper())
-            arguments = tuple(self.kind(one.type) for one in signature) or (WORLD,)
+            arguments = tuple(map(self.kind, signature)) or (WORLD,)
             found[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
             self.places[predicate] = Place(name)
         return found
@@ -255,30 +262,32 @@ class _Import:
         return found
 
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal, and the behaviour that reaches it if it isn't a conjunction of facts."""
+        """Return the goal, and the behaviour that reaches it if it isn't a conjunction of facts: none if it is empty."""
         found: dict[Symbol, str] = {}
-        if self.pddl.goal is None:
-            return found, None
         parts = list(_conjuncts(self.pddl.goal))
-        for part in parts:
-            plain = part.items[1] if part.head == "not" else part
-            if not isinstance(plain, Form) or plain.head not in self.places:
-                break
-            condition = self.atom(_words(plain))
-            functional = not situations[condition.situation].boolean
-            symbol = Symbol(condition.situation, condition.arguments)
-            value = FALSE if part.head == "not" else condition.value
-            if (functional and part.head == "not") or found.setdefault(symbol, value) != value:
-                break
-        else:
+        plain = all(self.plain(part, situations, found) for part in parts)
+        if parts and plain:
             return found, None
         name = self.name("situation", "goal reached", "GOAL_REACHED")
         situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
-        action, variables = Action(REACH_GOAL, (), self.pddl.goal, None, Word("", 0, 0)), _Variables(self)
-        conditions = tuple(c for part in parts for c in variables.condition(part, {}))
+        goal, variables = {Symbol(name, (THE_WORLD,)): TRUE}, _Variables(self)
+        if not parts:
+            return goal, None
+        conditions = tuple(c for part in parts for c in variables.condition(part))
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
-        reach = Behavior(self.name("action", action.name, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
-        return {Symbol(name, (THE_WORLD,)): TRUE}, reach
+        reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
+        return goal, reach
+
+    def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
+        """Add a conjunct of the goal to what was found, if it is a fact or a negated boolean one that agrees with the rest."""
+        inner = part.items[1] if part.head == "not" else part
+        if not isinstance(inner, Form) or inner.head not in self.places:
+            return False
+        condition = self.atom(_words(inner))
+        if part.head == "not" and not situations[condition.situation].boolean:
+            return False
+        value = FALSE if part.head == "not" else condition.value
+        return found.setdefault(Symbol(condition.situation, condition.arguments), value) == value
 
     # --------------------------------------------------------------------------------------------- invariants
 
@@ -349,22 +358,38 @@ class _Import:
         return {name: [frozenset(things) for things in positions] for name, positions in found.items()}
 
     @cached_property
+    def signatures(self) -> dict[str, list[str]]:
+        """The types of each predicate's arguments: as declared, or wider where a variable of a wider type stands there."""
+        found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
+        for action in self.pddl.actions.values():
+            types = {p.name: p.type for p in action.parameters}
+            for form in (action.precondition, action.effect):
+                for atom, own in self.atoms_in(form, types) if form else ():
+                    kinds = found[atom[0]]
+                    for position, term in enumerate(atom[1:]):
+                        if term in own:
+                            kinds[position] = self.common([kinds[position], own[term]])
+        return found
+
+    @cached_property
     def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
         """Every atom in a condition, an effect or the goal: its predicate, and the objects each term may stand for."""
         found = []
         for _name, action in self.pddl.actions.items():
             forms = [form for form in (action.precondition, action.effect) if form]
             for atom, own in [pair for form in forms for pair in self.atoms_in(form, {})]:
-                found.append((atom[0], [own.get(t) or self.domain_of(action, t) for t in atom[1:]]))
+                found.append(
+                    (atom[0], [self.sets[own[t]] if t in own else self.domain_of(action, t) for t in atom[1:]])
+                )
         if self.pddl.goal:
             for atom, own in self.atoms_in(self.pddl.goal, {}):
-                found.append((atom[0], [own.get(t, frozenset({t})) for t in atom[1:]]))
+                found.append((atom[0], [self.sets[own[t]] if t in own else frozenset({t}) for t in atom[1:]]))
         return found
 
-    def atoms_in(self, form: Form, own: dict[str, frozenset[str]]) -> list[tuple[Atom, dict[str, frozenset[str]]]]:
-        """Return the atoms of a formula, each with the objects of the quantified variables around it."""
+    def atoms_in(self, form: Form, own: dict[str, str]) -> list[tuple[Atom, dict[str, str]]]:
+        """Return the atoms of a formula, each with the types of the quantified variables around it."""
         if form.head in ("exists", "forall"):
-            own = own | {t.name: self.sets[t.type] for t in _typed(form.items[1])}  # type: ignore[arg-type]
+            own = own | {t.name: t.type for t in _typed(form.items[1])}  # type: ignore[arg-type]
         elif form.head in self.pddl.predicates:
             return [(_words(form), own)]
         return [found for item in form.items[1:] if isinstance(item, Form) for found in self.atoms_in(item, own)]
@@ -449,11 +474,10 @@ class _Import:
     def behaviors(self, name: str, relations: dict[str, frozenset[tuple[str, ...]]]) -> Iterator[Behavior]:
         """Yield the behaviour of an action: one, or one per cost."""
         action, variables = self.pddl.actions[name], _Variables(self)
-        types = {p.name: p.type for p in action.parameters}
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
-        conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form, types))
+        conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form))
         conditions = tuple(dict.fromkeys(conditions))
-        effects = self.value_effects(name, variables, types, conditions)
+        effects = self.value_effects(name, variables, conditions)
         used = {word for atom in _words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
@@ -476,12 +500,10 @@ class _Import:
         for words, number in self.pddl.numbers.items():
             if words[0] == function:
                 by_cost[number].add(tuple(self.name("object", w) for w in words[1:]))
-        if len(by_cost) > MOST_COSTS:
-            raise PddlError(f"action '{name}': its cost {function} takes {len(by_cost)} values, more than {MOST_COSTS}")
+        if not terms or len(by_cost) > MOST_COSTS:
+            yield replace(behavior, cost=constant + sum(by_cost) / max(len(by_cost), 1))
+            return
         for number, rows in sorted(by_cost.items()):
-            if not terms:
-                yield replace(behavior, cost=constant + number)
-                return
             text = f"{number:g}".replace(".", "_").replace("-", "minus_")
             relation = self.name("static", f"{function} = {number}", f"{function}_is_{text}")
             relations[relation] = frozenset(rows)
@@ -490,16 +512,15 @@ class _Import:
             yield replace(behavior, name=own, preconditions=(*conditions, more), cost=constant + number)
 
     def value_effects(
-        self, name: str, variables: _Variables, types: Mapping[str, str], conditions: Sequence[Condition]
+        self, name: str, variables: _Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
         """Return an action's effects, those that end something first."""
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
         effects = self.effects[name]
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
-            inner = {**types, **{v.name: v.type for v in effect.variables}}
             when = tuple(
-                c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, inner, named)
+                c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, named)
             )
             at = self.atom(effect.atom)
             put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
@@ -549,30 +570,26 @@ class _Variables:
         return found
 
     def condition(
-        self, form: Form, types: Mapping[str, str], named: Mapping[str, str] | None = None, negated: bool = False
+        self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
         """Yield the conditions whose conjunction a formula is."""
         table, named = self.table, named or {}
         head, rest = form.head, [item for item in form.items[1:] if isinstance(item, Form)]
         if head == "not":
-            yield from self.condition(rest[0], types, named, not negated)
+            yield from self.condition(rest[0], named, not negated)
         elif head == "and" and not negated:
             for part in rest:
-                yield from self.condition(part, types, named)
+                yield from self.condition(part, named)
         elif head == "and":
-            yield AnyOf((tuple(c for part in rest for c in self.condition(part, types, named)),), True)
+            yield AnyOf((tuple(c for part in rest for c in self.condition(part, named)),), True)
         elif head in ("or", "imply"):
-            groups = [
-                tuple(self.condition(part, types, named, head == "imply" and i == 0)) for i, part in enumerate(rest)
-            ]
+            groups = [tuple(self.condition(part, named, head == "imply" and i == 0)) for i, part in enumerate(rest)]
             yield AnyOf(tuple(groups), negated)
         elif head in ("exists", "forall"):
             typed = _typed(form.items[1])  # type: ignore[arg-type]
             inner = dict(named) | self.renamed(typed)
             flip = head == "forall"
-            conditions = tuple(
-                self.condition(rest[1], {**types, **{t.name: t.type for t in typed}}, inner, negated=flip)
-            )
+            conditions = tuple(self.condition(rest[1], inner, negated=flip))
             for one in reversed(typed[1:]):
                 conditions = (Witness(inner[table.term(one.name)], table.kind(one.type), conditions),)
             first = typed[0] if typed else None
@@ -581,11 +598,9 @@ class _Variables:
             else:
                 yield Witness(inner[table.term(first.name)], table.kind(first.type), conditions, negated is not flip)
         else:
-            yield from self.literal(_words(form), types, named, negated)
+            yield from self.literal(_words(form), named, negated)
 
-    def literal(
-        self, atom: Atom, types: Mapping[str, str], named: Mapping[str, str], negated: bool
-    ) -> Iterator[Condition]:
+    def literal(self, atom: Atom, named: Mapping[str, str], negated: bool) -> Iterator[Condition]:
         table = self.table
 
         def put(terms: Sequence[str]) -> tuple[str, ...]:
@@ -595,18 +610,7 @@ class _Variables:
             yield EqualityCondition(put([table.term(atom[1])])[0], put([table.term(atom[2])])[0], negated)
         elif atom[0] in table.places:
             at = table.atom(atom)
-            found = ValueCondition(at.situation, put(at.arguments), put([at.value])[0], negated)
-            declared = table.pddl.predicates[atom[0]]
-            wider = [
-                ClassCondition(put([table.term(t)])[0], table.kind(d.type))
-                for t, d in zip(atom[1:], declared, strict=True)
-                if t in types and d.type not in table.pddl.above(types[t])
-            ]
-            if wider and negated:
-                yield AnyOf(((replace(found, negated=False), *wider),), True)
-            else:
-                yield found
-                yield from wider
+            yield ValueCondition(at.situation, put(at.arguments), put([at.value])[0], negated)
         elif len(atom) == 2:
             yield ClassCondition(put([table.term(atom[1])])[0], table.names["static", atom[0]], negated)
         else:
@@ -618,15 +622,17 @@ def _typed(form: Form) -> list[Typed]:
     """Return the variables of a quantifier, which have been checked before."""
     found: list[Typed] = []
     waiting: list[Word] = []
-    items = [w for w in form.items if isinstance(w, Word)]
-    position = 0
-    while position < len(items):
-        if items[position].text == "-":
-            found += [Typed(w.text, items[position + 1].text, w) for w in waiting]
-            waiting, position = [], position + 2
+    items = iter(form.items)
+    for item in items:
+        assert isinstance(item, Word)
+        if item.text == "-":
+            kind = next(items)
+            found += [
+                Typed(w.text, kind.text if isinstance(kind, Word) else either(_words(kind)[1:]), w) for w in waiting
+            ]
+            waiting = []
         else:
-            waiting.append(items[position])
-            position += 1
+            waiting.append(item)
     return [*found, *(Typed(w.text, "object", w) for w in waiting)]
 
 

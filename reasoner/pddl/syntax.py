@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 MOST_BYTES = 32 * 2**20
-TOKEN = re.compile(r"[()]|[^\s();]+|;[^\n]*|\s+")
+TOKEN = re.compile(r"[()]|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")  # a variable begins at its '?', as in (aircraft?a)
 SECTIONS = {
     ":durative-action": "durative actions",
     ":derived": "derived predicates",
@@ -83,7 +83,7 @@ class Pddl:
 
     domain: str = "domain"
     problem: str = "problem"
-    types: dict[str, str] = field(default_factory=lambda: {"object": ""})  # and the type above
+    types: dict[str, tuple[str, ...]] = field(default_factory=lambda: {"object": ()})  # and the types right above
     predicates: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
@@ -93,15 +93,29 @@ class Pddl:
     goal: Form | None = None
     minimize: bool = False
 
-    def above(self, name: str) -> Iterator[str]:
-        """Yield a type and those above it."""
-        while name:
-            yield name
-            name = self.types[name]
+    def above(self, name: str) -> Sequence[str]:
+        """Return a type and those above it, from the nearest to ``object``."""
+        found = {name: None}
+        layer = [name]
+        while layer:
+            layer = [kind for lower in layer for kind in self.types[lower] if kind not in found and kind != "object"]
+            found |= dict.fromkeys(layer)
+        return tuple(found) if name == "object" else (*found, "object")
 
     def of_type(self, name: str) -> tuple[str, ...]:
         """Return the objects of a type."""
-        return tuple(o for o, t in self.objects.items() if name in self.above(t))
+        kinds = {kind for kind in self.types if name in self.above(kind)}
+        return tuple(o for o, t in self.objects.items() if t in kinds)
+
+
+def either(kinds: Sequence[str]) -> str:
+    """Return the name of the type above some types.
+
+    >>> either(["person", "aircraft"])
+    'either aircraft person'
+    """
+    kinds = sorted(set(kinds))
+    return "object" if "object" in kinds else kinds[0] if len(kinds) == 1 else f"either {' '.join(kinds)}"
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
@@ -233,7 +247,7 @@ class _Reader:
                 self.objects(section.items[1:])
             elif section.head == ":metric":
                 self.metric(section)
-            elif section.head not in (":requirements", ":domain", ":init", ":goal"):
+            elif section.head not in (":requirements", ":domain", ":init", ":goal", ":length"):
                 raise self.fail(section, f"unknown section {section.head} in a problem")
         for wanted in (":init", ":goal"):
             if wanted not in sections:
@@ -252,9 +266,11 @@ class _Reader:
 
     def metric(self, form: Form) -> None:
         words = form.items[1:]
-        self.pddl.minimize = len(words) == 2 and isinstance(words[1], Form) and words[1].head == "total-cost"
-        if not self.pddl.minimize or self.word(words[0], "minimize").text != "minimize":
+        wanted = words[1] if len(words) == 2 and self.word(words[0], "minimize").text == "minimize" else None
+        head = wanted.head if isinstance(wanted, Form) else wanted.text if wanted else ""
+        if head not in ("total-cost", "total-time"):
             raise self.fail(form, "the only metric supported is (:metric minimize (total-cost))")
+        self.pddl.minimize = head == "total-cost"
 
     def typed(self, items: Sequence[Word | Form], declaring: bool = False) -> list[Typed]:
         """Return ``a b - t c`` as typed names; without a type they are objects."""
@@ -262,47 +278,56 @@ class _Reader:
         waiting: list[Word] = []
         position = 0
         while position < len(items):
-            word = self.word(items[position], "a name") if not isinstance(items[position], Form) else None
-            if word is None:
-                raise self.fail(items[position], "wanted a name, got a list")
+            word = self.word(items[position], "a name")
             if word.text == "-":
                 if position + 1 == len(items):
                     raise self.fail(word, "wanted a type behind '-'")
-                kind = items[position + 1]
-                if isinstance(kind, Form):
-                    raise self.fail(kind, "(either …) types are not supported; declare a type above them")
-                if kind.text not in self.pddl.types and not declaring:
-                    known = ", ".join(sorted(self.pddl.types))
-                    raise self.fail(kind, f"undefined type '{kind.text}' (known: {known})")
-                found += [Typed(name.text, kind.text, kind) for name in waiting]
+                kind = self.kind(items[position + 1], declaring)
+                found += [Typed(name.text, kind, name) for name in waiting]
                 waiting, position = [], position + 2
                 continue
             waiting.append(word)
             position += 1
         return [*found, *(Typed(name.text, "object", name) for name in waiting)]
 
+    def kind(self, item: Word | Form, declaring: bool) -> str:
+        """Return a type's name. What is ``(either a b)`` becomes a type of that name above `a` and `b`."""
+        if isinstance(item, Form):
+            words = [self.word(one, "a type") for one in item.items[1:]]
+            if item.head != "either" or not words:
+                raise self.fail(item, "wanted a type or (either TYPE …)")
+            kinds = [self.kind(word, declaring) for word in words]
+            name = either(kinds)
+            if name not in (*self.pddl.types, *kinds):
+                self.pddl.types[name] = ("object",)
+                for kind in set(kinds):
+                    self.pddl.types[kind] = (*self.pddl.types.get(kind, ()), name)
+            return name
+        if item.text not in self.pddl.types and not declaring:
+            known = ", ".join(sorted(self.pddl.types))
+            raise self.fail(item, f"undefined type '{item.text}' (known: {known})")
+        return item.text
+
     def types(self, items: Sequence[Word | Form]) -> None:
+        """Take types; one that is declared twice, or as ``either``, has several above it."""
         declared = self.typed(items, declaring=True)
         for one in declared:
             if one.name != "object":
-                self.pddl.types[one.name] = one.type
+                higher = one.type.split()[1:] if one.type.startswith("either ") else [one.type]
+                self.pddl.types[one.name] = tuple(dict.fromkeys((*self.pddl.types.get(one.name, ()), *higher)))
+        for kind in [kind for above in self.pddl.types.values() for kind in above]:
+            self.pddl.types.setdefault(kind, ("object",))
         for one in declared:
-            self.pddl.types.setdefault(one.type, "object")
-        for one in declared:
-            above, name = [], one.name
-            while name:
-                if name in above:
-                    raise self.fail(one.place, f"type '{one.name}' is above itself")
-                above.append(name)
-                name = self.pddl.types[name]
+            if any(one.name in self.pddl.above(kind) for kind in self.pddl.types[one.name]) and one.name != "object":
+                raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[Word | Form]) -> None:
+        """Take objects; one that is declared twice is of the lower of its types."""
         for one in self.typed(items):
-            if self.pddl.objects.get(one.name, one.type) != one.type:
-                raise self.fail(
-                    one.place, f"'{one.name}' is declared as {self.pddl.objects[one.name]} and as {one.type}"
-                )
-            self.pddl.objects[one.name] = one.type
+            known = self.pddl.objects.get(one.name, one.type)
+            if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
+                raise self.fail(one.place, f"'{one.name}' is declared as {known} and as {one.type}")
+            self.pddl.objects[one.name] = known if one.type in self.pddl.above(known) else one.type
 
     def signatures(self, items: Sequence[Word | Form], what: str) -> Iterator[tuple[str, tuple[Typed, ...]]]:
         for item in items:
@@ -459,11 +484,19 @@ class _Reader:
             raise self.fail(form, f"{what} '{form.head}' takes {len(wanted)} arguments, got {len(got)}")
         for item, declared in zip(got, wanted, strict=True):
             kind = self.term(item, variables)
-            fits = declared.type in self.pddl.above(kind) or kind in self.pddl.above(declared.type)
-            if not fits:
+            above = self.pddl.above(kind)
+            if (
+                declared.type not in above
+                and kind not in self.pddl.above(declared.type)
+                and not self.meet(kind, declared)
+            ):
                 text = self.word(item, "a term").text
                 raise self.fail(item, f"'{text}' is a {kind}; {what} '{form.head}' takes a {declared.type} there")
         return (form.head, *(self.word(item, "a term").text for item in got))
+
+    def meet(self, kind: str, declared: Typed) -> bool:
+        """Return whether some type lies below two types."""
+        return any({kind, declared.type} <= set(self.pddl.above(lower)) for lower in self.pddl.types)
 
     def term(self, item: Word | Form, variables: Mapping[str, str]) -> str:
         """Return the type of a variable or object."""
@@ -485,6 +518,8 @@ class _Reader:
         if item.head == "at" and len(item.items) == 3 and _is_number(item.items[1]):
             raise self.fail(item, "timed initial literals are not supported")
         if item.head == "=":
+            if [isinstance(word, Word) and word.text for word in item.items[1:]] in ([o, o] for o in self.pddl.objects):
+                return  # (= a a)
             if len(item.items) != 3 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (= (function …) NUMBER)")
             words = self.atom(item.items[1], {}, self.pddl.functions, "function")
