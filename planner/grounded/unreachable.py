@@ -39,8 +39,9 @@ def blocked(task: Task) -> Reason:
             if reached & need == need:
                 for bit in add:
                     reached |= 1 << bit
-    wanted, seen, terms = task.goal & ~reached, set(), []
+    wanted, seen = task.goal & ~reached, set()
     said: list[str] = []
+    terms: list[str] = []
     while wanted and len(said) <= DEPTH:
         bit = (wanted & -wanted).bit_length() - 1
         fact = task.facts[bit] if bit < len(task.facts) else task.complements.get(bit)

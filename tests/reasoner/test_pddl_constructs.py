@@ -487,7 +487,7 @@ def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> No
 @pytest.mark.parametrize(
     ("domain", "message"),
     [
-        ("(:types a) (:predicates (p ?x - (or a a)))", "domain:1:51: wanted a type or (either TYPE …)"),
+        ("(:types a) (:predicates (p ?x - (or a a)))", "domain:1:52: wanted a type or (either TYPE …)"),
         ("(:types a) (:predicates (p ?x - (either a c)))", "domain:1:62: undefined type 'c' (known: a, object)"),
         ("(:types a - b b - a)", "domain:1:28: type 'a' is above itself"),
     ],
