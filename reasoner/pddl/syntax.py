@@ -518,8 +518,8 @@ class _Reader:
         if item.head == "at" and len(item.items) == 3 and _is_number(item.items[1]):
             raise self.fail(item, "timed initial literals are not supported")
         if item.head == "=":
-            words = [word.text for word in item.items[1:] if isinstance(word, Word)]
-            if len(words) == 2 and words[0] == words[1] in self.pddl.objects:
+            names = [word.text for word in item.items[1:] if isinstance(word, Word)]
+            if len(names) == 2 and names[0] == names[1] in self.pddl.objects:
                 return  # (= a a)
             if len(item.items) != 3 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (= (function …) NUMBER)")
