@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -262,15 +262,21 @@ class Scene:
                     return optimal_plan(problem, limits=limits, using=using)
                 return guided_plan(problem, advisor, mode, limits=limits, using=using)
 
-            seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
-            problem = with_goals(seen, goals)
+            if observed:
+                problem = with_goals(self._seen(self.reading, observed), goals)
+            else:
+                seen = recognise(self.knowledge, goals)
+                problem = seen.problem
             quantified = perf_counter() - begin
             self._check_goal(problem)
             outcome = search(problem)
-            if outcome.status is Status.UNSOLVABLE and not seen.whole:
+            if outcome.status is Status.UNSOLVABLE and not observed:
                 # A "no" is worth a look at the whole world, whatever task recognition left out of it.
-                problem = with_goals(self.reading, goals)
-                outcome = search(problem)
+                if "reading" not in self.__dict__:
+                    self.reading = read(self.knowledge, seen.schema)
+                whole = replace(self.problem, goal=problem.goal)
+                if whole != problem:
+                    problem, outcome = whole, search(whole)
         queries = self.knowledge.round_trips - asked
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
 
@@ -278,9 +284,12 @@ class Scene:
         """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type."""
         if not problem.goal:
             raise KnowledgeError(f"{self.iri} has no task with goals; plan in a scene that has one, or give a goal")
+        allowed = {
+            name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()
+        }
         for symbol, value in problem.goal.items():
-            values = problem.classes.get(problem.domain.situations[symbol.situation].range, ())
-            if value not in (*values, TRUE, FALSE):
+            if value not in allowed[symbol.situation]:
+                values = allowed[symbol.situation] - {TRUE, FALSE}
                 raise KnowledgeError(
                     f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}"
                 )
@@ -310,11 +319,12 @@ class Scene:
         from confab.execution import execute, planner_of
         from confab.interchange import read_plan
 
-        problem = with_goals(self.reading, goals)
         if isinstance(plan, Result):
             problem, plan = plan.problem, plan.plan
-        elif isinstance(plan, str | Path):
-            plan = read_plan(Path(plan), problem)
+        else:
+            problem = with_goals(self.reading, goals)
+            if isinstance(plan, str | Path):
+                plan = read_plan(Path(plan), problem)
         planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
         if planner is None and memory is not None and not isinstance(memory, Links):
             from planner.experience.portfolio import planner_with

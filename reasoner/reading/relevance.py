@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import pyoxigraph as ox
@@ -35,6 +35,7 @@ from reasoner.reading.problem import (
     frame,
     read_schema,
     reading_of,
+    with_goals,
 )
 from reasoner.symbols import (
     FALSE,
@@ -77,7 +78,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ----------
     graph : KnowledgeGraph
     goals : sequence of str
-        Goals that will replace some of the task's (`reasoner.reading.problem.with_goals`): what they name is read as well.
+        Goals that replace some of the task's, as in `reasoner.reading.problem.with_goals`; what they name is read as well.
 
     Returns
     -------
@@ -105,7 +106,8 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     search.close(fresh, constants, bounds)
     members = search.members()
     known = frame(schema, members, _namesakes(graph, schema, members), lifted)
-    return reading_of(graph.scene, known, search.facts(known), search.tuples(), whole=False)
+    reading = reading_of(graph.scene, known, search.facts(known), search.tuples(), whole=False)
+    return replace(reading, problem=with_goals(reading, goals))
 
 
 # ------------------------------------------------------------------------------------------------- 1. what leads to what
