@@ -98,16 +98,18 @@ class KnowledgeGraph:
         KnowledgeError
             The query is no SPARQL; the message has line and column.
         """
+        return [tuple(row) for row in self.solutions(query, graphs, **bindings)]
+
+    def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
+        """Return what `select` returns one row after the other, for those who read very many; errors as there."""
         answer = self.query(query, graphs, **bindings)
         if not isinstance(answer, ox.QuerySolutions):
             raise KnowledgeError(NO_ROWS)
-        return [tuple(row) for row in answer]
+        return answer
 
     def table(self, query: str) -> tuple[tuple[str, ...], list[Row]]:
         """Return columns and rows of a SELECT query on the union of the graphs; errors as in `select`."""
-        answer = self.query(query)
-        if not isinstance(answer, ox.QuerySolutions):
-            raise KnowledgeError(NO_ROWS)
+        answer = self.solutions(query)
         return tuple(variable.value for variable in answer.variables), [tuple(row) for row in answer]
 
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, product
 
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Row, Term, text
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Term, text
 from reasoner.names import Names, local_name, nearest
 from reasoner.reading.definitions import EXPRESSIONS, Definitions
 from reasoner.symbols import (
@@ -172,8 +172,8 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
 def read_schema(graph: KnowledgeGraph) -> Schema:
     """Read what doesn't depend on how many individuals there are, in one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
-    for row in graph.select(SCHEMA, SCENE):
-        parts[text(row[0])].append(_triple(row[1:]))
+    for part, *row in graph.solutions(SCHEMA, SCENE):
+        parts[text(part)].append(_triple(row))
     return Schema(
         nodes=_nodes(parts["node"]),
         supers=_superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
@@ -344,7 +344,7 @@ def _nodes(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[
     return dict(sorted(nodes.items()))
 
 
-def _triple(row: Row) -> tuple[str, str, str]:
+def _triple(row: Sequence[Term]) -> Triple:
     subject, predicate, value = map(text, row)
     return subject, predicate, value
 

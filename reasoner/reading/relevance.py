@@ -15,7 +15,6 @@ docs/quantification.md, the test in tests/reasoner/test_recognition.py). Two ste
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -53,6 +52,7 @@ ROUNDS = 6
 PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
 """What leads from a fact that is a node of its own to the individuals in it."""
 NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
+INDEX = CORE + "index"
 FACT = CORE + "SituatedObjectInstance"
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps that reach a term is taken
 
@@ -299,14 +299,14 @@ class _Search:
 
     Attributes
     ----------
-    said : mapping of individual to property to values
-        All that is said of those in `seen`, and what was found backward of others.
+    triples : set of triples
+        All that is said of those in `seen`, and what was found backward of others, in the order of reading.
     seen : set of individuals
     """
 
     def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
         self.graph, self.schema = graph, schema
-        self.said: defaultdict[str, defaultdict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self.triples: dict[Triple, None] = {}
         self.seen: set[str] = set()
 
     def visit(
@@ -327,12 +327,13 @@ class _Search:
                 )
         for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
-        rows = []
-        for s, p, o in self.graph.select("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
-            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode):
-                row = (s.value, text(p), text(o))
-                rows.append(row)
-                self.said[row[0]][row[1]].add(row[2])
+        answer = self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE)
+        rows = [
+            (s.value, p.value, o.value)
+            for s, p, o in answer
+            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode)
+        ]
+        self.triples.update(dict.fromkeys(rows))
         kinds = self._below(classes)
         self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
         return rows
@@ -357,7 +358,7 @@ class _Search:
         if reached - asked:
             self._close_by_path(reached - asked, bounds)
 
-    def _follow(self, triples: Iterable[Triple], bounds: Routes, reached: set[str]) -> None:
+    def _follow(self, triples: Sequence[Triple], bounds: Routes, reached: set[str]) -> None:
         """Add to `reached` where some triples lead."""
         kinds = self._below(bounds.classes)
         facts = set[str]()
@@ -373,8 +374,8 @@ class _Search:
                 reached.add(s)
             elif p == TYPE and o == FACT:
                 facts.add(s)
-        for s in facts:
-            reached.update(o for p in PLACES for o in self.said[s].get(p, ()))
+        if facts:
+            reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _below(self, classes: Iterable[str]) -> set[str]:
         """Return some classes with their subclasses."""
@@ -399,33 +400,37 @@ class _Search:
 
     def members(self) -> list[Member]:
         """Return what was read as individuals of classes."""
-        found = []
-        for s in self.seen:
-            said: Mapping[str, set[str]] = self.said.get(s, {})
-            if INDIVIDUAL in said.get(TYPE, ()):
-                index = min(map(int, said.get(CORE + "index", ())), default=FIRST_INDEX_OF_NONE)
-                found += [(s, o, index) for o in said[TYPE] if not o.startswith(OWL)]
-        return found
+        named = set[str]()
+        kinds: list[tuple[str, str]] = []
+        indices: dict[str, int] = {}
+        for s, p, o in self.triples:
+            if p == TYPE and o == INDIVIDUAL:
+                named.add(s)
+            elif p == TYPE and not o.startswith(OWL):
+                kinds.append((s, o))
+            elif p == INDEX:
+                indices[s] = min(int(o), indices.get(s, FIRST_INDEX_OF_NONE))
+        named &= self.seen
+        return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
 
-    def facts(self, known: Frame) -> Iterator[Triple]:
-        """Yield the values and relations that were read, between individuals whose own triples were read."""
-        wanted = known.properties.keys() | self.schema.nodes.keys()
-        for s in self.seen:
-            for p, values in self.said.get(s, {}).items():
-                if p in wanted:
-                    yield from ((s, p, o) for o in values if o in self.seen)
+    def facts(self, known: Frame) -> list[Triple]:
+        """Return the values and relations that were read, between individuals whose own triples were read."""
+        wanted, seen = known.properties.keys() | self.schema.nodes.keys(), self.seen
+        return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and o in seen]
 
     def tuples(self) -> dict[str, Node]:
         """Return the facts that are nodes of their own, as far as all individuals in them were read."""
-        if not self.schema.tuples:
-            return {}
         nodes = self.schema.nodes
+        facts = (
+            {s for s, p, o in self.triples if p == TYPE and o == FACT} - nodes.keys() if self.schema.tuples else set()
+        )
+        found: dict[str, dict[str, list[str]]] = {}
+        for s, p, o in sorted(triple for triple in self.triples if triple[0] in facts):
+            found.setdefault(s, {}).setdefault(p, []).append(o)
         return {
-            s: {p: sorted(values) for p, values in said.items()}
-            for s, said in sorted(self.said.items())
-            if s not in nodes
-            and FACT in said.get(TYPE, ())
-            and all(o in self.seen for p in PLACES for o in said.get(p, ()) if o not in nodes)
+            s: node
+            for s, node in found.items()
+            if all(o in self.seen for p in PLACES for o in node.get(p, ()) if o not in nodes)
         }
 
 
