@@ -549,12 +549,12 @@ def _load(source: str, iri: str | None = None) -> Scene:
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     """Return the memory to plan with, if one was asked for."""
-    from confab.memory import Memory
-
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:
         return None
+    from confab.memory import Memory
+
     try:
         if path.is_file():
             from confab.authoring import unknown_terms
@@ -620,13 +620,12 @@ def _print(what: Any) -> None:
 def main() -> NoReturn:
     """Run the command line; turn errors into one clear line and an exit code."""
     from planner.paper.transitions import DomainError
-    from reasoner.embodiment.reading import EmbodimentError
 
     try:
         code = app(prog_name="confab", standalone_mode=False)
     except CLICK_ERROR as error:
         _complain(_usage(error))
-    except (KnowledgeError, DomainError, EmbodimentError) as error:
+    except (KnowledgeError, DomainError) as error:
         _complain(str(error))
     except OSError as error:
         _complain(f"{error.filename or 'file'}: {error.strerror or error}")

@@ -9,8 +9,6 @@ import pyoxigraph as ox
 
 import ontology
 from confab.scene import Scene
-from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
-from reasoner.embodiment.reading import EmbodimentError
 from reasoner.graph.knowledge import BASE, KnowledgeError
 
 log = logging.getLogger(__name__)
@@ -36,7 +34,7 @@ def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:
         if file.is_file():
             file.touch()
         return reached
-    except (KnowledgeError, EmbodimentError, OSError) as error:
+    except (KnowledgeError, OSError) as error:
         tell(f"what the hands reach isn't known: {error}")
         return scene
 
@@ -49,9 +47,10 @@ def with_reach(scene: Scene) -> Scene:
 
     Raises
     ------
-    KnowledgeError, EmbodimentError
+    KnowledgeError
         The scene is symbolic only, or lacks something that physics needs.
     """
+    from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
     from sim.reach import fingerprint, reach
 
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):

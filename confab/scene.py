@@ -251,7 +251,6 @@ class Scene:
             outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
         else:
             from planner.experience.portfolio import plan as guided_plan
-            from planner.hierarchical.bounds import plan as optimal_plan
             from planner.hierarchical.planner import compiled
 
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
@@ -259,6 +258,8 @@ class Scene:
             def search(problem: Problem) -> Outcome:
                 using = compiled(problem)
                 if optimal:
+                    from planner.hierarchical.bounds import plan as optimal_plan
+
                     return optimal_plan(problem, limits=limits, using=using)
                 return guided_plan(problem, advisor, mode, limits=limits, using=using)
 

@@ -29,6 +29,7 @@ from reasoner.embodiment.values import (
     SkillUse,
     Vector,
 )
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import local_name
 
 PREFIXES = {
@@ -74,7 +75,7 @@ PALETTE: tuple[Color, ...] = (
 GREY = "0.7 0.7 0.7 1"
 
 
-class EmbodimentError(ValueError):
+class EmbodimentError(KnowledgeError):
     """What the ontology says about bodies can't be used; the message says what, where, and what to do."""
 
 

@@ -10,7 +10,6 @@ subclasses): `needed` asks for that. What RL can't conclude is said in docs/infe
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -116,6 +115,8 @@ def _of_behaviors(iri: str) -> bool:
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
     """Yield the closure of some triples, those of IRIs only."""
+    import tempfile
+
     import reasonable
 
     with tempfile.TemporaryDirectory() as folder:

@@ -1,0 +1,154 @@
+"""What a call costs, counted: what recognition reads and looks at, how often the store is asked, what the command imports."""
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pyoxigraph as ox
+import pytest
+import rdflib
+from rdflib.plugins.stores.memory import SimpleMemory
+
+import confab
+from reasoner.generate import write_scene
+from reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load
+from reasoner.reading.problem import SCHEMA
+from reasoner.reading.relevance import recognise
+
+
+class Looked(SimpleMemory):
+    """The triples of a knowledge graph as rdflib's query engine sees them, each counted that it looks at."""
+
+    def __init__(self, store: ox.Store) -> None:
+        super().__init__()
+        self.store, self.count = store, 0
+
+    def triples(self, triple_pattern: Any, context: Any = None) -> Iterator[Any]:
+        """Yield what fits a pattern."""
+        s, p, o = (None if term is None else to_oxigraph(term) for term in triple_pattern)
+        for graph in SCENE:
+            for quad in self.store.quads_for_pattern(s, p, o, ox.NamedNode(BASE + graph)):
+                self.count += 1
+                yield (to_rdflib(quad.subject), to_rdflib(quad.predicate), to_rdflib(quad.object)), iter(())
+
+
+def to_oxigraph(term: Any) -> Any:
+    """Return a term of rdflib's as one of pyoxigraph's."""
+    if isinstance(term, rdflib.Literal):
+        return (
+            ox.Literal(str(term), language=term.language)
+            if term.language
+            else ox.Literal(str(term), datatype=ox.NamedNode(str(term.datatype or rdflib.XSD.string)))
+        )
+    return ox.BlankNode(str(term)) if isinstance(term, rdflib.BNode) else ox.NamedNode(str(term))
+
+
+def to_rdflib(term: Any) -> Any:
+    """Return a term of pyoxigraph's as one of rdflib's."""
+    if isinstance(term, ox.Literal):
+        named = None if term.language else rdflib.URIRef(term.datatype.value)
+        return rdflib.Literal(term.value, lang=term.language, datatype=named)
+    return rdflib.BNode(term.value) if isinstance(term, ox.BlankNode) else rdflib.URIRef(term.value)
+
+
+@dataclass
+class Counting:
+    """A store elsewhere, which counts what it is asked, what it answers and what it looks at for that.
+
+    It works a query out as it is written, from one bound pattern to the next, as plain engines do: what it looks at is what
+    the query needs of the world, not what one engine's optimiser makes of it. Only the query for the schema, which is the
+    same for every task, is left to Oxigraph, and its rows alone are counted.
+    """
+
+    graph: KnowledgeGraph
+    counts: Counter[str] = field(default_factory=Counter)
+
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+        """Answer a query."""
+        looked = Looked(self.graph.store)
+        if query == SCHEMA:
+            data = self.graph.solutions(query, SCENE).serialize(format=ox.QueryResultsFormat.JSON) or b""
+        else:
+            data = rdflib.Graph(looked).query(query, initNs=dict(prefixes)).serialize(format="json") or b""
+        rows = json.loads(data)["results"]["bindings"]
+        self.counts += Counter(
+            queries=1,
+            rows=len(rows),
+            bytes=len(query) + sum(len(t["value"]) for row in rows for t in row.values() if t["type"] != "bnode"),
+            looked=looked.count,
+        )
+        return ox.parse_query_results(data, format=ox.QueryResultsFormat.JSON)
+
+
+def counted(path: Path, goals: tuple[str, ...] = ()) -> Counter[str]:
+    """Return what recognition costs in a scene."""
+    graph = load(path)
+    remote = Counting(graph)
+    there = KnowledgeGraph(graph.scene, remote=remote)
+    assert recognise(there, goals).problem == recognise(graph, goals).problem
+    return remote.counts
+
+
+@pytest.mark.parametrize("goals", [(), ("cup1 LOCATION location3",)])
+def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: tuple[str, ...]) -> None:
+    """A task among 20,000 irrelevant objects costs the queries, rows, bytes and looks that it costs alone."""
+    path = tmp_path / "scene.ttl"
+    write_scene(path, "served")
+    alone = counted(path, goals)
+    assert alone["queries"] == 6 + bool(goals)
+    for clutter in (1_000, 20_000):
+        write_scene(path, "served", clutter=clutter)
+        assert counted(path, goals) == alone
+
+
+def test_a_call_asks_the_store_few_questions() -> None:
+    """Two and one per file for loading; six for recognition, and one more that finds what a changed goal names."""
+    scene = confab.load("beverage-serving")
+    assert scene.knowledge.round_trips == 2 + len(scene.knowledge.files)
+    assert scene.plan().queries == 6
+    assert scene.plan(["cup1 BEVERAGE no_beverage"]).queries == 7
+
+
+def test_a_no_reads_the_schema_once(tmp_path: Path) -> None:
+    """Three queries look at the individuals that were left out: what they are, what is said of them, and facts in nodes."""
+    write_scene(tmp_path / "scene.ttl", "unsolvable", clutter=10)
+    scene = confab.load(tmp_path / "scene.ttl")
+    result = scene.plan()
+    assert not result.solved
+    assert result.queries == 6 + 3
+
+
+UNWANTED = {
+    "rdflib",
+    "owlready2",
+    "pybullet",
+    "networkx",
+    "matplotlib",
+    "pyshacl",
+    "reasonable",
+    "urllib3",
+    "imageio",
+    "numba",
+}
+"""What a plan in a shipped scene has no use for: heavy, and kept for other commands."""
+
+
+def test_the_plan_command_imports_what_it_needs() -> None:
+    script = (
+        "import sys; sys.argv = ['confab', 'plan', 'beverage-serving']\n"
+        "from confab.cli import main\n"
+        "try: main()\n"
+        "finally: print(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    modules = done.stderr.split()
+    rooms = Counter(name.split(".")[0] for name in modules)
+    assert not UNWANTED & rooms.keys()
+    assert "sim" not in rooms
+    assert rooms["reasoner"] <= 15, [name for name in modules if name.startswith("reasoner")]
+    assert rooms["confab"] <= 8, [name for name in modules if name.startswith("confab")]
