@@ -45,7 +45,7 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, PREFIXES, RDF, TYPE
 
 ROUNDS = 6
 """Queries that follow routes one step each; what lies farther is closed by a property path, of which the last is one."""
@@ -435,13 +435,13 @@ class _Search:
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
-    """Return what ends like an individual or class of a part of the scene, in the namespace of any of its ontologies.
+    """Return what ends like an individual or class of a part of the scene, in any namespace that is known.
 
     Each IRI that it can be is looked up by itself: no row is read of anything else.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
-    candidates = {space + ending for space in _spaces(schema, terms) for ending in endings} - terms
+    candidates = {space + ending for space in _spaces(graph, schema, terms) for ending in endings} - terms
     if not candidates:
         return set()
     rows = graph.select(
@@ -452,9 +452,10 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     return {text(x) for (x,) in rows}
 
 
-def _spaces(schema: Schema, terms: Iterable[str]) -> set[str]:
-    """Return the namespaces of some terms, and those of the ontologies in which none of them is."""
+def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[str]:
+    """Return the namespaces of some terms, those for which files have prefixes, and those of other ontologies."""
     found = {iri.removesuffix(local_name(iri)) for iri in terms if ":" in iri}
+    found |= {*graph.prefixes.values()} - ({*PREFIXES.values()} - {CORE})
     for ontology in schema.ontologies:
         both = {ontology.rstrip("#/") + mark for mark in "#/"}
         found |= set() if both & found else both
@@ -499,7 +500,7 @@ def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[s
     words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split()}
     if not words:
         return set()
-    spaces = _spaces(schema, chain(schema.nodes, schema.supers, _goal_individuals(schema))) | {*graph.prefixes.values()}
+    spaces = _spaces(graph, schema, chain(schema.nodes, schema.supers, _goal_individuals(schema)))
     rows = graph.select(
         f"SELECT ?x WHERE {{ VALUES ?x {{ {_values(space + word for space in spaces for word in words)} }} "
         "FILTER EXISTS { ?x a owl:NamedIndividual } }",

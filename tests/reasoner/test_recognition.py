@@ -222,3 +222,34 @@ def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -
         (tmp_path / Path(name).name.replace("one-arm", "one-hand")).write_text(text, encoding="utf-8")
     graph = load(tmp_path / "one-hand-serving.ttl")
     assert recognise(graph).problem.classes["Hand"] == read(graph).problem.classes["Hand"] == ("one-hand:hand",)
+
+
+@pytest.mark.parametrize("where", ["prefix", "import", "class"])
+def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_path: Path, where: str) -> None:
+    """Another cup1, far away in a namespace of its own, isn't read; the cup1 of the task is called as in the whole scene."""
+    space, text = "<https://example.org/far#{}>", generate("served", clutter=5)
+    cup, shelf, cat = map(space.format, ("cup1", "shelf", "cat"))
+    more = f"{cup} a owl:NamedIndividual, k:Cup ; k:location {shelf} ; k:beverage k:no_beverage .\n"
+    more += f"{shelf} a owl:NamedIndividual, k:Location .\n"
+    if where == "class":
+        more = f"{cup} a owl:Class . {cat} a owl:NamedIndividual, {cup} .\n"
+    if where == "import":
+        head = "".join(line for line in text.splitlines(keepends=True) if line.startswith("@prefix"))
+        (tmp_path / "far.ttl").write_text(f"{head}<https://example.org/far> a owl:Ontology .\n{more}", encoding="utf-8")
+        text = text.replace("owl:imports <https", "owl:imports <https://example.org/far>, <https", 1)
+    else:
+        text = f"@prefix far: {space.format('')} .\n{text}{more}"
+    (tmp_path / "scene.ttl").write_text(text, encoding="utf-8")
+    graph = load(tmp_path / "scene.ttl")
+    whole, sliced = read(graph), recognise(graph)
+    (cup,) = (name for name in sliced.problem.classes["Cup"] if name.endswith("cup1"))
+    assert cup == sliced.names.short(sliced.names.iri(cup)) == whole.names.short(sliced.names.iri(cup)) != "cup1"
+    assert "cup1" not in whole.names
+    assert len(sliced.problem.classes["Cup"]) == 2
+    assert plan(sliced.problem).status is Status.SOLVED
+    (goal,) = (
+        str(s)
+        for s in recognise(graph, [f"{cup} LOCATION location3"]).problem.goal
+        if "LOC" in str(s) and cup in str(s)
+    )
+    assert goal == f"<{cup}, LOCATION>"
