@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.grounded.joins import Ints, Table, TooLargeError, pack
-from planner.grounded.schemas import Atom, Schema, schemas, variables
+from planner.grounded.schemas import Atom, Schema, plain_variables, schemas, variables
 from planner.grounded.task import Change, Grouped, Task
 from planner.plan import Reason
 from reasoner.symbols import (
@@ -424,7 +424,7 @@ class Formulas:
         self, group: list[Condition], terms: dict[str, str], kinds: Mapping[str, str]
     ) -> Iterator[dict[str, str]]:
         """Yield every way to put individuals in for a group's unbound variables that static knowledge doesn't rule out."""
-        unbound = sorted(set().union(*map(variables, group)) - terms.keys()) if group else []
+        unbound = sorted(plain_variables(group) - terms.keys())
         if not unbound:
             yield terms
             return

@@ -165,9 +165,7 @@ class _Compiler:
         fresh: Iterator[int],
     ) -> Iterator[Condition]:
         """Yield the conjuncts of a group, its own variables renamed."""
-        own = {name: kinds[name] for name in sorted(set().union(*map(variables, group)) - shared - witness.keys())} | {
-            **witness
-        }
+        own = {name: kinds[name] for name in sorted(plain_variables(group) - shared - witness.keys())} | {**witness}
         names = {name: f"?{next(fresh)}{name[1:]}" for name in own}
         kinds |= {names[name]: kind for name, kind in own.items()}
         yield from (ClassCondition(names[name], kind) for name, kind in own.items())
@@ -225,6 +223,11 @@ def variables(condition: Condition) -> set[str]:
         case AnyOf(alternatives):
             found = {t for group in alternatives for c in group for t in variables(c)}
     return {t for t in found if t.startswith("?")}
+
+
+def plain_variables(group: Sequence[Condition]) -> set[str]:
+    """Return the variables that a group has from outside or determines; what only a nested condition mentions is that one's own."""
+    return {t for c in group if not isinstance(c, Witness | AnyOf) for t in variables(c)}
 
 
 def walk(condition: Condition) -> Iterator[Condition]:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
-    Behavior,
-    Condition,
-    Domain,
     EqualityCondition,
-    Parameter,
     Problem,
     RelationCondition,
     SituationType,
     Symbol,
-    ValueCondition,
-    ValueEffect,
     Witness,
 )
+from worlds.writing import becomes, behavior, has, lacks, world
 
 
 @dataclass(frozen=True)
@@ -32,60 +27,6 @@ class Case:
     length: Mapping[int, int]
     afterwards: Mapping[Symbol, str]
     never: Mapping[Symbol, str] = field(default_factory=dict)
-
-
-def has(situation: str, *terms: str) -> ValueCondition:
-    """Return ``situation(all terms but the last) = the last``."""
-    return ValueCondition(situation, terms[:-1], terms[-1])
-
-
-def lacks(situation: str, *terms: str) -> ValueCondition:
-    return ValueCondition(situation, terms[:-1], terms[-1], negated=True)
-
-
-def becomes(situation: str, *terms: str, when: tuple[Condition, ...] = ()) -> ValueEffect:
-    return ValueEffect(situation, terms[:-1], terms[-1], when)
-
-
-def behavior(
-    name: str,
-    level: int,
-    terms: str,
-    conditions: Iterable[Condition],
-    effects: Iterable[ValueEffect],
-    variables: str = "",
-) -> Behavior:
-    """Return a behaviour; terms are given as ``"?b:Book ?p:Place"``."""
-
-    def parameters(text: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(*term.split(":")) for term in text.split())
-
-    return Behavior(name, level, parameters(terms), parameters(variables), tuple(conditions), tuple(effects))
-
-
-def world(
-    situations: Iterable[SituationType],
-    behaviors: Iterable[Behavior],
-    classes: Mapping[str, tuple[str, ...]],
-    initial: Mapping[str, str],
-    goal: Mapping[str, str],
-    relations: Mapping[str, Iterable[tuple[str, ...]]] = {},
-    value_levels: Mapping[str, int] = {},
-) -> Problem:
-    """Return a problem; facts are given as ``{"AT book": "shelf"}``."""
-
-    def facts(stated: Mapping[str, str]) -> dict[Symbol, str]:
-        return {Symbol(key.split()[0], tuple(key.split()[1:])): value for key, value in stated.items()}
-
-    return Problem(
-        scene="small",
-        domain=Domain({s.name: s for s in situations}, {b.name: b for b in behaviors}),
-        classes={"Truth": (FALSE, TRUE), **classes},
-        relations={name: frozenset(rows) for name, rows in relations.items()},
-        initial=facts(initial),
-        goal=facts(goal),
-        value_levels=value_levels,
-    )
 
 
 def drive() -> Case:

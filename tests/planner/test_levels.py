@@ -1,6 +1,6 @@
 """What a plan of several levels means (docs/levels.md): the planners and the checker agree on it, case by case."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import pytest
@@ -11,8 +11,11 @@ from planner.paper.hierarchy import plan as paper
 from planner.plan import Outcome, Plan, Status
 from planner.validation import successor, validate
 from reasoner.symbols import FALSE, Problem, Symbol
+from tests.planner import naive
 from tests.planner.families import tabletop
 from tests.planner.small import CASES, Case
+from worlds.agreement import State, complaints, on_top, solvable
+from worlds.hierarchies import hierarchy, states
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper}
 """The planners that every case is given to."""
@@ -77,3 +80,58 @@ def test_a_plan_that_leaves_no_level_has_nothing_to_name() -> None:
     outcome = paper(problem)
     assert outcome.plan is not None
     assert levels_left(problem, outcome.plan) == []
+
+
+# ------------------------------------------------------------------------------------------------------- random worlds
+
+
+@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("mode", MODES)
+def test_random_worlds_keep_their_levels_and_the_truth(mode: str, part: int) -> None:
+    for seed in range(75 * part, 75 * (part + 1)):
+        problem = hierarchy(seed)
+        outcome = MODES[mode](problem)
+        reference = outcome if mode == "paper" else paper(problem)
+        truth = solvable(problem) if outcome.status is Status.UNSOLVABLE else None
+        assert complaints(problem, outcome, reference, truth) == [], seed
+
+
+def naively(problem: Problem) -> Callable[[State], Iterable[State]]:
+    """Return the successors of a state as the naive interpreter reads behaviours."""
+    behaviors = problem.domain.at_level(problem.domain.levels[-1])
+    return lambda state: (after for b in behaviors for _, after in naive.results(problem, b, dict(state)))
+
+
+def test_the_truth_about_random_worlds_is_that_of_the_naive_interpreter() -> None:
+    small = [problem for problem in map(hierarchy, range(400)) if states(problem) <= 60]
+    found = [solvable(problem) for problem in small]
+    assert found == [solvable(problem, naively) for problem in small]
+    assert [paper(problem).status is Status.SOLVED for problem in small] == found
+    assert min(found.count(True), found.count(False)) > 5
+
+
+def test_random_worlds_differ_in_what_the_levels_make_of_them() -> None:
+    problems = list(map(hierarchy, range(100)))
+    outcomes = list(map(paper, problems))
+    solved = [(p, o) for p, o in zip(problems, outcomes, strict=True) if o.plan is not None]
+    assert {len(p.domain.levels) for p in problems} == {2, 3}
+    assert sum(not on_top(p, o) for p, o in solved) > 2
+    assert sum(on_top(p, o) for p, o in solved) > 50
+    excursions = [
+        o
+        for p, o in solved
+        if p.domain.situations["COVER"].rest and {"OPEN", "SHUT"} <= {s.behavior for s in o.plan.walk()}  # type: ignore[union-attr]
+    ]
+    assert len(excursions) > 5
+
+
+def test_what_is_wrong_with_an_outcome_is_said() -> None:
+    problem = hierarchy(0)
+    outcome = paper(problem)
+    assert outcome.plan is not None
+    assert complaints(problem, outcome, outcome, True) == []
+    assert "invalid" in complaints(problem, replace(outcome, plan=Plan(outcome.plan.steps[:-1])), outcome, True)[0]
+    assert "the first level left" in complaints(problem, plan_level(problem, 2), outcome, True)
+    refused = replace(outcome, status=Status.UNSOLVABLE, plan=None)
+    assert "a false unsolvable" in complaints(problem, refused, outcome, True)
+    assert "a plan where there is none" in complaints(problem, outcome, outcome, False)

@@ -1,0 +1,83 @@
+"""Short hands to write worlds as values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import product
+
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Behavior,
+    Condition,
+    Domain,
+    Parameter,
+    Problem,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+)
+
+
+def has(situation: str, *terms: str) -> ValueCondition:
+    """Return ``situation(all terms but the last) = the last``."""
+    return ValueCondition(situation, terms[:-1], terms[-1])
+
+
+def lacks(situation: str, *terms: str) -> ValueCondition:
+    """Return that this isn't so."""
+    return ValueCondition(situation, terms[:-1], terms[-1], negated=True)
+
+
+def becomes(situation: str, *terms: str, when: tuple[Condition, ...] = ()) -> ValueEffect:
+    """Return the effect that this is so afterwards, if it was so before that `when`."""
+    return ValueEffect(situation, terms[:-1], terms[-1], when)
+
+
+def behavior(
+    name: str,
+    level: int,
+    terms: str,
+    conditions: Iterable[Condition],
+    effects: Iterable[ValueEffect],
+    variables: str = "",
+) -> Behavior:
+    """Return a behaviour; terms are given as ``"?b:Book ?p:Place"``."""
+
+    def parameters(text: str) -> tuple[Parameter, ...]:
+        return tuple(Parameter(*term.split(":")) for term in text.split())
+
+    return Behavior(name, level, parameters(terms), parameters(variables), tuple(conditions), tuple(effects))
+
+
+def world(
+    situations: Iterable[SituationType],
+    behaviors: Iterable[Behavior],
+    classes: Mapping[str, tuple[str, ...]],
+    initial: Mapping[str, str],
+    goal: Mapping[str, str],
+    relations: Mapping[str, Iterable[tuple[str, ...]]] = {},
+    value_levels: Mapping[str, int] = {},
+) -> Problem:
+    """Return a problem; facts are given as ``{"AT book": "shelf"}``."""
+
+    def facts(stated: Mapping[str, str]) -> dict[Symbol, str]:
+        return {Symbol(key.split()[0], tuple(key.split()[1:])): value for key, value in stated.items()}
+
+    return Problem(
+        scene="world",
+        domain=Domain({s.name: s for s in situations}, {b.name: b for b in behaviors}),
+        classes={"Truth": (FALSE, TRUE), **classes},
+        relations={name: frozenset(rows) for name, rows in relations.items()},
+        initial=facts(initial),
+        goal=facts(goal),
+        value_levels=value_levels,
+    )
+
+
+def quantified(problem: Problem, level: int) -> Iterator[tuple[Behavior, tuple[str, ...]]]:
+    """Yield the behaviours of a level with all arguments that fit."""
+    for one in problem.domain.at_level(level):
+        for arguments in product(*(problem.classes.get(parameter.kind, ()) for parameter in one.parameters)):
+            yield one, arguments
