@@ -22,6 +22,7 @@ from time import perf_counter
 from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
 from planner.grounded.hff import Evaluate
 from planner.grounded.hff_numba import automatic
+from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
 from planner.grounded.unreachable import blocked
@@ -29,8 +30,6 @@ from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
 from reasoner.symbols import Problem, State
 
 BOOST = 1000  # turns that the preferred operators get on a new best h
-ALONE = 1000  # evaluations before the search without lookahead begins to get its share
-SHARE = 3  # of so many evaluations, it gets one
 FAR = 1 << 40  # more than any h
 SHORTEN, SHORTENING = 500_000, 20  # work on the finished plan: so much, and a twentieth of the search's
 
@@ -119,23 +118,35 @@ def search(
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
     evaluate = evaluate or automatic(task)
-    kinds = ((True, False), (False, False), (True, True))  # lookahead, open goals first
-    searches = [_best_first(task, evaluate, counts, prefer, *kind) for kind in kinds]
-    turns = 0
+    if evaluate(task.initial) is None:
+        return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
+    searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
+        (6, by_novelty(task, evaluate, counts, last_first=False)),
+        (4, _best_first(task, evaluate, counts, prefer, lookahead=True, goals_first=False)),
+        (2, by_novelty(task, evaluate, counts, last_first=True)),
+        (1, _best_first(task, evaluate, counts, prefer, lookahead=False, goals_first=False)),
+        (1, _best_first(task, evaluate, counts, prefer, lookahead=True, goals_first=True)),
+    ]
+    spent = [0.0] * len(searches)
+    total = 0
     while True:
-        turns += 1
+        turn = spent.index(min(spent))
+        share, search_ = searches[turn]
         try:
-            next(searches[1 + turns // SHARE % 2 if turns > ALONE and turns % SHARE == 0 else 0])
+            work = next(search_)
+            total += work
+            spent[turn] += work / share
+        except OutOfMemoryError:
+            del searches[turn], spent[turn]
         except StopIteration as done:
             if done.value is None:
-                if not counts.expanded:
-                    return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
-                what = f"all {counts.expanded} states that can be reached were searched"
+                what = "all states that can be reached were searched"
                 return Flat(Status.UNSOLVABLE, (), Reason(f"no plan exists: {what}"), counts)
+            plan = _path(*done.value)
             if found:
-                found(done.value)
-            work = SHORTEN + counts.evaluated * len(task.owners) // SHORTENING
-            return Flat(Status.SOLVED, tuple(shorter(task, done.value, work, deadline)), None, counts)
+                found(plan)
+            work = SHORTEN + total // SHORTENING
+            return Flat(Status.SOLVED, tuple(shorter(task, plan, work, deadline)), None, counts)
         if counts.expanded >= limits.expansions:
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
@@ -144,10 +155,10 @@ def search(
 
 def _best_first(
     task: Task, evaluate: Evaluate, counts: Counts, prefer: Prefer | None, lookahead: bool, goals_first: bool
-) -> Generator[None, None, list[int] | None]:
-    """Search greedily; yield after each evaluation, return the plan, or None if there is none."""
+) -> Generator[int, None, tuple[Seen, int] | None]:
+    """Search greedily; yield the work of each evaluation, return what was seen and the last state, or None if there is no plan."""
     apply, goal = task.applied, task.goal
-    came_from: dict[int, tuple[int, tuple[int, ...]]] = {task.initial: (task.initial, ())}
+    came_from: Seen = {task.initial: (task.initial, ())}
     queues: tuple[list[tuple[int, int, int, list[int]]], ...] = (
         [],
         [],
@@ -173,10 +184,10 @@ def _best_first(
             waiting.append(after)
         state = waiting.pop()
         if state & goal == goal:
-            return _path(came_from, state)
+            return came_from, state
         evaluation = evaluate(state)
         counts.evaluated += 1
-        yield
+        yield len(task.owners)
         if evaluation is None:
             continue
         counts.expanded += 1
@@ -221,7 +232,7 @@ def _ahead(task: Task, state: int, relaxed_plan: Sequence[int]) -> tuple[int, li
         left = stuck
 
 
-def _path(came_from: dict[int, tuple[int, tuple[int, ...]]], state: int) -> list[int]:
+def _path(came_from: Seen, state: int) -> list[int]:
     parts: list[tuple[int, ...]] = []
     while True:
         before, operators = came_from[state]

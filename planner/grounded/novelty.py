@@ -1,0 +1,163 @@
+"""Search by novelty: a state comes first that has a fact which no state before it had at the same distance from the goal.
+
+distance    the goals that are open, and of the facts of a relaxed plan, made where the last goal was reached, those met since
+novel       some fact is new among the states of the same distance: one "and" of two integers
+open        a queue by novelty, then by open goals, then as they came (or the last first)
+
+A relaxed plan is made only for states that reach a goal and are expanded, so that hundreds of thousands of states a second are
+looked at. No state is dropped: where the queue runs empty, there is no plan.
+
+Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
+cut off at one. Successors are found by a decision tree over symbols: Helmert, "The Fast Downward planning system", JAIR 26 (2006).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+from planner.grounded.hff import Evaluate
+from planner.grounded.task import Task
+from planner.plan import Counts
+
+MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
+STATE_BYTES = 400  # that a state takes besides its bits
+CHILD = 8  # operators that h_FF looks at in the time in which one successor is made
+AT_ONCE = 32  # states expanded in one turn
+
+Seen = dict[int, tuple[int, tuple[int, ...]]]
+"""For each state that from which it was reached, and by which operators."""
+
+
+class OutOfMemoryError(Exception):
+    """A search holds as many states as it may."""
+
+
+def by_novelty(
+    task: Task, evaluate: Evaluate, counts: Counts, last_first: bool
+) -> Generator[int, None, tuple[Seen, int] | None]:
+    """Search by novelty; yield the work done, in operators, every so many states; return what was seen and the last state.
+
+    Raises
+    ------
+    OutOfMemoryError
+        There are more states than it may keep.
+    """
+    goal, applied = task.goal, task.applied
+    successors = _tree(task)
+    plain = [_plain(task, operator) for operator in range(len(task))]
+    seen: Seen = {task.initial: (task.initial, ())}
+    most = MOST_BYTES // (STATE_BYTES + task.size // 4)
+    known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
+    number, step = 0, -1 if last_first else 1
+    # (no new fact, open goals, number, state, facts of the relaxed plan, those met); a relaxed plan is made when it is needed
+    queue: list[tuple[bool, int, int, int, int, int]] = [
+        (False, (goal & ~task.initial).bit_count(), 0, task.initial, -1, 0)
+    ]
+    work = turns = 0
+    while queue:
+        _, open_, _, state, wanted, met = heapq.heappop(queue)
+        turns += 1
+        if not turns % AT_ONCE:
+            yield work
+            work = 0
+            if len(seen) > most:
+                raise OutOfMemoryError
+        if wanted < 0:
+            evaluation = evaluate(state)
+            counts.evaluated += 1
+            work += len(task.owners)
+            if evaluation is None:
+                continue
+            wanted = 0
+            for operator in evaluation[1]:
+                for _, _, set_ in task.known(operator)[1]:
+                    wanted |= set_
+            wanted &= ~state
+        operators = successors.of(state)
+        work += CHILD * len(operators)
+        counts.generated += len(operators)
+        for operator in operators:
+            change = plain[operator]
+            after = state & change[0] | change[1] if change else applied(state, operator)
+            if after is None or after in seen:
+                continue
+            seen[after] = (state, (operator,))
+            left = (goal & ~after).bit_count()
+            if not left:
+                return seen, after
+            if left < open_:
+                facts, reached, distance = -1, 0, (left, 0)
+            else:
+                facts, reached = wanted, met | after & wanted
+                distance = (left, reached.bit_count())
+            old = known[distance]
+            known[distance] = old | after
+            number += step
+            heapq.heappush(queue, (not after & ~old, left, number, after, facts, reached))
+    return None
+
+
+def _plain(task: Task, operator: int) -> tuple[int, int] | None:
+    """Return what an operator leaves of a state, and what it sets; None if that depends on the state."""
+    changes = task.known(operator)[1]
+    if task.derived or len(changes) != 1 or changes[0][0]:
+        return (-1, 0) if not changes else None
+    _, cleared, set_ = changes[0]
+    return ~cleared, set_
+
+
+@dataclass
+class _Tree:
+    """Operators by the values that they need, symbol by symbol.
+
+    `mask` are the bits of a symbol; `by_value` leads on for each of its values, `otherwise` for operators that don't need it.
+    """
+
+    mask: int = 0
+    by_value: dict[int, _Tree] = field(default_factory=dict)
+    otherwise: _Tree | None = None
+    operators: list[int] = field(default_factory=list)
+
+    def of(self, state: int) -> list[int]:
+        """Return the operators that are applicable in a state."""
+        found: list[int] = []
+        waiting = [self]
+        while waiting:
+            node = waiting.pop()
+            found += node.operators
+            if node.mask:
+                fitting = node.by_value.get(state & node.mask)
+                if fitting is not None:
+                    waiting.append(fitting)
+                if node.otherwise is not None:
+                    waiting.append(node.otherwise)
+        return found
+
+
+def _tree(task: Task) -> _Tree:
+    """Return the tree of a task; symbols that many operators need are asked first."""
+    of_symbol: defaultdict[object, int] = defaultdict(int)
+    for bit, fact in enumerate(task.facts):
+        of_symbol[fact.symbol] |= 1 << bit
+    masks = [of_symbol[fact.symbol] for fact in task.facts] + [1 << bit for bit in range(len(task.facts), task.size)]
+    needs = task.needs.lists()[: len(task)]
+    often: defaultdict[int, int] = defaultdict(int)
+    for bits in needs:
+        for bit in bits:
+            often[masks[bit]] += 1
+    rank = {mask: i for i, mask in enumerate(sorted(often, key=lambda mask: (-often[mask], mask)))}
+    root = _Tree()
+    for operator, bits in enumerate(needs):
+        node = root
+        for bit in sorted(bits, key=lambda bit: rank[masks[bit]]):
+            mask = masks[bit]
+            while node.mask not in (0, mask):
+                node.otherwise = node.otherwise or _Tree()
+                node = node.otherwise
+            node.mask = mask
+            node = node.by_value.setdefault(1 << bit, _Tree())
+        node.operators.append(operator)
+    return root
