@@ -31,10 +31,7 @@ from reasoner.symbols import Problem, State
 
 BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
-SHORTEN, SHORTENING = 500_000, 20  # work on the finished plan: so much, and a twentieth of the search's
-
-Prefer = Callable[[int, list[int]], list[int]]
-"""Puts a state's preferred operators in order, the best first; this is where cogency comes in."""
+SHORTEN, SHORTENING = 200_000, 10  # work on the finished plan: so much, and a tenth of the search's
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,6 @@ def plan_level(
     initial: State | None = None,
     goal: State | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-    prefer: Callable[[Task], Prefer] | None = None,
 ) -> Outcome:
     """Plan one level of a problem, the lowest if none is given.
 
@@ -65,8 +61,6 @@ def plan_level(
         In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
     limits : Limits
         The time includes grounding.
-    prefer : function of a task to a function of a state and its preferred operators, optional
-        Puts them in order, the best first.
 
     Returns
     -------
@@ -83,7 +77,7 @@ def plan_level(
         return Outcome(Status.GAVE_UP, reason=Reason(f"grounding: {error}"), seconds=perf_counter() - began)
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
-    found = search(task, limits, deadline, prefer=prefer(task) if prefer else None)
+    found = search(task, limits, deadline)
     plan = Plan(task.steps(found.plan)) if found.status is Status.SOLVED else None
     return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began)
 
@@ -93,13 +87,13 @@ def search(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     deadline: float | None = None,
     evaluate: Evaluate | None = None,
-    prefer: Prefer | None = None,
     found: Callable[[Sequence[int]], None] | None = None,
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Three searches take turns: with lookahead; without it, since it can lead astray; by open goals first, and then h. The
-    same limit of expansions gives the same plan; a deadline can only cut the search short.
+    Five searches share the time: by novelty, broad and deep; by h with lookahead, without it, since it can lead astray, and by
+    open goals first. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
+    deadline can only cut the search short.
 
     Parameters
     ----------
@@ -110,7 +104,6 @@ def search(
         On the clock of `time.perf_counter`.
     evaluate : function of a state, optional
         In place of h_FF, plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`).
-    prefer : function of a state and its preferred operators, optional
     found : function of a plan, optional
         Called with the first plan, before it is made shorter.
     """
@@ -121,11 +114,11 @@ def search(
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (6, by_novelty(task, evaluate, counts, last_first=False)),
-        (4, _best_first(task, evaluate, counts, prefer, lookahead=True, goals_first=False)),
-        (2, by_novelty(task, evaluate, counts, last_first=True)),
-        (1, _best_first(task, evaluate, counts, prefer, lookahead=False, goals_first=False)),
-        (1, _best_first(task, evaluate, counts, prefer, lookahead=True, goals_first=True)),
+        (5, by_novelty(task, evaluate, counts, deep=False)),
+        (4, _best_first(task, evaluate, counts, lookahead=True, goals_first=False)),
+        (3, by_novelty(task, evaluate, counts, deep=True)),
+        (1, _best_first(task, evaluate, counts, lookahead=False, goals_first=False)),
+        (1, _best_first(task, evaluate, counts, lookahead=True, goals_first=True)),
     ]
     spent = [0.0] * len(searches)
     total = 0
@@ -140,8 +133,12 @@ def search(
             del searches[turn], spent[turn]
         except StopIteration as done:
             if done.value is None:
-                what = "all states that can be reached were searched"
-                return Flat(Status.UNSOLVABLE, (), Reason(f"no plan exists: {what}"), counts)
+                return Flat(
+                    Status.UNSOLVABLE,
+                    (),
+                    Reason("no plan exists: all states that can be reached were searched"),
+                    counts,
+                )
             plan = _path(*done.value)
             if found:
                 found(plan)
@@ -154,7 +151,7 @@ def search(
 
 
 def _best_first(
-    task: Task, evaluate: Evaluate, counts: Counts, prefer: Prefer | None, lookahead: bool, goals_first: bool
+    task: Task, evaluate: Evaluate, counts: Counts, lookahead: bool, goals_first: bool
 ) -> Generator[int, None, tuple[Seen, int] | None]:
     """Search greedily; yield the work of each evaluation, return what was seen and the last state, or None if there is no plan."""
     apply, goal = task.applied, task.goal
@@ -197,8 +194,6 @@ def _best_first(
         number += 1
         possible = set(applicable)
         preferred = [operator for operator in relaxed_plan if operator in possible]
-        if prefer and len(preferred) > 1:
-            preferred = prefer(state, preferred)
         if applicable:
             rest = possible.difference(preferred)
             heapq.heappush(queues[0], (h, number, state, [*sorted(rest, reverse=True), *preferred[::-1]]))

@@ -1,8 +1,9 @@
 """Search by novelty: a state comes first that has a fact which no state before it had at the same distance from the goal.
 
-distance    the goals that are open, and of the facts of a relaxed plan, made where the last goal was reached, those met since
+distance    the goals (and landmarks) that are open, and of the facts of a relaxed plan, made where the last goal was
+            reached, those met since
 novel       some fact is new among the states of the same distance: one "and" of two integers
-open        a queue by novelty, then by open goals, then as they came (or the last first)
+open        a queue by novelty, then by open goals (and landmarks), then as they came (or the last first)
 
 A relaxed plan is made only for states that reach a goal and are expanded, so that hundreds of thousands of states a second are
 looked at. No state is dropped: where the queue runs empty, there is no plan.
@@ -36,9 +37,11 @@ class OutOfMemoryError(Exception):
 
 
 def by_novelty(
-    task: Task, evaluate: Evaluate, counts: Counts, last_first: bool
+    task: Task, evaluate: Evaluate, counts: Counts, deep: bool
 ) -> Generator[int, None, tuple[Seen, int] | None]:
     """Search by novelty; yield the work done, in operators, every so many states; return what was seen and the last state.
+
+    Where it is `deep`, landmarks that weren't met yet count like goals, and of equal states the last comes first.
 
     Raises
     ------
@@ -46,19 +49,19 @@ def by_novelty(
         There are more states than it may keep.
     """
     goal, applied = task.goal, task.applied
-    successors = _tree(task)
+    tree = successors(task)
     plain = [_plain(task, operator) for operator in range(len(task))]
     seen: Seen = {task.initial: (task.initial, ())}
     most = MOST_BYTES // (STATE_BYTES + task.size // 4)
     known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
-    number, step = 0, -1 if last_first else 1
-    # (no new fact, open goals, number, state, facts of the relaxed plan, those met); a relaxed plan is made when it is needed
-    queue: list[tuple[bool, int, int, int, int, int]] = [
-        (False, (goal & ~task.initial).bit_count(), 0, task.initial, -1, 0)
-    ]
+    marks = landmarks(task) & ~(task.initial | goal) if deep else 0
+    number, step = 0, -1 if deep else 1
+    # (no new fact, distance, number, state, facts of the relaxed plan (-1: not made yet), those met, landmarks left)
+    first = (goal & ~task.initial).bit_count() + marks.bit_count()
+    queue: list[tuple[bool, int, int, int, int, int, int]] = [(False, first, 0, task.initial, -1, 0, marks)]
     work = turns = 0
     while queue:
-        _, open_, _, state, wanted, met = heapq.heappop(queue)
+        _, open_, _, state, wanted, met, marked = heapq.heappop(queue)
         turns += 1
         if not turns % AT_ONCE:
             yield work
@@ -76,7 +79,7 @@ def by_novelty(
                 for _, _, set_ in task.known(operator)[1]:
                     wanted |= set_
             wanted &= ~state
-        operators = successors.of(state)
+        operators = tree.of(state)
         work += CHILD * len(operators)
         counts.generated += len(operators)
         for operator in operators:
@@ -85,9 +88,11 @@ def by_novelty(
             if after is None or after in seen:
                 continue
             seen[after] = (state, (operator,))
-            left = (goal & ~after).bit_count()
-            if not left:
+            missing = goal & ~after
+            if not missing:
                 return seen, after
+            remaining = marked & ~after
+            left = missing.bit_count() + remaining.bit_count()
             if left < open_:
                 facts, reached, distance = -1, 0, (left, 0)
             else:
@@ -96,8 +101,34 @@ def by_novelty(
             old = known[distance]
             known[distance] = old | after
             number += step
-            heapq.heappush(queue, (not after & ~old, left, number, after, facts, reached))
+            heapq.heappush(queue, (not after & ~old, left, number, after, facts, reached, remaining))
     return None
+
+
+def landmarks(task: Task) -> int:
+    """Return facts that every plan makes true at some time: a fact's are those that all ways to it have in common.
+
+    Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
+    """
+    behind = [0 if task.initial >> bit & 1 else -1 for bit in range(task.size)]
+    ways = list(zip(task.needs.lists(), task.adds.lists(), strict=True))
+    before = None
+    while before != behind:
+        before = behind[:]
+        for needs, adds in ways:
+            needed = 0
+            for bit in needs:
+                if behind[bit] < 0:
+                    break
+                needed |= behind[bit] | 1 << bit
+            else:
+                for bit in adds:
+                    behind[bit] &= needed
+    found = 0
+    for bit in range(task.size):
+        if task.goal >> bit & 1:
+            found |= behind[bit] | 1 << bit
+    return found
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
@@ -110,15 +141,15 @@ def _plain(task: Task, operator: int) -> tuple[int, int] | None:
 
 
 @dataclass
-class _Tree:
+class Tree:
     """Operators by the values that they need, symbol by symbol.
 
     `mask` are the bits of a symbol; `by_value` leads on for each of its values, `otherwise` for operators that don't need it.
     """
 
     mask: int = 0
-    by_value: dict[int, _Tree] = field(default_factory=dict)
-    otherwise: _Tree | None = None
+    by_value: dict[int, Tree] = field(default_factory=dict)
+    otherwise: Tree | None = None
     operators: list[int] = field(default_factory=list)
 
     def of(self, state: int) -> list[int]:
@@ -137,8 +168,8 @@ class _Tree:
         return found
 
 
-def _tree(task: Task) -> _Tree:
-    """Return the tree of a task; symbols that many operators need are asked first."""
+def successors(task: Task) -> Tree:
+    """Return the tree of a task's operators; symbols that many operators need are asked first."""
     of_symbol: defaultdict[object, int] = defaultdict(int)
     for bit, fact in enumerate(task.facts):
         of_symbol[fact.symbol] |= 1 << bit
@@ -149,15 +180,15 @@ def _tree(task: Task) -> _Tree:
         for bit in bits:
             often[masks[bit]] += 1
     rank = {mask: i for i, mask in enumerate(sorted(often, key=lambda mask: (-often[mask], mask)))}
-    root = _Tree()
+    root = Tree()
     for operator, bits in enumerate(needs):
         node = root
         for bit in sorted(bits, key=lambda bit: rank[masks[bit]]):
             mask = masks[bit]
             while node.mask not in (0, mask):
-                node.otherwise = node.otherwise or _Tree()
+                node.otherwise = node.otherwise or Tree()
                 node = node.otherwise
             node.mask = mask
-            node = node.by_value.setdefault(1 << bit, _Tree())
+            node = node.by_value.setdefault(1 << bit, Tree())
         node.operators.append(operator)
     return root

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Generator
 from dataclasses import replace
 from time import perf_counter
 
@@ -12,9 +13,10 @@ from planner.grounded.best_first import plan_level, search
 from planner.grounded.grounding import TooLargeError, ground
 from planner.grounded.hff import heuristic
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
+from planner.grounded.novelty import Seen, by_novelty, landmarks, successors
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
-from planner.plan import Limits, Plan, Reason, Status
+from planner.plan import Counts, Limits, Plan, Reason, Status
 from planner.validation import validate
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse
@@ -95,6 +97,53 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
     assert len(shortened(task, doubled)) <= len(plan)
 
 
+@pytest.mark.parametrize("deep", [False, True])
+def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
+    task = ground(carrier(3))
+    assert isinstance(task, Task)
+    seen, state = finished(by_novelty(task, heuristic(task), Counts(), deep)) or ({}, 0)
+    assert state & task.goal == task.goal
+    while state != task.initial:
+        before, operators = seen[state]
+        for operator in operators:
+            assert task.applied(before, operator) == state
+        state = before
+    me = sum(1 << bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == "ME")
+    nowhere = replace(task, goal=task.goal | me)  # here and there at once: relaxed, that can be
+    assert finished(by_novelty(nowhere, heuristic(nowhere), Counts(), deep)) is None
+
+
+def finished(search: Generator[int, None, tuple[Seen, int] | None]) -> tuple[Seen, int] | None:
+    while True:
+        try:
+            next(search)
+        except StopIteration as done:
+            found: tuple[Seen, int] | None = done.value
+            return found
+
+
+def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> None:
+    for problem in (tabletop, corridor(12), carrier(4)):
+        task = ground(problem)
+        assert isinstance(task, Task)
+        tree, evaluate, choice, state = successors(task), heuristic(task), random.Random(1), task.initial
+        for _ in range(60):
+            operators = sorted(tree.of(state))
+            assert operators == [o for o in range(len(task)) if task.applied(state, o) is not None]
+            evaluation = evaluate(state)
+            assert evaluation is None or operators == evaluation[2]
+            if not operators:
+                break
+            state = task.applied(state, choice.choice(operators)) or 0
+
+
+def test_what_every_plan_passes_is_a_landmark() -> None:
+    task = ground(carrier(1))
+    assert isinstance(task, Task)
+    names = {str(fact) for bit, fact in enumerate(task.facts) if landmarks(task) >> bit & 1}
+    assert names == {"x0 AT here", "x0 AT there", "here ME true", "there ME true"}  # either arm will do
+
+
 def carrier(parcels: int) -> Problem:
     """Two places, a carrier with two arms, and parcels to be brought from one place to the other."""
     names = " ".join(f"x{i}" for i in range(parcels))
@@ -143,20 +192,6 @@ def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monk
     plain = search(task, evaluate=heuristic(task))
     monkeypatch.setattr("planner.grounded.hff_numba.PLAIN", 5 * len(task.owners))
     assert search(task) == plain
-
-
-def test_preferred_operators_are_ordered_by_the_function_passed_in(tabletop: Problem) -> None:
-    seen: list[list[int]] = []
-
-    def prefer(_: Task) -> object:
-        def order(state: int, operators: list[int]) -> list[int]:
-            seen.append(operators)
-            return sorted(operators, reverse=True)
-
-        return order
-
-    outcome = plan_level(tabletop, 2, prefer=prefer)  # type: ignore[arg-type]
-    assert outcome.status is Status.SOLVED and seen
 
 
 def test_the_compiled_heuristic_is_the_plain_one(tabletop: Problem) -> None:
