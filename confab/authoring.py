@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 import ontology
+from confab.memory import Memory
 from planner.paper.transitions import ground
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import CORE, FORMATS, KnowledgeError, KnowledgeGraph
+from reasoner.files import alone, write_whole
+from reasoner.graph.knowledge import CORE, KnowledgeError, KnowledgeGraph
 from reasoner.memory.counts_file import SPACE, Lines
 from reasoner.names import local_name, nearest
 
@@ -171,12 +172,15 @@ def migrate(memory: Path, renames: Sequence[str]) -> int:
     KnowledgeError
         The file is no memory; OLD isn't in it, or names two terms.
     """
-    quads = _parse(memory)
-    iris = {term.value for quad in quads for term in (quad.predicate, quad.object) if isinstance(term, ox.NamedNode)}
-    table = dict(_rename(text, iris) for text in renames)
-    words = {local_name(old): local_name(new) for old, new in table.items()}
-    changed = [_renamed(quad, table, words) for quad in quads]
-    write_whole(memory, ox.serialize(changed, format=FORMATS[memory.suffix], prefixes=_prefixes(memory)) or b"")
+    with alone(memory):
+        quads, prefixes = _parse(memory)
+        terms = [term for quad in quads for term in (quad.predicate, quad.object)]
+        iris = {term.value for term in terms if isinstance(term, ox.NamedNode)}
+        table = dict(_rename(text, iris) for text in renames)
+        words = {local_name(old): local_name(new) for old, new in table.items()}
+        changed = [_renamed(quad, table, words) for quad in quads]
+        text = ox.serialize(changed, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b""
+        write_whole(memory, text, check=Memory.load)
     return sum(one != other.triple for one, other in zip(changed, quads, strict=True))
 
 
@@ -189,7 +193,11 @@ def _rename(text: str, iris: set[str]) -> tuple[str, str]:
         what = "isn't in the memory" if not found else f"could be {' or '.join(sorted(found))}"
         raise KnowledgeError(f"'{old}' {what}{nearest(old, map(local_name, iris)) if not found else '; give the IRI'}")
     namespace = found[0][: len(found[0]) - len(local_name(found[0]))]
-    return found[0], new if "://" in new else namespace + new
+    iri = new if "://" in new else namespace + new
+    try:
+        return found[0], ox.NamedNode(iri).value
+    except ValueError as error:
+        raise KnowledgeError(f"'{text}': <{iri}> is no IRI; wanted a name without blanks and signs") from error
 
 
 def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.Triple:
@@ -202,16 +210,11 @@ def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.
     return ox.Triple(quad.subject, quad.predicate, value)
 
 
-def _parse(memory: Path) -> list[ox.Quad]:
-    if memory.suffix not in FORMATS or not memory.is_file():
+def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:
+    """Return what a memory file says, and its prefixes."""
+    if not memory.is_file():
         raise KnowledgeError(f"{memory}: no such memory file")
-    try:
-        return list(ox.parse(path=str(memory), format=FORMATS[memory.suffix], base_iri=memory.resolve().as_uri()))
-    except SyntaxError as error:
-        raise KnowledgeError(f"{memory}: {error}") from error
-
-
-def _prefixes(memory: Path) -> dict[str, str]:
-    parser = ox.parse(path=str(memory), format=FORMATS[memory.suffix], base_iri=memory.resolve().as_uri())
-    next(iter(parser), None)
-    return dict(parser.prefixes)
+    Memory.load(memory)  # what it isn't, it says better
+    parser = ox.parse(path=str(memory), format=ox.RdfFormat.TURTLE, base_iri=memory.resolve().as_uri())
+    quads = list(parser)
+    return quads, dict(parser.prefixes)

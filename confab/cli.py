@@ -1,13 +1,16 @@
 """The command line: one function per command, each a few calls to the rooms behind it.
 
 Results go to stdout, progress and errors to stderr. Exit 0: yes; 1: the answer is no; 2: misuse or unreadable input; 3: gave up
-at a limit. Heavy imports wait inside the commands that need them.
+at a limit; 4: a fault of ours. Heavy imports wait inside the commands that need them.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -21,7 +24,9 @@ if TYPE_CHECKING:
     from confab.scene import Scene
     from planner.plan import Plan
 
-YES, NO, MISUSE, GAVE_UP = 0, 1, 2, 3
+YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
+LONGEST = 2_000
+"""Signs of a message: it quotes what others wrote, which may be of any length."""
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
 CLICK_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
@@ -295,14 +300,11 @@ def learn(
                 if not result.solved:
                     status = EXIT[result.outcome.status.value]
                     why = result.outcome.reason.text if result.outcome.reason else ""
-                    print(f"{name}: nothing to learn, {result.outcome.status.value}: {why}", file=sys.stderr)
+                    _say(f"{name}: nothing to learn, {result.outcome.status.value}: {why}")
                     continue
                 remembered.teach(loaded, result.plan)
             if remembered.links is links:
-                print(
-                    f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned",
-                    file=sys.stderr,
-                )
+                _say(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned")
         assert remembered is not None
         if remembered.experience.episodes:
             remembered.save(memory)
@@ -544,7 +546,7 @@ def _load(source: str, iri: str | None = None) -> Scene:
     from confab.reaching import with_current_reach
     from confab.scene import load
 
-    return with_current_reach(load(source, iri), lambda what: print(f"confab: {what}", file=sys.stderr))
+    return with_current_reach(load(source, iri), _say)
 
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
@@ -561,12 +563,12 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
             from reasoner.memory.links_file import memory_lines
 
             if unknown := unknown_terms(memory_lines(path), scene.knowledge):
-                print(f"confab: {path} counts what this scene doesn't know: {'; '.join(unknown)}", file=sys.stderr)
+                _say(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
         return Memory.load(path, scene)
     except KnowledgeError as error:
         if not path.is_file():
             raise
-        print(f"confab: {error}\nconfab: planning goes on without memory", file=sys.stderr)
+        _say(f"{error}; planning goes on without memory")
         return None
 
 
@@ -617,19 +619,74 @@ def _print(what: Any) -> None:
         show_whole(what)
 
 
-def main() -> NoReturn:
-    """Run the command line; turn errors into one clear line and an exit code."""
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
     from planner.paper.transitions import DomainError
+    from reasoner.limits import LimitError
 
+    _open_streams()
     try:
-        code = app(prog_name="confab", standalone_mode=False)
+        code = app(arguments, prog_name="confab", standalone_mode=False) or YES  # None where a command decides nothing
+        sys.stdout.flush()
     except CLICK_ERROR as error:
-        _complain(_usage(error))
+        _end(MISUSE, _usage(error))
     except (KnowledgeError, DomainError) as error:
-        _complain(str(error))
+        _end(MISUSE, str(error))
+    except LimitError as error:
+        _end(GAVE_UP, str(error))
+    except MemoryError:
+        _end(GAVE_UP, "gave up: there isn't enough memory for this")
+    except RecursionError as error:
+        _end(GAVE_UP, f"gave up: something is nested too deeply to be worked on; where, is said in {_log(error)}")
+    except (KeyboardInterrupt, typer.Abort):
+        _end(INTERRUPTED, "interrupted; every file is as it was before, or whole")
     except OSError as error:
-        _complain(f"{error.filename or 'file'}: {error.strerror or error}")
-    sys.exit(code or YES)  # None where a command decides nothing
+        try:
+            sys.stdout.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still buffered has nowhere to go
+        _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        _end(
+            BUG,
+            f"a fault of Confab, not yours ({what[:200]}); please open an issue (CONTRIBUTING.md) with {_log(error)}",
+        )
+    sys.exit(code)
+
+
+def _open_streams() -> None:
+    """See to it that no file that is opened later takes the place of a standard stream that the caller has closed."""
+    closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
+    for _ in closed:
+        os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+    if 2 in closed:
+        sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
+    if 1 in closed:
+        sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
+        _end(MISUSE, "stdout is closed, so that nothing could be answered; nothing was done")
+
+
+def _is_open(stream: int) -> bool:
+    try:
+        os.fstat(stream)
+    except OSError:
+        return False
+    return True
+
+
+def _log(error: BaseException) -> str:
+    """Write a traceback into a file of its own and return where it lies."""
+    import tempfile
+    import traceback
+
+    said = "".join(traceback.format_exception(error))
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="confab-", suffix=".log", delete=False, encoding="utf-8") as file:
+            file.write(f"{sys.version}\n{sys.argv}\n{said}")
+    except OSError as failure:
+        return f"what follows, since no log can be written ({failure.strerror}): {said.splitlines()[-3:]}"
+    return file.name
 
 
 def _usage(error: Any) -> str:
@@ -642,6 +699,14 @@ def _usage(error: Any) -> str:
     return f"{said[:1].lower()}{said[1:]}; see {command} --help"
 
 
-def _complain(text: str) -> NoReturn:
-    print(f"confab: {text}", file=sys.stderr)
-    sys.exit(MISUSE)
+def _say(text: str) -> None:
+    """Say something on stderr in one line, whatever signs it quotes."""
+    line = " ".join(text.split())
+    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
+    with suppress(OSError):
+        print(f"confab: {shown}{' …' if len(line) > LONGEST else ''}", file=sys.stderr)
+
+
+def _end(code: int, text: str) -> NoReturn:
+    _say(text)
+    sys.exit(code)

@@ -196,15 +196,35 @@ class Memory:
             self.experience.learn(lived)
 
     def save(self, target: str | Path) -> Path:
-        """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters."""
+        """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters.
+
+        A file is read back before it replaces anything.
+
+        Raises
+        ------
+        KnowledgeError
+            What was written says something else than this memory; the file stays as it was.
+        OSError
+            The file can't be written.
+        """
         url = endpoint(target)
         self.experience.trusts = self.trusted - {self.experience.replica}
         if url is not None:
             push(url, self.experience, self.names, self.scene)
             return Path(target)
         links = [links_text(self.links, self.names, self.scene)] if len(self.links) else []
-        write_whole(Path(target), chain(turtle(self.experience, self.names, self.scene), links))
+        lines = chain(turtle(self.experience, self.names, self.scene), links)
+        write_whole(Path(target), lines, check=self._check_written)
         return Path(target)
+
+    def _check_written(self, file: Path) -> None:
+        """Raise `KnowledgeError` unless a file says what this memory says."""
+        found = memory_lines(file)
+        read, links = parse(found, "what was written", self.names), load_links(file, self.names, found)
+        if read != self.experience or len(links) != len(self.links):
+            raise KnowledgeError(
+                "what was written can't be read again as it was learned, so the memory stays as it was; please report it"
+            )
 
     @property
     def advisor(self) -> Advisor:

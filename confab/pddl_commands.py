@@ -11,6 +11,7 @@ from planner.grounded.plan_windows import regrouped
 from planner.grounded.task import Task
 from planner.paper.transitions import Model, Values
 from planner.plan import Plan, Step
+from reasoner.files import write_whole
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.pddl.exporting import plan_of, to_pddl
 from reasoner.pddl.importing import imported
@@ -42,7 +43,7 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         raise KnowledgeError(str(error)) from error
     title = f"{pddl.problem} ({pddl.domain})"
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
-    _write(out, text)
+    write_whole(out, text)
     return found.problem
 
 
@@ -60,7 +61,7 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     exported = to_pddl(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"
     for path, text in zip(paths, (exported.domain, exported.problem), strict=True):
-        _write(path, text)
+        write_whole(path, text)
     return paths
 
 
@@ -114,13 +115,3 @@ def _regrouped(problem: Problem, level: int, plan: list[Ground]) -> list[Ground]
         chosen.append(after[0])
         state = after[1]
     return [task.describe(operator)[:2] for operator in regrouped(task, chosen)]
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f"{path.name}.part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise KnowledgeError(f"{path}: can't be written: {error.strerror or error}") from error

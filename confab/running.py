@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from confab.memory import Memory
+from confab.memory import Memory, undisturbed
 from confab.physics import Report, progress_bar
 from confab.reaching import with_reach
 from confab.scene import Result, Scene, load
@@ -51,9 +51,14 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     report = verified(scene, result, seed, out / "run.mp4" if film else None, gui)
     show(report)
     assert_observed(scene.knowledge, report.rollouts[0].state, scene.names)
-    if report.verified:
-        remembered.learn(scene, result.plan)
-    for what, path in written(scene, result, report, remembered, out).items():
+    target = out / "memory.ttl"
+    with undisturbed(target):
+        if memory and target.exists() and memory.samefile(target):  # others may have learned meanwhile
+            remembered = Memory.load(memory, scene)
+        if report.verified:
+            remembered.learn(scene, result.plan)
+        remembered.save(target)
+    for what, path in {"memory": target, **written(scene, result, report, out)}.items():
         print(f"{what:<9} {path}")
     return YES if report.verified else NO
 
@@ -79,15 +84,14 @@ def tell(what: str) -> None:
         print(f"confab: {what}", file=sys.stderr, flush=True)
 
 
-def written(scene: Scene, result: Result, report: Report, memory: Memory, out: Path) -> dict[str, Path]:
-    """Write plan, verdicts, observed facts, memory and report, and return what lies where."""
+def written(scene: Scene, result: Result, report: Report, out: Path) -> dict[str, Path]:
+    """Write plan, verdicts, observed facts and report, and return what lies where."""
     from confab.report import report_html
 
     paths = {
         "plan": result.save(out / "plan.json"),
         "verdicts": out / "verify.json",
         "observed": out / "observed.ttl",
-        "memory": memory.save(out / "memory.ttl"),
         "report": out / "report.html",
     }
     write_whole(paths["verdicts"], json.dumps(report.json(), indent=1) + "\n")

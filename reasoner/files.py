@@ -4,57 +4,124 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import logging
 import os
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+import re
+import stat
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from time import monotonic, sleep
+from urllib.parse import quote
+from uuid import uuid4
+
+from reasoner.limits import LimitError
+
+log = logging.getLogger(__name__)
+PATIENCE = 600.0
+"""Seconds to wait for others who write beside a file: a lesson in a large scene takes minutes."""
 
 
-def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
+def write_whole(
+    path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
+) -> None:
     """Write a file so that a reader, or a crash, sees the old content or the new: temporary file, fsync, replace.
 
-    The content can come in pieces.
+    A link is followed: what it leads to is replaced. Permissions stay as they were. What is read-only, or no ordinary file,
+    isn't touched.
+
+    Parameters
+    ----------
+    path : Path
+    content : str, bytes or iterable of str
+    check : callable, optional
+        Reads what was written; raises what is wrong with it, and nothing is replaced then.
 
     Raises
     ------
     OSError
-        The folder can't be written to.
+        The file can't be written; it names the file.
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, "is a folder; wanted the name of a file", str(path))
+    target = _behind(path)
+    part = target.with_name(f".confab-{uuid4().hex}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise OSError(error.errno, f"can't be written: {error.strerror}", str(path)) from error
-    try:
-        with os.fdopen(handle, "wb") as file:
+        old = target.stat() if target.exists() else None
+        if old is not None and not stat.S_ISREG(old.st_mode):
+            what = "a folder" if stat.S_ISDIR(old.st_mode) else "no ordinary file"
+            raise OSError(errno.EISDIR, f"is {what}; wanted the name of a file")
+        if old is not None and not (old.st_mode & 0o222 and os.access(target, os.W_OK)):
+            raise OSError(errno.EACCES, "is read-only; make it writable, or give another name")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("xb") as file:
             for piece in pieces:
                 file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
             file.flush()
             os.fsync(file.fileno())
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+        if check is not None:
+            check(part)
+        if old is not None:
+            part.chmod(stat.S_IMODE(old.st_mode))
+            with suppress(PermissionError):  # only root can give a file away
+                os.chown(part, old.st_uid, old.st_gid)
+        part.replace(target)
+    except OSError as error:
+        said = (
+            (error.strerror or str(error))
+            if error.filename in (None, str(path))
+            else f"can't be written: {error.strerror}"
+        )
+        raise OSError(error.errno, said, str(path)) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
     """Let nobody else who asks for it rewrite a file until this is done; its folder is locked, so that nothing is left behind.
 
+    Links are followed, so that all ways to a file lead to one lock. Who has to wait is told so.
+
     Raises
     ------
     OSError
         There is no such folder, and it can't be made.
+    LimitError
+        Somebody else has kept the folder locked for `PATIENCE` seconds.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    folder = os.open(path.parent, os.O_RDONLY)
+    folder = _behind(path).parent
+    folder.mkdir(parents=True, exist_ok=True)
+    opened = os.open(folder, os.O_RDONLY)
+    begin, told = monotonic(), False
     try:
-        fcntl.flock(folder, fcntl.LOCK_EX)
+        while True:
+            try:
+                fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if monotonic() - begin > PATIENCE:
+                    raise LimitError(
+                        f"{path}: another process has been writing in {folder} for {PATIENCE:.0f} s; end it, then try again"
+                    ) from None
+                if not told:
+                    log.warning("confab: %s: waiting for another process that writes in %s", path, folder)
+                told = True
+                sleep(0.02)
         yield
     finally:
-        os.close(folder)
+        os.close(opened)
+
+
+def as_iri_part(name: str) -> str:
+    """Return a file's name as the last part of an IRI: what no IRI can hold is escaped.
+
+    >>> as_iri_part("my table"), as_iri_part("Küche-2")
+    ('my%20table', 'Küche-2')
+    """
+    return re.sub(r"[^\w.~-]", lambda match: quote(os.fsencode(match[0]), safe=""), name)
+
+
+def _behind(path: Path) -> Path:
+    """Return the file that a path leads to through all links, also if it doesn't exist yet."""
+    return Path(os.path.realpath(path))

@@ -19,7 +19,8 @@ from urllib3.exceptions import HTTPError, LocationValueError, MaxRetryError
 
 import ontology
 from reasoner.files import write_whole
-from reasoner.graph.knowledge import KnowledgeError, refuse_entity_tricks
+from reasoner.graph.documents import DocumentError, plain_xml
+from reasoner.graph.knowledge import KnowledgeError
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0
@@ -67,17 +68,22 @@ def fetch(url: str, folder: Path) -> Fetched:
     KnowledgeError
         It can't be reached or read, is too large, plays tricks, or is another ontology; nothing is written then.
     """
-    parts = urlsplit(url)
-    if parts.scheme not in ("http", "https") or not parts.hostname:
+    try:
+        parts = urlsplit(url)
+        good = parts.scheme in ("http", "https") and parts.hostname and ox.NamedNode(url) and (parts.port or 1)
+    except ValueError:
+        good = False
+    if not good:
         raise KnowledgeError(f"'{url}' can't be fetched: wanted the http or https address of an ontology")
     content, kind = _download(url)
     said = url.split("#")[0]
     suffix = SUFFIX.get(kind) or _guessed(said, content)
-    text = content.decode("utf-8", errors="replace")
-    if suffix == ".owl":
-        refuse_entity_tricks(url, text)
     try:
+        if suffix == ".owl":
+            content = plain_xml(content)
         triples = [quad.triple for quad in ox.parse(content, format=FORM[suffix], base_iri=url)]
+    except DocumentError as error:
+        raise KnowledgeError(f"{url}: {error}") from error
     except SyntaxError as error:
         raise KnowledgeError(f"{url}: is no {suffix[1:]} document (sent as '{kind or 'nothing'}'): {error}") from error
     iri = _declared(url, said, triples)

@@ -7,8 +7,8 @@ in the shipped one.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
@@ -18,18 +18,17 @@ from typing import Protocol, TypeAlias
 import pyoxigraph as ox
 
 import ontology
+from reasoner.graph.documents import DocumentError, document
+from reasoner.limits import Deadline
 
 CORE = "https://w3id.org/confab/core#"
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 SCENE = ("asserted", "inferred", "reach")
 """The graphs that a planning call starts from."""
-FORMATS = {
-    ".ttl": ox.RdfFormat.TURTLE,
-    ".nt": ox.RdfFormat.N_TRIPLES,
-    ".owl": ox.RdfFormat.RDF_XML,
-    ".rdf": ox.RdfFormat.RDF_XML,
-}
+TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
+"""What a file has in it that speaks of triples, in one of the three notations."""
+HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
 NO_ROWS = "wanted a SELECT query, whose answer is rows; ASK gives none, and CONSTRUCT goes into a file: -o FILE.ttl"
 PREFIXES = {
     "": CORE,
@@ -81,6 +80,8 @@ class KnowledgeGraph:
         The store that answers instead of `store`; it is only read.
     round_trips : int
         How many queries were asked so far.
+    deadline : Deadline
+        When reading and asking end with a `LimitError`.
     """
 
     scene: str
@@ -89,6 +90,7 @@ class KnowledgeGraph:
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
     remote: Remote | None = None
     round_trips: int = 0
+    deadline: Deadline = field(default_factory=Deadline)
 
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
         """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
@@ -128,6 +130,7 @@ class KnowledgeGraph:
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
         """Return what any SPARQL 1.1 query answers on the union of some graphs; a remote store decides itself on which."""
+        self.deadline.check("asking the knowledge graph")
         self.round_trips += 1
         if self.remote:
             return self.remote.query(query, self.prefixes, bindings)
@@ -160,7 +163,7 @@ class KnowledgeGraph:
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
 
-def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
+def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline | None = None) -> KnowledgeGraph:
     """Load a scene with all that it imports, and its reach file if there is one.
 
     Parameters
@@ -169,6 +172,8 @@ def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
         Name of a shipped scene, or a file in Turtle, N-Triples or RDF/XML.
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
+    deadline : Deadline, optional
+        When loading, and whatever is asked of the graph later, ends.
 
     Raises
     ------
@@ -176,7 +181,7 @@ def load(source: str | Path, store: ox.Store | None = None) -> KnowledgeGraph:
         No such scene or file; syntax error with line and column; an import that no catalog knows.
     """
     path = scene_file(source)
-    graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
+    graph = KnowledgeGraph("", store=ox.Store() if store is None else store, deadline=deadline or Deadline())
     read_into(graph, path, "asserted")
     graph.scene = _only_ontology(graph, path)
     waiting = [(graph.scene, path)]
@@ -210,38 +215,33 @@ def scene_file(source: str | Path) -> Path:
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     """Read one file into a named graph of the store, and its prefixes into the graph's."""
-    form = FORMATS.get(file.suffix.lower())
-    if form is None:
-        raise KnowledgeError(f"{file}: unknown kind of file; wanted one of {', '.join(FORMATS)}")
-    try:
-        if form == ox.RdfFormat.RDF_XML:
-            refuse_entity_tricks(file, file.read_text(encoding="utf-8", errors="replace"))
-        base = file.resolve().as_uri()
-        graph.store.load(path=str(file), format=form, base_iri=base, to_graph=ox.NamedNode(BASE + name))
+    graph.deadline.check(f"reading {file}")
+    target = ox.NamedNode(BASE + name)
+    with readable(file) as (content, form):
+        graph.store.load(input=content, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
+        if any(sign in content for sign in TRIPLE_TERMS) and graph.query(HAS_TRIPLE_TERM, [name]):
+            raise KnowledgeError(f"{file}: speaks of triples (RDF 1.2), which OWL doesn't know; take them out")
         read_prefixes(graph, file)
+
+
+@contextmanager
+def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
+    """Give a file of RDF as its parser may see it, and its format; what is wrong with it becomes a `KnowledgeError`."""
+    try:
+        yield document(file)
     except SyntaxError as error:
         raise KnowledgeError(f"{file}: {error.msg}") from error
+    except DocumentError as error:
+        raise KnowledgeError(f"{file}: {error}") from error
     except OSError as error:
         raise KnowledgeError(f"{file}: can't be read: {error.strerror or error}") from error
 
 
-def refuse_entity_tricks(file: Path | str, content: str) -> None:
-    """Let through RDF/XML whose entities abbreviate namespaces, as Protégé 4 wrote them, and nothing else of a DTD."""
-    head = content.partition("<rdf:RDF")[0]
-    doctype = re.search(r"<!DOCTYPE\s+[^\[>]*", head)
-    for entity in re.findall(r"<!ENTITY\s[^>]*>", head) + ([doctype[0] + ">"] if doctype else []):
-        plain = re.fullmatch(r"""<!ENTITY\s+[\w.-]+\s+(?:"[^"&%]*"|'[^'&%]*')\s*>|<!DOCTYPE\s+[\w:.-]+\s*>""", entity)
-        if plain is None:
-            raise KnowledgeError(
-                f"{file}: refused, since '{entity}' reads another file or grows when expanded; "
-                "save the ontology again without a document type (Protégé 5 writes none)"
-            )
-
-
 def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
     """Read the prefixes at the top of a file into the graph's."""
-    parser = ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.resolve().as_uri())
-    list(islice(parser, 1))
+    with readable(file) as (content, form):
+        parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
+        list(islice(parser, 1))
     for prefix, namespace in parser.prefixes.items():
         graph.prefixes.setdefault(prefix, namespace)
 

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from urllib.error import URLError
-from urllib.parse import quote, urlencode
+from urllib.parse import quote, unquote, urlencode
 from urllib.request import Request, urlopen
 
 import pyoxigraph as ox
@@ -39,7 +39,7 @@ HEAD = """@prefix : <{core}> .
 @prefix rdfs: <{rdfs}> .
 @prefix m: <{space}> .
 
-<{iri}> a owl:Ontology ; owl:imports <{domain}> ; :memoryFormat {format} ; :learnsAs "{replica}" .
+{iri} a owl:Ontology ; owl:imports {domain} ; :memoryFormat {format} ; :learnsAs {replica} .
 """
 LINK = (
     "m:{counter} :associatedWith m:{pattern} . [] a owl:Axiom ; owl:annotatedSource m:{counter} ; "
@@ -116,14 +116,16 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 
 def turtle(experience: Experience, names: Names, domain: str, only: str | None = None) -> Iterator[str]:
     """Yield a memory as Turtle, counter by counter; `only` those of one replica."""
-    iri = f"urn:uuid:{experience.replica}"
+    iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": PREFIXES["owl"], "rdfs": PREFIXES["rdfs"], "space": SPACE}
-    yield HEAD.format(**prefixes, iri=iri, domain=domain, format=FORMAT, replica=experience.replica)
+    replica = _text(experience.replica)
+    yield HEAD.format(**prefixes, iri=iri, domain=ox.NamedNode(domain), format=FORMAT, replica=replica)
     for replica in sorted(experience.trusts) if only is None else ():
-        yield f"<{iri}> :trusts {_text(replica)} .\n"
+        yield f"{iri} :trusts {_text(replica)} .\n"
     for replica, episodes in sorted(experience.episodes.items()):
         if only in (None, replica):
-            yield f'm:replica_{replica} a owl:NamedIndividual, :Replica ; :replica "{replica}" ; :episodes {episodes} .\n'
+            node = _node(SPACE, "replica_" + replica)
+            yield f"{node} a owl:NamedIndividual, :Replica ; :replica {_text(replica)} ; :episodes {episodes} .\n"
     written: set[Pattern] = set()
     ids: dict[Pattern, str] = {}
     for (replica, epoch), tallies in sorted(experience.counts.items()):
@@ -161,12 +163,16 @@ def _pattern(pattern: Pattern) -> str:
 
 def _term(name: str, names: Names) -> str:
     """Return a behaviour or class as an IRI; what the scene doesn't know is kept under its name."""
-    return f"<{names.iri(name)}>" if name in names else f"<{SPACE}{quote(name)}>"
+    return str(ox.NamedNode(names.iri(name))) if name in names else _node(SPACE, name)
+
+
+def _node(space: str, name: str) -> str:
+    """Return the IRI of any name in a namespace, as Turtle and SPARQL write it."""
+    return str(ox.NamedNode(space + quote(name, safe="")))
 
 
 def _text(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+    return str(ox.Literal(text))
 
 
 # ------------------------------------------------------------------------------------------------------------- reading
@@ -222,7 +228,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
         if predicate == "trusts":
             trusts.setdefault(_id(triple.subject), set()).add(_id(triple.object))
         nodes.setdefault(_id(triple.subject), {})[predicate] = _id(triple.object)
-    head = next((node for node in nodes.values() if "memoryFormat" in node), None)
+    iri, head = next(((iri, node) for iri, node in nodes.items() if "memoryFormat" in node), ("", None))
     if head is None:
         raise KnowledgeError(
             f"{source}: no memory of counts: it says no :memoryFormat; a memory of the paper's mode has none"
@@ -234,11 +240,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
         )
     if "learnsAs" not in head:
         raise KnowledgeError(f"{source}: broken memory: it doesn't say who learns into it (:learnsAs); restore a copy")
-    experience = Experience(head["learnsAs"], trusts=trusts.get(f"urn:uuid:{head['learnsAs']}", set()))
+    experience = Experience(head["learnsAs"], trusts=trusts.get(iri, set()))
     try:
         for node in nodes.values():
             if "episodes" in node:
-                experience.episodes[node["replica"]] = int(node["episodes"])
+                experience.episodes[node["replica"]] = _count(node["episodes"], "episodes")
             if "chosen" in node:  # the paper's links have a probability alone
                 counter, pattern = (
                     _local(node[PREFIXES["owl"] + end]) for end in ("annotatedSource", "annotatedTarget")
@@ -264,10 +270,19 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
 
 def _meaning(node: Mapping[str, str], names: Names | None) -> tuple[tuple[str, int], Conclusion]:
     def short(iri: str) -> str:
+        if iri.startswith(SPACE):  # what the scene didn't know is kept under its name
+            return unquote(iri.removeprefix(SPACE))
         return names.short(iri) if names is not None else _local(iri)
 
     classes = tuple(short(node[role]) for role in ROLES if role in node)
-    return (node["replica"], int(node["epoch"])), Conclusion(short(node["behavior"]), classes)
+    return (node["replica"], _count(node["epoch"], "epoch")), Conclusion(short(node["behavior"]), classes)
+
+
+def _count(text: str, what: str) -> int:
+    """Return a number that something was counted to; raise ValueError if that can't be."""
+    if not 0 <= (number := int(text)) < MOST:
+        raise ValueError(f":{what} {number}; wanted a number from 0 to {MOST}")
+    return number
 
 
 def _facts(text: str, name: str, source: str, pairs: Pairs) -> Pattern:
@@ -311,7 +326,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
 
 def push(endpoint: str, experience: Experience, names: Names, domain: str, timeout: float = 60.0) -> None:
     """Replace this replica's own graph at a SPARQL endpoint by what it has counted; no other replica's is touched."""
-    graph = f"<{SPACE}graph/{experience.replica}>"
+    graph = _node(SPACE + "graph/", experience.replica)
     text = "".join(turtle(experience, names, domain, only=experience.replica))
     data = ox.serialize([q.triple for q in ox.parse(text, format=ox.RdfFormat.TURTLE)], format=ox.RdfFormat.N_TRIPLES)
     body = (data or b"").decode("utf-8")

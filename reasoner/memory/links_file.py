@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from decimal import Decimal
 from pathlib import Path
+from urllib.parse import quote
 
 import pyoxigraph as ox
 
@@ -52,7 +53,8 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     graph = _graph(path, found)
     nodes: dict[str, dict[str, str]] = {}
     for subject, predicate, value in graph.select(ASSERTED):
-        nodes.setdefault(text(subject), {})[text(predicate).removeprefix(CORE)] = text(value)
+        if isinstance(value, ox.NamedNode):
+            nodes.setdefault(text(subject), {})[text(predicate).removeprefix(CORE)] = text(value)
     links = Links()
     for behavior, fact, probability in graph.select(ANNOTATED):
         try:
@@ -60,7 +62,9 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
             conclusion = (names.short(source["behavior"]), _arguments(source, names))
             symbol = Symbol(names.short(target["situationType"]), _arguments(target, names))
             table = links.tables.setdefault(conclusion, {}).setdefault(symbol, {})
-            table[names.short(target["value"])] = float(text(probability))
+            if not 0 <= (share := float(text(probability))) <= 1:
+                raise ValueError(f":probability {share}; wanted a number from 0 to 1")
+            table[names.short(target["value"])] = share
         except (KeyError, ValueError) as error:
             raise KnowledgeError(f"{path}: the link {text(behavior)} → {text(fact)} isn't whole: {error}") from error
     return links
@@ -190,7 +194,7 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
 
 
 def _readable(*words: str) -> str:
-    return ".".join(word.replace(":", "-") for word in words)
+    return ".".join(quote(word.replace(":", "-"), safe="") for word in words)
 
 
 def _arguments(node: dict[str, str], names: Names) -> tuple[str, ...]:

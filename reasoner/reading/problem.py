@@ -15,11 +15,14 @@ in the ontology               in `reasoner.symbols`
 
 from __future__ import annotations
 
-from collections import defaultdict
+import re
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, product
+
+import pyoxigraph as ox
 
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Term, text
 from reasoner.names import Names, local_name, nearest
@@ -95,6 +98,16 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
   ?fact a :SituatedObjectInstance ; ?property ?value
 }"""
 
+DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost"))
+"""What the core says of its nodes in numbers and truth values; all else that it says leads to other nodes."""
+HIGHEST_LEVEL = 1_000
+HIGHEST_COST = 10**9
+HIGHEST_NUMBER = 10**9
+DEEPEST = 50
+"""Conditions inside one another."""
+MOST_CONDITIONS = 10_000
+"""In one behaviour, each counted as often as it is named."""
+
 Node = Mapping[str, Sequence[str]]
 Triple = tuple[str, str, str]
 Member = tuple[str, str, int]
@@ -162,9 +175,9 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     KnowledgeError
         An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
     """
-    members = [(text(who), text(kind), _number(index)) for who, kind, index in graph.select(MEMBERS, SCENE)]
-    facts = [_triple(row) for row in graph.select(FACTS, SCENE)]
-    tuples = _nodes(_triple(row) for row in graph.select(TUPLES, SCENE))
+    members = [(text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)]
+    facts = [link(row) for row in graph.select(FACTS, SCENE)]
+    tuples = _nodes(_core_triple(row) for row in graph.select(TUPLES, SCENE))
     schema = read_schema(graph) if schema is None else schema
     return reading_of(graph.scene, frame(schema, members), facts, tuples)
 
@@ -173,13 +186,15 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
     """Read what doesn't depend on how many individuals there are, in one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
     for part, *row in graph.solutions(SCHEMA, SCENE):
-        parts[text(part)].append(_triple(row))
+        parts[text(part)].append(_core_triple(row))
     return Schema(
         nodes=_nodes(parts["node"]),
         supers=_superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
         owners=sorted((kind, situation) for kind, _, situation in parts["owner"]),
         pairs=frozenset(situation for situation, _, _ in parts["pair"]),
-        from_levels={value: int(level) for value, _, level in parts["level"]},
+        from_levels={
+            value: whole_number(level, f"<{value}>: :fromLevel", 0, HIGHEST_LEVEL) for value, _, level in parts["level"]
+        },
         facts=_nodes(parts["fact"]),
         tuples=bool(parts["tuples"]),
         expressions=_nodes(parts["expression"]),
@@ -239,13 +254,17 @@ def frame(
     if earlier is not None and earlier.names.agree(names):
         behaviors = earlier.domain.behaviors
     else:
-        ordered = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=lambda iri: parts.number(iri, "level"))
+        ordered = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         behaviors = {names.short(iri): parts.behavior(iri) for iri in ordered}
     domain = Domain(
         situations={s.name: s for s in situations},
         behaviors=behaviors,
-        first_ids={parts.number(iri, "level"): parts.number(iri, "firstId", 0) for iri in schema.of_kind("Level")},
+        first_ids={
+            parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
+        },
     )
+    for behavior in domain.behaviors.values():
+        _check_behavior(behavior, domain)
     return Frame(schema, parts, domain, classes, parents, properties)
 
 
@@ -344,13 +363,53 @@ def _nodes(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[
     return dict(sorted(nodes.items()))
 
 
-def _triple(row: Sequence[Term]) -> Triple:
-    subject, predicate, value = map(text, row)
-    return subject, predicate, value
+def _core_triple(row: Sequence[Term]) -> Triple:
+    """Return a triple as text, once it is sure that a text isn't taken for the name of what is meant."""
+    subject, predicate, value = row
+    named = text(predicate)
+    return (
+        link(row, blank=True) if named.startswith(CORE) and named not in DATA else (text(subject), named, text(value))
+    )
 
 
-def _number(term: Term) -> int:
-    return FIRST_INDEX_OF_NONE if term is None else int(text(term))
+def link(row: Sequence[Term], blank: bool = False) -> Triple:
+    """Return a triple that leads from one individual to another, as text; only the core's own nodes can go without a name.
+
+    Raises
+    ------
+    KnowledgeError
+        A text, or something without a name, stands where an individual belongs.
+    """
+    subject, predicate, value = row
+    for term in (subject, value):
+        if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
+            what = f"'{text(term)[:60]}', a text" if isinstance(term, ox.Literal) else "something without a name"
+            raise KnowledgeError(
+                f"<{text(subject)}>: {local_name(text(predicate))} leads to {what}, where an individual belongs; "
+                "name one, without quotation marks"
+            )
+    return text(subject), text(predicate), text(value)
+
+
+def index_of(iri: str, index: str) -> int:
+    """Return a node's place in the declared order; what has no index comes last."""
+    if not index:
+        return FIRST_INDEX_OF_NONE
+    return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
+
+
+def whole_number(text: str, what: str, least: int, most: int) -> int:
+    """Return a number that stands in an ontology.
+
+    Raises
+    ------
+    KnowledgeError
+        It is none, or out of range.
+    """
+    number = int(text) if re.fullmatch(r"[+-]?\d{1,18}", text) else None
+    if number is None or not least <= number <= most:
+        raise KnowledgeError(f"{what} is '{text[:40]}'; wanted a whole number from {least} to {most}")
+    return number
 
 
 def _is(node: Node, *kinds: str) -> bool:
@@ -362,8 +421,12 @@ def _ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> li
     """Return nodes by their index, then by name."""
 
     def key(iri: str) -> tuple[int, str]:
-        index = nodes[iri].get(CORE + "index")
-        return (int(index[0]) if index else FIRST_INDEX_OF_NONE, names.short(iri))
+        if iri not in nodes:
+            raise KnowledgeError(
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+            )
+        index, *_ = nodes[iri].get(CORE + "index", [""])
+        return (index_of(iri, index), names.short(iri))
 
     return sorted(iris, key=key)
 
@@ -420,6 +483,8 @@ class _Schema:
     terms: set[str]
     pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
     definitions: Definitions
+    inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
+    count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
 
     def values(self, iri: str, name: str) -> Sequence[str]:
         return self.nodes.get(iri, {}).get(CORE + name, ())
@@ -430,12 +495,32 @@ class _Schema:
             raise KnowledgeError(f"<{iri}>: wanted one :{name}, found {len(found)}; state it in the ontology")
         return found[0]
 
-    def number(self, iri: str, name: str, default: int | None = None) -> int:
+    def number(self, iri: str, name: str, least: int, most: int, default: int | None = None) -> int:
         found = self.values(iri, name)
-        return default if not found and default is not None else int(self.one(iri, name))
+        if not found and default is not None:
+            return default
+        return whole_number(self.one(iri, name), f"<{iri}>: :{name}", least, most)
+
+    def level(self, iri: str) -> int:
+        return self.number(iri, "level", 1, HIGHEST_LEVEL)
+
+    def cost(self, iri: str) -> float:
+        if not self.values(iri, "cost"):
+            return 1.0
+        said = self.one(iri, "cost")
+        try:
+            cost = float(said)
+        except ValueError:
+            cost = -1.0
+        if not 0 <= cost <= HIGHEST_COST:  # not a number is neither
+            raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
+        return cost
 
     def flag(self, iri: str, name: str) -> bool:
-        return list(self.values(iri, name)) in (["true"], ["1"])
+        said = set(self.values(iri, name))
+        if said - {"true", "false", "1", "0"} or len(said) > 1:
+            raise KnowledgeError(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
+        return bool(said & {"true", "1"})
 
     def term(self, iri: str) -> str:
         """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
@@ -454,6 +539,8 @@ class _Schema:
     def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
         """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
         situation = self.one(iri, "situationType")
+        if situation not in self.nodes or not _is(self.nodes[situation], "SituationType"):
+            raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
         arguments = self.arguments(iri)
         value = [self.term(v) for v in self.values(iri, "value")]
         if situation in self.pairs:
@@ -463,12 +550,29 @@ class _Schema:
     def condition(self, iri: str) -> Condition:
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
+        if iri in self.inside or len(self.inside) > DEEPEST:
+            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
+            raise KnowledgeError(f"<{iri}>: the condition {what}; take it out of one of them")
+        self.count[self.inside[0] if self.inside else ""] += 1
+        if self.inside and self.count[self.inside[0]] > MOST_CONDITIONS:
+            raise KnowledgeError(
+                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
+            )
+        self.inside.append(iri)
+        found = self._condition(iri)
+        self.inside.pop()
+        return found
+
+    def _condition(self, iri: str) -> Condition:
         node, negated = self.nodes[iri], self.flag(iri, "negated")
         if _is(node, "ValueCondition"):
             return ValueCondition(*self.situation_and_value(iri), negated)
         if _is(node, "RelationCondition"):
             arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
-            return RelationCondition(self.names.short(self.one(iri, "relation")), arguments, negated)
+            relation = self.one(iri, "relation")
+            if relation not in self.nodes:
+                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+            return RelationCondition(self.names.short(relation), arguments, negated)
         if _is(node, "ClassCondition"):
             return self.definitions.condition(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
         if _is(node, "EqualityCondition"):
@@ -504,10 +608,9 @@ class _Schema:
     def behavior(self, iri: str) -> Behavior:
         parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
-        cost = self.values(iri, "cost")
         return Behavior(
             name=self.names.short(iri),
-            level=self.number(iri, "level"),
+            level=self.level(iri),
             parameters=parameters,
             variables=tuple(map(self.parameter, used)),
             preconditions=(
@@ -515,7 +618,7 @@ class _Schema:
                 *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
             ),
             effects=tuple(self.effect(value) for value in self.values(iri, "postcondition")),
-            cost=float(cost[0]) if cost else 1.0,
+            cost=self.cost(iri),
         )
 
     def terms_below(self, iri: str) -> set[str]:
@@ -543,6 +646,30 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
         for iri in schema.of_kind("SituationType")
         for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
     }
+
+
+def _check_behavior(behavior: Behavior, domain: Domain) -> None:
+    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a condition or effect has too many arguments or too few."""
+    names = [term.name for term in (*behavior.parameters, *behavior.variables)]
+    if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
+        raise KnowledgeError(
+            f"{behavior.name} has several terms called {', '.join(twice)}; give each a name of its own"
+        )
+    said: list[Condition | ValueEffect] = [*behavior.preconditions, *behavior.effects]
+    while said:
+        match said.pop():
+            case ValueCondition(situation, arguments) | ValueEffect(situation, arguments) as part:
+                wanted = len(domain.situations[situation].arguments)
+                if len(arguments) != wanted:
+                    raise KnowledgeError(
+                        f"{behavior.name} speaks of {situation} with {len(arguments)} arguments; it has {wanted}: "
+                        "mend the condition or effect, or say what has that situation type"
+                    )
+                said += part.when if isinstance(part, ValueEffect) else ()
+            case Witness(_, _, inner):
+                said += inner
+            case AnyOf(alternatives):
+                said += (condition for group in alternatives for condition in group)
 
 
 def _is_part(node: Node) -> bool:
@@ -574,7 +701,7 @@ def _situations(
                 name=name,
                 arguments=arguments,
                 range="Truth" if boolean else name,
-                level=schema.number(iri, "fromLevel", 1),
+                level=schema.number(iri, "fromLevel", 0, HIGHEST_LEVEL, 1),
                 rest=schema.term(rest[0]) if rest else None,
                 default=schema.term(default[0]) if default else (FALSE if boolean else None),
                 boolean=boolean,

@@ -32,6 +32,8 @@ from reasoner.reading.problem import (
     Schema,
     Triple,
     frame,
+    index_of,
+    link,
     read_schema,
     reading_of,
     with_goals,
@@ -308,6 +310,8 @@ class _Search:
         self.graph, self.schema = graph, schema
         self.triples: dict[Triple, None] = {}
         self.seen: set[str] = set()
+        values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
+        self.links = {*PLACES, *values, *schema.nodes}  # by which facts are said
 
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
@@ -327,12 +331,13 @@ class _Search:
                 )
         for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
-        answer = self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE)
-        rows = [
-            (s.value, p.value, o.value)
-            for s, p, o in answer
-            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode)
-        ]
+        rows = []
+        links, nodes = self.links, self.schema.nodes
+        for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
+            if not isinstance(o, ox.NamedNode) and text(p) in links and text(s) not in nodes:
+                link((s, p, o))  # says what is wrong with it
+            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode):
+                rows.append((s.value, text(p), text(o)))
         self.triples.update(dict.fromkeys(rows))
         kinds = self._below(classes)
         self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
@@ -409,7 +414,7 @@ class _Search:
             elif p == TYPE and not o.startswith(OWL):
                 kinds.append((s, o))
             elif p == INDEX:
-                indices[s] = min(int(o), indices.get(s, FIRST_INDEX_OF_NONE))
+                indices[s] = min(index_of(s, o), indices.get(s, FIRST_INDEX_OF_NONE))
         named &= self.seen
         return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
 

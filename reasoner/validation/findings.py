@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import FORMATS, KnowledgeGraph
+from reasoner.graph.knowledge import KnowledgeGraph, readable
 from reasoner.names import local_name
 
 ERROR, WARNING = "error", "warning"
@@ -114,9 +114,10 @@ def unique(findings: Iterable[Finding]) -> list[Finding]:
 def _subjects(file: Path) -> dict[str, list[str]]:
     """Return the IRIs that a file gives a type, and those that it says anything else about."""
     found: dict[str, list[str]] = {"typed": [], "other": []}
-    for quad in ox.parse(path=str(file), format=FORMATS[file.suffix.lower()], base_iri=file.as_uri()):
-        if isinstance(quad.subject, ox.NamedNode):
-            found["typed" if quad.predicate.value.endswith("#type") else "other"].append(quad.subject.value)
+    with readable(file) as (content, form):
+        for quad in ox.parse(content, format=form, base_iri=file.as_uri()):
+            if isinstance(quad.subject, ox.NamedNode):
+                found["typed" if quad.predicate.value.endswith("#type") else "other"].append(quad.subject.value)
     return found
 
 

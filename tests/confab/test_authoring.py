@@ -74,6 +74,8 @@ def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -
 
 
 MEMORY = """@prefix : <https://w3id.org/confab/core#> . @prefix m: <https://w3id.org/confab/memory#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+<urn:uuid:me> a owl:Ontology ; owl:imports <https://example.org/tearoom-scene> ; :memoryFormat 2 ; :learnsAs "me" .
 m:one :behavior <https://example.org/tearoom#B1_WASH> ; :about <https://example.org/tearoom-scene#plate1> ;
   :situationType <https://example.org/tearoom#CLEANLINES> ; :facts "item is: Plate | where is: Sink" .
 """
@@ -91,11 +93,11 @@ def test_a_renamed_term_takes_its_memory_along(tmp_path: Path) -> None:
 
 def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(tmp_path: Path) -> None:
     memory = tmp_path / "memory.ttl"
-    memory.write_text(MEMORY + 'm:two :about <https://example.org/tearoom#Plate> ; :facts "Plates" .')
+    memory.write_text(MEMORY + 'm:two :about <https://example.org/tearoom#Plate> ; :facts "are: Plates" .')
     assert migrate(memory, ["Plate=Saucer"]) == 2
     text = memory.read_text()
     assert "item is: Saucer" in text
-    assert '"Plates"' in text
+    assert '"are: Plates"' in text
     assert "https://example.org/tearoom#Saucer" in text or ":Saucer" in text
 
 

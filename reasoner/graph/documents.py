@@ -1,0 +1,119 @@
+"""Documents as they are handed to a parser: RDF/XML without the part of a DTD that reads other files or grows.
+
+A document type is read by expat, which is made for XML, and written anew with nothing in it but plain entities, as Protégé 4
+abbreviates namespaces by them. So the parser behind sees no prolog but that, whatever comments, instructions and declarations
+stood there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+from xml.parsers import expat
+
+import pyoxigraph as ox
+
+FORMATS = {
+    ".ttl": ox.RdfFormat.TURTLE,
+    ".nt": ox.RdfFormat.N_TRIPLES,
+    ".owl": ox.RdfFormat.RDF_XML,
+    ".rdf": ox.RdfFormat.RDF_XML,
+}
+MOST_EXPANDED = 50_000_000
+"""Bytes that all references to entities of a document may stand for."""
+PLAIN = re.compile(r"[^\s<>&%\"']*")
+REFERENCE = re.compile(rb"&([^\s&;#]+);")
+DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
+ADVICE = "save the ontology again without a document type (Protégé 5 writes none)"
+
+
+class DocumentError(ValueError):
+    """A document is refused; the message says why, and what to do."""
+
+
+def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
+    """Return a file of RDF as its parser may see it, and its format.
+
+    Raises
+    ------
+    DocumentError
+        Another kind of file; no XML; entities that read other files, or grow.
+    OSError
+        The file can't be read.
+    """
+    form = FORMATS.get(file.suffix.lower())
+    if form is None:
+        raise DocumentError(f"unknown kind of file; wanted one of {', '.join(FORMATS)}")
+    content = file.read_bytes()
+    return (plain_xml(content) if form == ox.RdfFormat.RDF_XML else content), form
+
+
+def plain_xml(content: bytes) -> bytes:
+    """Return an XML document with its prolog written anew; one without a document type as it is.
+
+    >>> plain_xml(b'<!--<a>--><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
+    b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
+
+    Raises
+    ------
+    DocumentError
+        It is no XML; its entities read other files or parameters, or would expand to more than `MOST_EXPANDED`.
+    """
+    prolog = _Prolog()
+    prolog.read(content)
+    body = content[prolog.end :]
+    if found := DECLARATION.search(body):
+        raise DocumentError(f"refused, since '{found[0].decode()}' stands inside the document; {ADVICE}")
+    if prolog.name is None:
+        return content
+    size = sum(
+        number * len(prolog.entities.get(name, b"")) for name, number in Counter(REFERENCE.findall(body)).items()
+    )
+    if size > MOST_EXPANDED:
+        raise DocumentError(f"refused, since its entities grow to {size:,} bytes when expanded; {ADVICE}")
+    entities = b"".join(b'<!ENTITY %s "%s">' % entity for entity in prolog.entities.items())
+    return b"<!DOCTYPE %s [%s]>" % (prolog.name, entities) + body
+
+
+class _Prolog:
+    """What stands before the first element: the document type's name, and its entities."""
+
+    def __init__(self) -> None:
+        self.name: bytes | None = None
+        self.entities: dict[bytes, bytes] = {}
+        self.end = -1
+
+    def read(self, content: bytes) -> None:
+        """Read up to the first element. The document is taken as UTF-8, as the parser behind takes it."""
+        parser = expat.ParserCreate("utf-8")
+        parser.StartDoctypeDeclHandler = self._doctype
+        parser.EntityDeclHandler = self._entity
+        parser.StartElementHandler = lambda *_: self._element(parser)
+        try:
+            parser.Parse(content, True)
+        except _PrologIsReadError:
+            return
+        except expat.ExpatError as error:
+            raise DocumentError(f"no XML: {error}") from error
+        raise DocumentError("no XML: it has no element")
+
+    def _element(self, parser: expat.XMLParserType) -> None:
+        self.end = parser.CurrentByteIndex
+        raise _PrologIsReadError
+
+    def _doctype(self, name: str, system: str | None, public: str | None, _: bool) -> None:
+        if system or public:
+            raise DocumentError(f"refused, since its document type reads '{system or public}'; {ADVICE}")
+        self.name = name.encode()
+
+    def _entity(self, name: str, parameter: bool, value: str | None, *_: object) -> None:
+        if parameter or value is None or not PLAIN.fullmatch(value):
+            raise DocumentError(
+                f"refused, since its entity '{name}' reads another file or grows when expanded; {ADVICE}"
+            )
+        self.entities.setdefault(name.encode(), value.encode())
+
+
+class _PrologIsReadError(Exception):
+    """Nothing more is to be read."""
