@@ -81,6 +81,15 @@ class Explanation:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw what spoke for the choice (right) and against it (left), and save the picture if a file is given."""
+        from confab.picturing import save, words_as_they_are
+
+        with words_as_they_are():
+            figure = self._figure()
+            if path is not None:
+                save(figure, Path(path), dpi=120)
+        return figure
+
+    def _figure(self) -> Figure:
         from matplotlib.figure import Figure
 
         shown = self.reasons[:12][::-1]
@@ -94,8 +103,6 @@ class Explanation:
         axes.axvline(0, color="black", linewidth=0.8)
         axes.set_xlabel("difference of ln odds")
         axes.set_title(f"{self.chosen}\nnot {self.other}", fontsize=10)
-        if path is not None:
-            figure.savefig(path, dpi=120)
         return figure
 
 

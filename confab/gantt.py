@@ -4,22 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planner.acting.schedule import Slot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def save_gantt(slots: Sequence[Slot], path: str | Path, serial: float | None = None) -> Path:
     """Draw a schedule, and the time that one hand after the other would take, into a picture file; return where."""
-    import matplotlib
+    from confab.picturing import save, words_as_they_are
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    with words_as_they_are():
+        return save(_gantt(slots, serial), Path(path), dpi=110)
+
+
+def _gantt(slots: Sequence[Slot], serial: float | None) -> Figure:
+    from matplotlib import colormaps
+    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
     workers = sorted({slot.worker for slot in slots})
     behaviors = list(dict.fromkeys(slot.step.behavior for slot in slots))
-    colors = pyplot.get_cmap("Pastel1")
-    figure, axes = pyplot.subplots(figsize=(15, 1.3 + 0.85 * len(workers)), layout="constrained")
+    colors = colormaps["Pastel1"]
+    figure = Figure(figsize=(15, 1.3 + 0.85 * len(workers)), layout="constrained")
+    axes = figure.subplots()
     for slot in slots:
         row, width = workers.index(slot.worker), slot.end - slot.begin
         color = colors(behaviors.index(slot.step.behavior) % 9)
@@ -46,7 +56,4 @@ def save_gantt(slots: Sequence[Slot], path: str | Path, serial: float | None = N
         fontsize=7,
         frameon=False,
     )
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
-    return Path(path)
+    return figure

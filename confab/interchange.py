@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,10 @@ from planner.plan import Outcome, Plan, Status, Step
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
 from reasoner.symbols import Behavior, Problem
+
+
+DEEPEST = 50
+"""Steps inside one another in a plan that is read."""
 
 
 def step_json(step: Step) -> dict[str, Any]:
@@ -60,7 +65,9 @@ def read_plan(path: Path, problem: Problem) -> Plan:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except RecursionError as error:
+        raise KnowledgeError(f"{path}: no plan: brackets are nested too deeply") from error
+    except ValueError as error:  # of JSON, of UTF-8, and of numbers with thousands of digits
         raise KnowledgeError(f"{path}: not JSON: {error}") from error
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
     if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
@@ -107,15 +114,23 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
     if behavior is None:
         hint = nearest(data["behavior"], problem.domain.behaviors)
         raise KnowledgeError(f"{where}: the scene has no behaviour '{data['behavior']}'{hint}")
-    arguments = tuple(map(str, data.get("arguments", ())))
+    said, bound, below = data.get("arguments", []), data.get("bindings", {}), data.get("steps", [])
+    number, rank = data.get("id"), data.get("rank")
+    for name, value, kind in (("arguments", said, list), ("bindings", bound, dict), ("steps", below, list)):
+        if not isinstance(value, kind):
+            wanted = "an object" if kind is dict else "a list"
+            raise KnowledgeError(f"{where}: '{name}' is {json.dumps(value)[:40]}; wanted {wanted}")
+    if len(position) > DEEPEST:
+        raise KnowledgeError(f"{where}: lies inside more than {DEEPEST} others; a plan has a step of each level at most")
+    arguments = tuple(map(str, said))
     check_arguments(problem, behavior, arguments, where)
     return Step(
         path=position,
-        id=data["id"] if isinstance(data.get("id"), int) else problem.id_of(behavior.name, arguments),
+        id=number if type(number) is int else problem.id_of(behavior.name, arguments),
         level=behavior.level,
         behavior=behavior.name,
         arguments=arguments,
-        bindings={str(k): str(v) for k, v in dict(data.get("bindings", {})).items()},
-        rank=data.get("rank"),
-        steps=tuple(_step(below, (*position, i), path, problem) for i, below in enumerate(data.get("steps", ()))),
+        bindings={str(k): str(v) for k, v in bound.items()},
+        rank=rank if isinstance(rank, float) and isfinite(rank) else None,
+        steps=tuple(_step(step, (*position, i), path, problem) for i, step in enumerate(below)),
     )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 from reasoner.embodiment.reach import reach_relation
+from reasoner.files import write_whole
 from reasoner.graph.knowledge import KnowledgeError, text
 from reasoner.names import local_name
 from reasoner.reading.quantification import behavior_named
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
     from sim.world import World
 
 KINDS = (".png", ".svg", ".pdf")
+MOST_ROWS, DEEPEST = 500, 100
+"""Of a diagram: what is larger no picture can hold."""
 REACHED, UNREACHED = (30, 140, 60), (200, 40, 40)
 VIEWPOINT = "seen from across the table: the robot's left is on the right"
 GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"
@@ -60,11 +65,24 @@ def draw(scene: Scene, path: Path, behavior: str | None = None, classes: bool = 
         raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {' or '.join(wanted)}")
     if behavior is not None and classes:
         raise KnowledgeError("--behavior and --classes exclude each other; give one")
-    path.parent.mkdir(parents=True, exist_ok=True)
     if not diagram:
         return _table(scene, path)
-    figure = class_tree(scene) if behavior is None else card(scene, behavior)
-    figure.savefig(path, dpi=100)
+    with words_as_they_are():
+        return save(class_tree(scene) if behavior is None else card(scene, behavior), path)
+
+
+def words_as_they_are() -> AbstractContextManager[None]:
+    """Let figures that are made meanwhile show a ``$`` as a dollar, where matplotlib would begin a formula."""
+    from matplotlib import rc_context
+
+    return rc_context({"text.parse_math": False})
+
+
+def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
+    """Write a figure in the form that the path's ending names, whole or not at all; return the path."""
+    drawn = BytesIO()
+    figure.savefig(drawn, dpi=dpi, format=path.suffix[1:].lower())
+    write_whole(path, drawn.getvalue())
     return path
 
 
@@ -76,6 +94,10 @@ def card(scene: Scene, name: str) -> Figure:
     iri = scene.names.iri(behavior.name)
     before, after = (_parts(scene, iri, which) for which in ("precondition", "postcondition"))
     high = max(len(before), len(after), 3)
+    if high > MOST_ROWS:
+        raise KnowledgeError(
+            f"{behavior.name} has {high} conditions or effects, too many to draw (at most {MOST_ROWS})"
+        )
     figure = Figure(figsize=(10, 0.62 * high + 0.6), layout="constrained")
     axes = _blank(figure)
     chosen = ", ".join(f"{p.name.lstrip('?')} ({p.kind})" for p in behavior.parameters)
@@ -113,7 +135,11 @@ def class_tree(scene: Scene) -> Figure:
     spots: dict[str, tuple[int, float]] = {}
 
     def put(iri: str, depth: int, row: float) -> float:
-        start = row
+        start, spots[iri] = row, (depth, row)
+        if depth > DEEPEST or row > MOST_ROWS:
+            raise KnowledgeError(
+                f"{scene.iri} has too many classes to draw (at most {MOST_ROWS} rows, {DEEPEST} below one another)"
+            )
         for child in below.get(iri, ()):
             row = put(child, depth + 1, row) if child not in spots else row
         row = max(row, start + 1)
@@ -214,5 +240,7 @@ def _table(scene: Scene, path: Path) -> Path:
         pen.text((x - width / 2, y - 21), name, font=font, fill=(250, 251, 253))
     pen.rectangle((0, 0, pen.textlength(VIEWPOINT, font=font) + 12, 18), fill=(250, 251, 253))
     pen.text((6, 2), VIEWPOINT, font=font, fill=(30, 36, 46))
-    image.save(path, optimize=True)
+    drawn = BytesIO()
+    image.save(drawn, "png", optimize=True)
+    write_whole(path, drawn.getvalue())
     return path

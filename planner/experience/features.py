@@ -79,9 +79,10 @@ class Schema:
         self.variables = program.variables
         self.mentioned = mentioned(problem)
         self.names = frozenset(named(problem)) | {TRUE, FALSE}
+        depths = _depths(problem)
         self._narrowest = sorted(
             (kind for kind in self.mentioned if kind in self.members),
-            key=lambda kind: (len(self.members[kind]), -_depth(kind, problem), kind),
+            key=lambda kind: (len(self.members[kind]), -depths[kind], kind),
         )
         self.kinds = {who: self._kind(who) for members in problem.classes.values() for who in members}
         self.classes = _most_specific(problem)
@@ -393,14 +394,27 @@ def mentioned(problem: Problem) -> tuple[str, ...]:
 def _most_specific(problem: Problem) -> dict[str, str]:
     """Return for each individual its smallest class."""
     found: dict[str, str] = {}
-    for kind in sorted(problem.classes, key=lambda kind: (-len(problem.classes[kind]), _depth(kind, problem), kind)):
+    depths = _depths(problem)
+    for kind in sorted(problem.classes, key=lambda kind: (-len(problem.classes[kind]), depths[kind], kind)):
         found.update(dict.fromkeys(problem.classes[kind], kind))
     return found
 
 
-def _depth(kind: str, problem: Problem) -> int:
-    """Return how many superclasses a class has above it, along the longest chain."""
-    return 1 + max((_depth(parent, problem) for parent in problem.parents.get(kind, ())), default=0)
+def _depths(problem: Problem) -> dict[str, int]:
+    """Return how many superclasses each class has above it, along the longest chain; a circle of classes is cut somewhere."""
+    found: dict[str, int] = {}
+    for kind in problem.classes:
+        path = {kind: None}
+        while path:
+            top = next(reversed(path))
+            parents = problem.parents.get(top, ())
+            above = next((parent for parent in parents if parent not in found and parent not in path), None)
+            if above is not None:
+                path[above] = None
+            else:
+                found[top] = 1 + max((found.get(parent, 0) for parent in parents), default=0)
+                del path[top]
+    return found
 
 
 def _partners(tuples: frozenset[tuple[str, ...]]) -> tuple[dict[str, frozenset[str]], dict[str, frozenset[str]]]:

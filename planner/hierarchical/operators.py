@@ -504,8 +504,8 @@ def _ready(waiting: Sequence[Condition], bound: set[str], where: str) -> Conditi
 
 
 def _name(prefix: str, name: str) -> str:
-    """Return an identifier for a term; distinct terms get distinct ones."""
-    clean = re.sub(r"\W", lambda m: f"_{ord(m[0]):x}_", name)
+    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
+    clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
     return f"{prefix}_{clean}"
 
 

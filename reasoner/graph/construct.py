@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
+from reasoner.files import as_iri_part, write_whole
 from reasoner.graph.knowledge import PREFIXES, KnowledgeError, KnowledgeGraph
 
 
@@ -29,7 +29,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path) -> int:
     if not found:
         raise KnowledgeError("the query gives no triples, so no file was written")
     owl, kind = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
-    iri = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{path.stem}")
+    iri = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     head = [
         ox.Triple(iri, kind, ox.NamedNode(owl + "Ontology")),
         ox.Triple(iri, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),

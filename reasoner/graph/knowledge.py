@@ -14,6 +14,7 @@ from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Protocol, TypeAlias
+from urllib.parse import unquote
 
 import pyoxigraph as ox
 
@@ -274,7 +275,7 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
                 raise KnowledgeError(f"{catalog}: <{iri}> shall lie in {found}, which doesn't exist; mend the entry")
             return found
     for suffix in ontology.SUFFIXES:
-        path = importer.with_name(iri.rstrip("#/").rsplit("/", 1)[-1] + suffix)
+        path = importer.with_name(unquote(iri.rstrip("#/").rsplit("/", 1)[-1]).replace("/", "_") + suffix)
         if path.is_file():
             return path
     web = iri.startswith(("http://", "https://"))

@@ -68,7 +68,11 @@ class Endpoint:
     graphs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        parts = urlsplit(self.url)
+        try:
+            parts = urlsplit(self.url)
+            ox.NamedNode(self.url)
+        except ValueError as error:
+            raise KnowledgeError(f"'{self.url}' is no address of an endpoint: {error}") from error
         if parts.username is not None:
             login = f"{unquote(parts.username)}:{unquote(parts.password or '')}"
             self.authorization = self.authorization or urllib3.make_headers(basic_auth=login)["authorization"]

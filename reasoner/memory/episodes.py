@@ -21,7 +21,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
+from reasoner.files import as_iri_part, write_whole
 from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeGraph
 from reasoner.names import Names
 
@@ -59,7 +59,7 @@ def assert_episode(graph: KnowledgeGraph, episode: Data, names: Names, name: str
 
 def ontology_of(episode: Data, name: str) -> str:
     """Return the IRI of the ontology that an episode is written as."""
-    return f"{str(episode['scene']).rstrip('#/').rpartition('/')[0]}/{name}"
+    return f"{str(episode['scene']).rstrip('#/').rpartition('/')[0]}/{as_iri_part(name)}"
 
 
 def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[ox.Triple]:

@@ -203,10 +203,16 @@ class Definitions:
 
     def _list(self, node: str, name: str) -> list[str]:
         found: list[str] = []
-        (rest,) = self.nodes.get(node, {}).get(OWL + name, [RDF + "nil"])
-        while rest != RDF + "nil":
-            found += self.nodes[rest][RDF + "first"]
-            (rest,) = self.nodes[rest][RDF + "rest"]
+        rests, seen = self.nodes.get(node, {}).get(OWL + name, [RDF + "nil"]), set[str]()
+        while rests != [RDF + "nil"]:
+            cell = self.nodes.get(rests[0], {})
+            if len(rests) != 1 or rests[0] in seen or len(cell.get(RDF + "first", ())) != 1:
+                raise KnowledgeError(f"the list of an owl:{name} isn't whole; write it as ( … )")
+            seen.add(rests[0])
+            found += cell[RDF + "first"]
+            rests = cell.get(RDF + "rest", [])
+            if not rests:
+                raise KnowledgeError(f"the list of an owl:{name} has no end; write it as ( … )")
         return found
 
 

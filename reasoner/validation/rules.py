@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from urllib.parse import unquote
 
 import pyoxigraph as ox
 
@@ -169,7 +170,7 @@ def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
 def files_and_iris(case: Case) -> Iterator[Fault]:
     """Find files whose name isn't the last part of their IRI, and catalogs that lead elsewhere."""
     for iri, file in case.graph.files.items():
-        wanted = local_name(iri)
+        wanted = unquote(local_name(iri))
         if file.stem != wanted:
             yield (
                 iri,
