@@ -236,10 +236,18 @@ def query(
     out: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE.ttl", help="What CONSTRUCT gives, as an ontology.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which the query ends (exit 3).")
+    ] = 60.0,
+    rows: Annotated[int, typer.Option("--rows", metavar="N", min=1, help="More rows than this end it, too.")] = 100_000,
+    service: Annotated[bool, typer.Option("--service", help="Let the query ask other endpoints (SERVICE).")] = False,
     iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask a scene in SPARQL, or what its objects afford."""
+    from reasoner.graph.apart import QueryLimits
+
+    limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
     asked = {"QUERY": sparql, "--show": show, "--affords": affords}
     given = [name for name, value in asked.items() if value is not None]
     if len(given) > 1:
@@ -258,9 +266,9 @@ def query(
     if out is not None:
         if sparql is None:
             raise KnowledgeError("-o takes what a CONSTRUCT query gives; give the query, too")
-        print(f"{_turtle(out)}: {loaded.construct(_sparql(sparql), out)} triples")
+        print(f"{_turtle(out)}: {loaded.construct(_sparql(sparql), out, limits)} triples")
         return
-    table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql))
+    table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql), limits)
     form = "json" if as_json else form
     if form == "csv":
         print(table.csv(), end="")

@@ -13,7 +13,6 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
 from reasoner.symbols import Behavior, Problem
 
-
 DEEPEST = 50
 """Steps inside one another in a plan that is read."""
 
@@ -121,7 +120,9 @@ def _step(data: Any, position: tuple[int, ...], path: Path, problem: Problem) ->
             wanted = "an object" if kind is dict else "a list"
             raise KnowledgeError(f"{where}: '{name}' is {json.dumps(value)[:40]}; wanted {wanted}")
     if len(position) > DEEPEST:
-        raise KnowledgeError(f"{where}: lies inside more than {DEEPEST} others; a plan has a step of each level at most")
+        raise KnowledgeError(
+            f"{where}: lies inside more than {DEEPEST} others; a plan has a step of each level at most"
+        )
     arguments = tuple(map(str, said))
     check_arguments(problem, behavior, arguments, where)
     return Step(

@@ -15,7 +15,7 @@ from confab.interchange import outcome_json
 from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import NO_ROWS, KnowledgeError, KnowledgeGraph
 from reasoner.graph.knowledge import load as load_graph
 from reasoner.memory.links import Links
 from reasoner.names import Names, nearest
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from planner.acting.episode import World
     from planner.acting.executive import Moment
     from reasoner.embodiment.values import Embodiment
+    from reasoner.graph.apart import QueryLimits
     from reasoner.graph.mirror import Mirror
 
 MODES = ("guarded", "leading", "strict", "paper")
@@ -134,34 +135,41 @@ class Scene:
             infer(self.knowledge)
             self.reading = read(self.knowledge)
 
-    def query(self, sparql: str) -> Table:
+    def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
         """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
+
+        It is answered in a process of its own: see `reasoner.graph.apart`.
 
         Raises
         ------
         KnowledgeError
-            The query isn't SPARQL, or has no rows as its answer.
+            The query isn't SPARQL, asks another endpoint without leave, or has no rows as its answer.
+        LimitError
+            It takes more time, rows or memory than the limits allow.
         """
+        from reasoner.graph.apart import ask
         from reasoner.reading.affordance import SITUATION, write_situation
 
         self._pull()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
-        columns, rows = self.knowledge.table(sparql)
-        return Table(columns, tuple(tuple(self._cell(term) for term in row) for row in rows))
+        kind, columns, rows = ask(self.knowledge, sparql, limits)
+        if kind != "rows":
+            raise KnowledgeError(NO_ROWS)
+        return Table(tuple(columns), tuple(tuple(self._cell(term) for term in row) for row in rows))
 
-    def construct(self, sparql: str, path: str | Path) -> int:
+    def construct(self, sparql: str, path: str | Path, limits: QueryLimits | None = None) -> int:
         """Write the triples that a CONSTRUCT query gives into a file that imports this scene; return how many they are.
 
         Raises
         ------
-        KnowledgeError
-            The query isn't SPARQL, or gives no triples but rows.
+        KnowledgeError, LimitError
+            As `query`; the query gives no triples but rows.
         """
         from reasoner.graph.construct import write_construct
 
         self._pull()
-        return write_construct(self.knowledge, sparql, Path(path))
+        return write_construct(self.knowledge, sparql, Path(path), limits)
 
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""

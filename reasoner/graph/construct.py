@@ -7,10 +7,11 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from reasoner.files import as_iri_part, write_whole
+from reasoner.graph.apart import QueryLimits, ask
 from reasoner.graph.knowledge import PREFIXES, KnowledgeError, KnowledgeGraph
 
 
-def write_construct(graph: KnowledgeGraph, query: str, path: Path) -> int:
+def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
     """Write the triples of a CONSTRUCT query into a Turtle file and return how many they are.
 
     The file is an ontology called like it, beside the scene's IRI, and imports the scene: it can be planned in itself.
@@ -19,20 +20,22 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path) -> int:
     ------
     KnowledgeError
         The query isn't SPARQL, or its answer is no triples, or none at all.
+    LimitError
+        As `reasoner.graph.apart.ask`.
     """
-    answer = graph.query(query)
-    if not isinstance(answer, ox.QueryTriples):
+    kind, _, answer = ask(graph, query, limits)
+    if kind != "triples":
         raise KnowledgeError(
             "wanted a CONSTRUCT query, whose answer is triples; leave -o out to see the rows of a SELECT"
         )
-    found = sorted(set(answer), key=str)
+    found = sorted({ox.Triple(*triple) for triple in answer}, key=str)  # type: ignore[arg-type]
     if not found:
         raise KnowledgeError("the query gives no triples, so no file was written")
     owl, kind = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
-    iri = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
+    name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     head = [
-        ox.Triple(iri, kind, ox.NamedNode(owl + "Ontology")),
-        ox.Triple(iri, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
+        ox.Triple(name, kind, ox.NamedNode(owl + "Ontology")),
+        ox.Triple(name, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
     ]
     text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.prefixes)
     write_whole(path, text or b"")

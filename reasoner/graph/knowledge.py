@@ -110,11 +110,6 @@ class KnowledgeGraph:
             raise KnowledgeError(NO_ROWS)
         return answer
 
-    def table(self, query: str) -> tuple[tuple[str, ...], list[Row]]:
-        """Return columns and rows of a SELECT query on the union of the graphs; errors as in `select`."""
-        answer = self.solutions(query)
-        return tuple(variable.value for variable in answer.variables), [tuple(row) for row in answer]
-
     def ntriples(self, graphs: Sequence[str] = GRAPHS) -> bytes:
         """Return the triples of some graphs as N-Triples; of a remote store, all that it shows."""
         if self.remote:

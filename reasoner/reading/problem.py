@@ -649,7 +649,7 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a condition or effect has too many arguments or too few."""
+    """Raise `KnowledgeError` if two terms of a behaviour share a name, or a part of it has more or fewer arguments than it can."""
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
         raise KnowledgeError(
