@@ -29,7 +29,7 @@ def main() -> None:
             answer: tuple[str, object, object] = ("truth", (), bool(found))
         else:
             columns = [variable.value for variable in getattr(found, "variables", ())]
-            rows = []
+            rows: list[tuple[object, ...]] = []
             for row in found:
                 rows.append(tuple(row))
                 if len(rows) > asked["rows"]:

@@ -31,10 +31,10 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     found = sorted({ox.Triple(*triple) for triple in answer}, key=str)  # type: ignore[arg-type]
     if not found:
         raise KnowledgeError("the query gives no triples, so no file was written")
-    owl, kind = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
+    owl, type_ = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     head = [
-        ox.Triple(name, kind, ox.NamedNode(owl + "Ontology")),
+        ox.Triple(name, type_, ox.NamedNode(owl + "Ontology")),
         ox.Triple(name, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
     ]
     text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.prefixes)

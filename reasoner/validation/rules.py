@@ -116,11 +116,12 @@ def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str
 
 MERGEABLE = """
 SELECT DISTINCT ?individual ?class WHERE {
-  { ?above a :SituationType } UNION { ?above rdfs:subClassOf :Object } UNION { VALUES ?above { :Object } }
-  UNION { ?property a owl:FunctionalProperty, owl:ObjectProperty ; rdfs:range ?above }
-  ?class rdfs:subClassOf* ?above . FILTER(isIRI(?class))
+  { SELECT DISTINCT ?class WHERE {
+    { ?above a :SituationType } UNION { ?above rdfs:subClassOf :Object } UNION { VALUES ?above { :Object } }
+    UNION { ?property a owl:FunctionalProperty, owl:ObjectProperty ; rdfs:range ?above }
+    ?class rdfs:subClassOf* ?above . FILTER(isIRI(?class) && (!STRSTARTS(STR(?class), STR(:)) || ?class = :Hand))
+  } }
   ?individual a ?class, owl:NamedIndividual . FILTER NOT EXISTS { ?individual a owl:Class }
-  FILTER(!STRSTARTS(STR(?class), STR(:)) || ?class = :Hand)
 }"""
 
 

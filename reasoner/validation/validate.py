@@ -25,7 +25,7 @@ import ontology
 from reasoner.embodiment import measures
 from reasoner.embodiment.reading import EmbodimentError, read_embodiment
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.graph.knowledge import BASE, CORE, GRAPHS, PREFIXES, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
@@ -50,6 +50,9 @@ CONSEQUENCES = {
 ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
 SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
 SHACL = "http://www.w3.org/ns/shacl#"
+SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
+"""Namespaces of the properties that shapes look at: not at the facts of scenes, which are many."""
+LISTS = (PREFIXES["rdf"] + "first", PREFIXES["rdf"] + "rest")
 
 
 def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding]:
@@ -206,7 +209,9 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     sh = Namespace(SHACL)
     shapes = _shapes()
     data = Graph()
-    data.parse(data=graph.ntriples(["asserted"]), format="nt")
+    for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
+        if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
+            data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
     conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
     if conforms or not isinstance(report, Graph):
         return
@@ -219,6 +224,21 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
         rule, why, remedy = (str(shapes.value(source, said) or "") for said in (sh.name, sh.description, RDFS.comment))
         severity = WARNING if report.value(result, sh.resultSeverity) == sh.Warning else ERROR
         yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy, severity)
+
+
+def _rdflib(term: object) -> rdflib.term.Node:
+    from rdflib import BNode, Literal, URIRef
+
+    match term:
+        case ox.NamedNode(value=value):
+            return URIRef(value)
+        case ox.BlankNode(value=value):
+            return BNode(value)
+        case ox.Literal(value=value, language=None, datatype=datatype):
+            return Literal(value, datatype=URIRef(datatype.value))
+        case ox.Literal(value=value, language=language):
+            return Literal(value, lang=language)
+    raise TypeError(f"{term!r} is no term of RDF 1.1")
 
 
 @cache
