@@ -21,7 +21,7 @@ from itertools import chain
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import local_name
 from reasoner.reading.problem import (
     FIRST_INDEX_OF_NONE,
@@ -102,6 +102,10 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     constants = _constants(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)
     search = _Search(graph, schema)
+    if nameless := sorted(term for term in seeds | constants if ":" not in term):
+        raise KnowledgeError(
+            f"a condition, an effect or a goal leads to something without a name (_:{nameless[0]}), where an individual belongs"
+        )
     fresh = search.visit(seeds | constants)
     lifted = frame(schema, [member for member in search.members() if member[0] in constants])
     bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])

@@ -1,0 +1,471 @@
+"""Hostile and broken input: a result or one line, never a traceback, and nothing that was good is harmed."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+import confab
+from confab.authoring import migrate, new_domain
+from confab.cli import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, main
+from confab.memory import Memory
+from reasoner.files import alone, write_whole
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+
+Answer = tuple[int, str, str]
+Ask = Callable[..., Answer]
+
+
+@pytest.fixture
+def ask(capsys: pytest.CaptureFixture[str]) -> Ask:
+    """Call the command line in this process: exit code, stdout, stderr."""
+
+    def answer(*arguments: str | Path) -> Answer:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main([str(argument) for argument in arguments])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.out + said.err
+        return int(end.value.code or 0), said.out, said.err
+
+    return answer
+
+
+@pytest.fixture
+def tearoom(tmp_path: Path) -> Path:
+    new_domain("tearoom", tmp_path)
+    return tmp_path / "tearoom-scene.ttl"
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+
+
+# ---------------------------------------------------------------------------------------------- a memory is never lost
+
+
+ODD_NAMES = ["robot 1", "a;b", 'say "hi"', "back\\slash", "line\rbreak\n", "tab\t", "m:x . # y", "µ²…\u2028", "", "a" * 300]
+
+
+def lived(replica: str, word: str = "yes") -> Experience:
+    experience = Experience(replica)
+    experience.learn([Decision(Candidate(Conclusion("B1_WASH", ("Plate",)), (("item is", word),)))])
+    return experience
+
+
+@pytest.mark.parametrize("name", ODD_NAMES)
+def test_any_name_and_any_text_is_written_so_that_it_can_be_read(tmp_path: Path, tearoom: Path, name: str) -> None:
+    scene = confab.load(tearoom)
+    memory = Memory.of(scene)
+    memory.experience = lived(name, name.replace("\n", "") or "-")
+    memory.experience.trusts = memory.trusted = {name + " too"}
+    memory.experience.episodes[name + " too"] = 1
+    memory.save(tmp_path / "m.ttl")
+    again = Memory.load(tmp_path / "m.ttl", scene)
+    assert again.experience == memory.experience
+    assert again.trusted == memory.trusted
+    again.merge(Memory.load(tmp_path / "m.ttl"))
+    again.save(tmp_path / "m.ttl")
+    assert Memory.load(tmp_path / "m.ttl", scene).experience == memory.experience
+
+
+def test_what_cannot_be_read_again_replaces_nothing(
+    tmp_path: Path, tearoom: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory, file = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl"
+    memory.experience = lived("me")
+    memory.save(file)
+    good = file.read_bytes()
+    for broken in (["@prefix : <x"], [good.decode().replace(":chosen 1", ":chosen 2")], [good.decode().replace('"me"', '"you"')]):
+        monkeypatch.setattr("confab.memory.turtle", lambda *_, lines=broken: iter(lines))
+        with pytest.raises(KnowledgeError):
+            memory.save(file)
+        assert file.read_bytes() == good
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [(":episodes 1", ":episodes -1"), (":epoch 0", ":epoch -1"), (":chosen 1", ":chosen -1"), (":episodes 1", ":episodes 1e9")],
+)
+def test_counts_that_cannot_be_are_refused(tmp_path: Path, tearoom: Path, old: str, new: str) -> None:
+    memory = Memory.of(confab.load(tearoom))
+    memory.experience = lived("me")
+    memory.save(tmp_path / "m.ttl")
+    change(tmp_path / "m.ttl", old, new)
+    with pytest.raises(KnowledgeError, match=r"m\.ttl: broken memory"):
+        Memory.load(tmp_path / "m.ttl")
+
+
+def test_a_link_is_followed_and_permissions_stay(tmp_path: Path) -> None:
+    real, link = tmp_path / "a" / "real.ttl", tmp_path / "link.ttl"
+    real.parent.mkdir()
+    real.write_text("old")
+    real.chmod(0o600)
+    link.symlink_to(real)
+    write_whole(link, "new")
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    assert real.stat().st_mode & 0o777 == 0o600
+    new = tmp_path / "new.ttl"
+    old_mask = os.umask(0o077)
+    try:
+        write_whole(new, "new")
+    finally:
+        os.umask(old_mask)
+    assert new.stat().st_mode & 0o777 == 0o600
+
+
+def test_what_is_read_only_or_no_ordinary_file_stays_and_the_message_names_it(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.ttl"
+    kept.write_text("old")
+    kept.chmod(0o444)
+    with pytest.raises(OSError, match="read-only") as error:
+        write_whole(kept, "new")
+    assert error.value.filename == str(kept)
+    os.mkfifo(tmp_path / "pipe")
+    for other in (tmp_path, tmp_path / "pipe", Path(os.devnull)):
+        with pytest.raises(OSError, match="wanted the name of a file"):
+            write_whole(other, "new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["kept.ttl", "pipe"]
+    assert kept.read_text() == "old"
+
+
+def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    program = (
+        "import resource, sys; from pathlib import Path; from reasoner.files import write_whole\n"
+        "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+        "try: write_whole(Path(sys.argv[1]), 'x' * 5000)\nexcept OSError as error: print(error.filename, error.strerror)"
+    )
+    (tmp_path / "m.ttl").write_text("old")
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "m.ttl")],
+        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    assert done.stdout.startswith(f"{tmp_path / 'm.ttl'} "), done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["m.ttl"]
+    assert (tmp_path / "m.ttl").read_text() == "old"
+
+
+def test_a_rename_waits_for_whoever_writes_and_says_so(
+    tmp_path: Path, tearoom: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    memory, file, link = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl", tmp_path / "link" / "m.ttl"
+    memory.experience = lived("me")
+    memory.save(file)
+    link.parent.mkdir()
+    link.symlink_to(file)
+    renaming = threading.Thread(target=migrate, args=(link, ["B1_WASH=B1_CLEAN"]))
+    with alone(file):
+        renaming.start()
+        renaming.join(0.2)
+        assert renaming.is_alive()
+        memory.experience.merge(lived("other"))
+        memory.save(file)
+    renaming.join()
+    found = Memory.load(file)
+    assert found.experience.episodes == {"me": 1, "other": 1}
+    assert {c.behavior for _, c, _, _ in found.experience} == {"B1_CLEAN"}
+    assert "waiting for another process" in caplog.text
+
+
+@pytest.mark.parametrize("rename", ["B1_WASH=a b", "B1_WASH=", "=", "B1_WASH=http://[x", "x=y"])
+def test_a_rename_to_what_is_no_name_changes_nothing(tmp_path: Path, tearoom: Path, ask: Ask, rename: str) -> None:
+    memory, file = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl"
+    memory.experience = lived("me")
+    memory.save(file)
+    before = file.read_bytes()
+    code, _, said = ask("memory", "migrate", file, rename)
+    assert (code, said.count("\n")) == (MISUSE, 1)
+    assert file.read_bytes() == before
+
+
+# --------------------------------------------------------------------------------------------------------------- XML
+
+
+BOMB = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefgh", "bcdefghi", strict=True))
+HEAD = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:rdfs="http://www.w3.org/2000/01/rdf-schema#">'
+BODY = '<owl:Ontology rdf:about="https://x.org/s"><rdfs:label>&i;</rdfs:label></owl:Ontology></rdf:RDF>'
+
+
+@pytest.mark.parametrize(
+    ("prolog", "body", "said"),
+    [
+        (f'<!-- <rdf:RDF --><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{BOMB}]>', BODY, "entity 'b' reads another file or grows"),
+        (f'<?pi <rdf:RDF ?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{BOMB}]>', BODY, "entity 'b'"),
+        ('<!DOCTYPE x SYSTEM "file:///etc/hostname">', BODY, "reads 'file:///etc/hostname'"),
+        ('<!DOCTYPE x [<!ENTITY i SYSTEM "file:///etc/hostname">]>', BODY, "entity 'i'"),
+        ('<!DOCTYPE x [<!ENTITY % i "x"> %i;]>', BODY, "entity 'i'"),
+        (f'<!DOCTYPE x [<!ENTITY i "{"x" * 60_000}">]>', BODY.replace("&i;", "&i;" * 1_000), "grow to 60,000,000 bytes"),
+        ("", BODY.replace("&i;", '<!DOCTYPE x [<!ENTITY i "x">]>'), "stands inside the document"),
+        ("<", BODY, "no XML"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("command", ["plan", "validate"])
+def test_xml_that_reads_files_or_grows_is_refused(
+    tmp_path: Path, ask: Ask, command: str, prolog: str, body: str, said: str
+) -> None:
+    (tmp_path / "s.owl").write_text(f'<?xml version="1.0"?>{prolog}{HEAD}{body}')
+    code, out, err = ask(command, tmp_path / "s.owl")
+    assert code in (1, MISUSE)
+    assert said in out + err
+
+
+def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
+    text = BODY.replace("https://x.org/", "&i;")
+    (tmp_path / "s.owl").write_text(f'<!DOCTYPE rdf:RDF [<!ENTITY i "https://x.org/" >]>{HEAD}{text}')
+    assert confab.load(tmp_path / "s.owl").iri == "https://x.org/s"
+
+
+# ------------------------------------------------------------------------------------------------- the structure of a scene
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("-scene", "d:isAt :table", 'd:isAt "table"', "isAt leads to 'table', a text, where an individual belongs"),
+        ("-scene", "d:isAt :table", "d:isAt [ a d:Place ]", "something without a name"),
+        ("-scene", "c:value :table", 'c:value "table"', "a text, where an individual belongs"),
+        ("-scene", "c:index 1", 'c:index "one"', ":index is 'one'; wanted a whole number"),
+        ("-scene", "c:situationType d:PLACE ; ", "", "wanted one :situationType, found 0"),
+        ("-scene", "d:isAt :table", "d:isAt <<( :a :b :c )>>", "speaks of triples"),
+        ("", "c:level 1", "c:level 1.5", ":level is '1.5'; wanted a whole number from 1"),
+        ("", "c:level 1", "c:level 0", ":level is '0'"),
+        ("", "c:level 1", "c:level -1", ":level is '-1'"),
+        ("", "c:level 1", f"c:level {'9' * 5000}", ":level is '9999"),
+        ("", "c:index 1", 'c:index "one"', ":index is 'one'"),
+        ("", "c:level 1", 'c:level 1 ; c:cost "x"', ":cost is 'x'; wanted a number from 0"),
+        ("", "c:level 1", "c:level 1 ; c:cost -1", ":cost is '-1'"),
+        ("", "c:level 1", 'c:level 1 ; c:cost "NaN"^^<http://www.w3.org/2001/XMLSchema#double>', ":cost is 'NaN'"),
+        ("", "c:level 1", 'c:level 1 ; c:cost "INF"^^<http://www.w3.org/2001/XMLSchema#double>', ":cost is 'INF'"),
+        ("", "c:parameter :B1_CARRY.item,", "c:parameter :B1_CARRY.thing,", "B1_CARRY.thing> is used as a parameter but"),
+        ("", "c:precondition :B1_CARRY.free", "c:precondition :B1_CARRY.fre", "B1_CARRY.fre> is used as a condition but"),
+        ("", "c:situationType :PLACE ; c:value :B1_CARRY.place", "c:situationType :PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
+        ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY speaks of PLACE with 0 arguments; it has 1"),
+        ("", "c:AbsenceCondition ;", 'c:AbsenceCondition ; c:negated "perhaps" ;', ":negated is 'perhaps'"),
+        ("", "c:precondition :B1_CARRY.free", "c:precondition :N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY c:precondition :B1_CARRY.free", "the condition contains itself"),
+    ],
+)  # fmt: skip
+def test_a_scene_that_cannot_be_meant_is_refused_in_one_line_by_plan_and_validate(
+    tearoom: Path, ask: Ask, file: str, old: str, new: str, said: str
+) -> None:
+    change(tearoom.with_name(f"tearoom{file}.ttl"), old, new)
+    code, out, err = ask("plan", tearoom)
+    assert (code, out, err.count("\n")) == (MISUSE, "", 1)
+    assert said in err
+    assert ask("validate", tearoom)[0] == 1
+
+
+def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> None:
+    domain = tearoom.with_name("tearoom.ttl")
+    change(domain, "c:precondition :B1_CARRY.free", "c:precondition :B1_CARRY.free, :N0")
+    text = domain.read_text()
+    for deep, wide, code in ((40, 1, YES), (60, 1, MISUSE), (20, 2, MISUSE)):
+        more = []
+        for i in range(deep):
+            group = f":N{i} a c:AnyOf ; c:alternative :N{i + 1}, :B1_CARRY.free"
+            more.append(group + (f", :A{i} . :A{i} a c:AllOf ; c:condition :N{i + 1} ." if wide == 2 else " ."))
+        domain.write_text("\n".join([text, *more, f":N{deep} a c:AllOf ; c:condition :B1_CARRY.free ."]).replace(
+            f":N{deep} a c:AllOf ; c:condition :B1_CARRY.free", f":N{deep} a c:AbsenceCondition ; c:ofClass :Item ; c:situationType :PLACE ; c:value :B1_CARRY.place"
+        ))  # fmt: skip
+        assert ask("plan", tearoom)[0] == code
+
+
+def test_long_chains_and_circles_of_classes_are_taken_everywhere(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+    chain = "".join(f":K{i} a owl:Class ; rdfs:subClassOf :K{i + 1} .\n" for i in range(1000))
+    domain = tearoom.with_name("tearoom.ttl")
+    text = domain.read_text()
+    domain.write_text(text + ":Plate rdfs:subClassOf :K0 . " + chain + ":K1000 a owl:Class ; rdfs:subClassOf :Item .")
+    assert ask("plan", tearoom)[0] == YES
+    assert ask("learn", tearoom, "--memory", tmp_path / "m.ttl")[0] == YES
+    code, _, said = ask("picture", tearoom, "--classes", "-o", tmp_path / "c.svg")
+    assert code == MISUSE
+    assert "too many classes to draw" in said
+    domain.write_text(text + ":Item rdfs:subClassOf :Plate .")
+    assert ask("learn", tearoom, "--memory", tmp_path / "n.ttl")[0] == YES
+    assert ask("picture", tearoom, "--classes", "-o", tmp_path / "c.svg")[0] == YES
+
+
+@pytest.mark.parametrize("name", ["µPlate", "Plate²", "ﬁsh", "Pl-ate", "Ⅷ", "class", "Pl_2d_ate"])
+def test_classes_may_have_any_name(tearoom: Path, ask: Ask, name: str) -> None:
+    for file in (tearoom, tearoom.with_name("tearoom.ttl")):
+        file.write_text(re.sub(r"(?<!\w)d?:Plate\b", f"<https://example.org/tearoom#{name}>", file.read_text()))
+    assert ask("plan", tearoom)[0] == YES
+
+
+def test_dollars_in_labels_are_drawn(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+    change(tearoom.with_name("tearoom.ttl"), '"the item is dirty"', '"costs $5 or \\\\frac$"')
+    assert ask("picture", tearoom, "--behavior", "B1_WASH", "-o", tmp_path / "a.svg")[0] == YES
+
+
+# ------------------------------------------------------------------------------------------------- other doors
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"steps": 5}', "it has no 'steps'"),
+        ('{"steps": [{"behavior": "B1_WASH", "arguments": 5}]}', "'arguments' is 5; wanted a list"),
+        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "bindings": 5}]}', "'bindings' is 5; wanted an object"),
+        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": {"a": 1}}]}', "'steps' is {\"a\": 1}; wanted a list"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "id": ' + "9" * 5000 + "}]}", "not JSON"),
+        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": [' + '{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": [' * 200 + "]}" * 201 + "]}", "lies inside more than"),
+        ("\ufeff", "not JSON"),
+    ],
+)  # fmt: skip
+def test_a_plan_that_is_none_is_refused_in_one_line(
+    tmp_path: Path, tearoom: Path, ask: Ask, text: str, said: str
+) -> None:
+    (tmp_path / "plan.json").write_text(text)
+    code, _, err = ask("execute", tearoom, "--plan", tmp_path / "plan.json")
+    assert (code, err.count("\n")) == (MISUSE, 1)
+    assert said in err
+
+
+def test_files_may_have_any_name(tmp_path: Path, tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert ask("execute", tearoom, "--save", "ep 1.ttl", "--memory", "m.ttl")[0] == MISUSE
+    assert ask("learn", tearoom, "--memory", "my $ memory")[0] == YES
+    assert ask("execute", tearoom, "--save", 'ep "1" <x>.ttl', "--memory", "my $ memory", "--learn")[0] == YES
+    assert Path('ep "1" <x>.ttl').is_file()
+    construct = "CONSTRUCT { ?s rdfs:label ?l } WHERE { ?s rdfs:label ?l }"
+    assert ask("query", tearoom, construct, "-o", "my täble^.ttl")[0] == YES
+    assert ask("generate", "served", "-o", "Küche 1.ttl")[0] == YES
+    assert ask("validate", "Küche 1.ttl")[:2] == (YES, "nothing is wrong\n")
+
+
+@pytest.mark.parametrize("url", ["http://[bad", "http://[::1", "https://", "http://x y/", "http://x:99999999/", "http://\x1b"])
+@pytest.mark.parametrize("command", ["plan", "fetch"])
+def test_an_address_that_is_none_is_refused_in_one_line(tmp_path: Path, ask: Ask, command: str, url: str) -> None:
+    code, _, err = ask(command, url, *(["--into", tmp_path] if command == "fetch" else []))
+    assert (code, err.count("\n")) == (MISUSE, 1)
+
+
+# ------------------------------------------------------------------------------------------------- queries, apart
+
+
+NESTED = "SELECT * WHERE " + "{" * 3000 + "}" * 3000
+CROSS = "SELECT * WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
+
+
+@pytest.mark.parametrize(
+    ("query", "more", "code", "said"),
+    [
+        (NESTED, [], MISUSE, "brings the SPARQL engine down"),
+        (CROSS, [], GAVE_UP, "more than 100,000 rows"),
+        (CROSS, ["--rows", "7"], GAVE_UP, "more than 7 rows"),
+        (CROSS.replace("*", "(COUNT(*) AS ?n)"), ["--time-limit", "1"], GAVE_UP, "gave up after 1 s at the query"),
+        (CROSS + " ORDER BY ?a ?d ?g", ["--time-limit", "60"], GAVE_UP, "more than 2,000 MB of memory"),
+        ("SELECT * WHERE { service <http://127.0.0.1:9/> { ?a ?b ?c } }", [], MISUSE, "asks another endpoint"),
+    ],
+)
+def test_a_query_harms_nothing_but_itself(ask: Ask, query: str, more: list[str], code: int, said: str) -> None:
+    got, out, err = ask("query", "beverage-serving", query, *more)
+    assert (got, out, err.count("\n")) == (code, "", 1)
+    assert said in err
+
+
+def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
+    """Whatever the check of words lets through: without leave, the process can't open a connection."""
+    import http.server
+
+    asked: list[str] = []
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            asked.append(self.path)
+            self.send_response(500)
+            self.end_headers()
+
+        def log_message(self, *_: Any) -> None:
+            pass
+
+    server = http.server.HTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    from reasoner.graph import apart
+
+    scene, url = confab.load("living-room"), f"<http://127.0.0.1:{server.server_port}/q>"
+    query = f"SELECT * WHERE {{ SERVICE SILENT {url} {{ ?a ?b ?c }} }}"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(apart, "SERVICE", apart.re.compile("(?!)"))
+        scene.query(query)
+    assert not asked
+    scene.query(query, apart.QueryLimits(service=True))
+    server.shutdown()
+    server.server_close()
+    assert asked == ["/q"]
+
+
+@pytest.mark.parametrize("text", ['"SERVICE"', "<urn:SERVICE>", "?service", ":SERVICE", "'''a\nSERVICE'''"])
+def test_the_word_service_may_be_spoken_of(text: str) -> None:
+    from reasoner.graph.apart import SERVICE, TEXTS
+
+    assert SERVICE.search(TEXTS.sub(" ", f"SELECT * {{ ?a ?b {text} }}")) is None
+
+
+# ------------------------------------------------------------------------------------------------- the door
+
+
+def test_a_fault_of_ours_is_one_line_with_a_log(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> NoReturn:
+        raise KeyError("no\nsuch\x1b[2J thing")
+
+    monkeypatch.setattr("confab.scene.load", fail)
+    code, out, err = ask("plan", "beverage-serving")
+    assert (code, out, err.count("\n")) == (BUG, "", 1)
+    assert "a fault of Confab" in err
+    log = Path(err.rsplit(" with ", 1)[1].strip())
+    assert "KeyError" in log.read_text()
+    assert "Traceback" in log.read_text()
+    log.unlink()
+
+
+@pytest.mark.parametrize(("raised", "code"), [(MemoryError(), GAVE_UP), (KeyboardInterrupt(), INTERRUPTED)])
+def test_limits_and_interrupts_have_codes_of_their_own(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, raised: BaseException, code: int
+) -> None:
+    def fail(*_: object, **__: object) -> NoReturn:
+        raise raised
+
+    monkeypatch.setattr("confab.scene.load", fail)
+    got, out, err = ask("plan", "beverage-serving")
+    assert (got, out, err.strip().count("\n")) == (code, "", 0)
+
+
+@pytest.mark.parametrize(
+    ("where", "said"), [(">&-", "stdout is closed"), (">/dev/full", "stdout: No space left"), ("2>&-", ""), ("| :", "")]
+)
+def test_streams_may_be_closed_or_full(tmp_path: Path, where: str, said: str) -> None:
+    run = f'"{sys.executable}" -c "from confab.cli import main; main()" plan living-room {where}'
+    done = subprocess.run(
+        ["/bin/sh", "-c", run], capture_output=True, text=True, cwd=tmp_path, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert said in done.stderr
+    assert done.returncode == (MISUSE if said else YES)
+
+
+def test_no_control_character_is_echoed(ask: Ask) -> None:
+    code, _, err = ask("plan", "beverage-serving", "--goal", "a\x1b[2J\x07 b\r\nc")
+    assert code == MISUSE
+    assert err.strip().isprintable()
+    assert "\\x1b" in err
+
+
+def test_json_stays_json(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+    code, out, _ = ask("plan", tearoom, "--optimal", "--json")
+    assert code == YES
+    json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
