@@ -4,8 +4,8 @@
     python -m benchmarks.fuzz --cases 500 --door plan  some of one door
     python -m benchmarks.fuzz --again memory:17        one case again, its files kept
 
-A case is a door and a number, from which everything in it is drawn. It runs in a process of its own, with limits of time and memory.
-What broke is kept in ``fuzz-seeds.txt``; `tests/confab/test_fuzz.py` runs it again, and a share of new cases.
+A case is a door and a number, from which everything in it is drawn. It runs in a process of its own, with limits of time and
+memory. What broke is kept in ``fuzz-seeds.txt``; `tests/confab/test_fuzz.py` runs it again, and a share of new cases.
 """
 
 from __future__ import annotations
@@ -40,10 +40,63 @@ HERE = Path(__file__).resolve().parent
 SEEDS = HERE / "fuzz-seeds.txt"
 PROGRESS = Path("confab-out") / "fuzz.json"
 SECONDS, MEGABYTES = 30, 4_000
-OWL, RDF, XSD = "http://www.w3.org/2002/07/owl#", "http://www.w3.org/1999/02/22-rdf-syntax-ns#", "http://www.w3.org/2001/XMLSchema#"
+OWL, RDF, XSD = (
+    "http://www.w3.org/2002/07/owl#",
+    "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "http://www.w3.org/2001/XMLSchema#",
+)
 TYPE = ox.NamedNode(RDF + "type")
-ODD = ("", " ", "-1", "0", "1", "1.5", "NaN", "inf", "1e999", "9" * 30, "9" * 5000, "true", "x", "µ²", "$x$", "a b", "\t", "\r", "\n", "\0",
-       "\x1b[2J", "\u202e", "…", "'", '"', "\\", "%s", "{0}", "../x", "/", "-", "--", "=", "a=b", "nothing", "?x", "<x>", "[bad", "é" * 300)  # fmt: skip
+ODD = (
+    *(
+        "",
+        " ",
+        "-1",
+        "0",
+        "1",
+        "1.5",
+        "NaN",
+        "inf",
+        "1e999",
+        "9" * 30,
+        "9" * 5000,
+        "true",
+        "x",
+        "µ²",
+        "$x$",
+        "a b",
+        "\t",
+        "\r",
+        "\n",
+    ),
+    *(
+        "\0",
+        "\x1b[2J",
+        "\u202e",
+        "…",
+        "'",
+        '"',
+        "\\",
+        "%s",
+        "{0}",
+        "../x",
+        "/",
+        "-",
+        "--",
+        "=",
+        "a=b",
+        "nothing",
+        "?x",
+        "<x>",
+    ),
+    *("[bad", "é" * 300),
+)
+OWL_WORDS = (
+    "sameAs equivalentClass disjointWith onProperty unionOf complementOf intersectionOf someValuesFrom oneOf imports"
+)
+CORE_WORDS = (
+    "condition alternative when precondition parameter goal witness valueProperty argument2 restValue defaultValue "
+    "hasSituationType fromLevel firstId negated cost symbolicOnly"
+)
 DOMAINS = ("tearoom", "ferry", "served")
 
 
@@ -159,7 +212,9 @@ def other_end(draw: random.Random, triples: Triples) -> None:
         draw.choice(triples).object,
         t.subject,
         ox.Literal(odd),
-        ox.Literal(odd, datatype=ox.NamedNode(XSD + draw.choice(("integer", "decimal", "boolean", "double", "string")))),
+        ox.Literal(
+            odd, datatype=ox.NamedNode(XSD + draw.choice(("integer", "decimal", "boolean", "double", "string")))
+        ),
         ox.Literal(draw.choice((0, -1, 2, 10**15, 1.5, True))),
         ox.NamedNode("urn:fuzz:nowhere"),
         ox.NamedNode(CORE + draw.choice(("true", "false", "Object", "nothing", "Behavior", "World"))),
@@ -179,10 +234,8 @@ def other_property(draw: random.Random, triples: Triples) -> None:
 def axiom(draw: random.Random, triples: Triples) -> None:
     """Add a statement of OWL or of the core between two nodes."""
     if triples:
-        said = (OWL + "sameAs", OWL + "equivalentClass", OWL + "disjointWith", OWL + "inverseOf", OWL + "onProperty", OWL + "unionOf",
-                OWL + "complementOf", RDF + "rest", RDF + "first", "http://www.w3.org/2000/01/rdf-schema#subClassOf",
-                *(CORE + word for word in ("condition", "alternative", "when", "precondition", "parameter", "goal", "witness", "valueProperty",
-                "argument2", "restValue", "defaultValue", "hasSituationType", "fromLevel", "firstId", "negated", "cost", "symbolicOnly")))  # fmt: skip
+        said = [OWL + word for word in OWL_WORDS.split()] + [CORE + word for word in CORE_WORDS.split()]
+        said += [RDF + "rest", RDF + "first", "http://www.w3.org/2000/01/rdf-schema#subClassOf"]
         one, other = draw.choice(triples).subject, draw.choice(triples)
         triples.append(ox.Triple(one, ox.NamedNode(draw.choice(said)), draw.choice((other.subject, other.object))))
 
@@ -193,7 +246,12 @@ def rename(draw: random.Random, triples: Triples) -> None:
     if named:
         old = draw.choice(named)
         space = re.split(r"(?<=[#/])(?=[^#/]*$)", old.value)[0]
-        new = ox.NamedNode(space + draw.choice(("µCar", "Car²", "a-b", "a.b", "true", "None", "class", "a%20b", "x:y", "_", "1", "Ω…", old.value[-1:])))
+        new = ox.NamedNode(
+            space
+            + draw.choice(
+                ("µCar", "Car²", "a-b", "a.b", "true", "None", "class", "a%20b", "x:y", "_", "1", "Ω…", old.value[-1:])
+            )
+        )
         triples[:] = [
             ox.Triple(*(new if term == old else term for term in (t.subject, t.predicate, t.object)))  # type: ignore[arg-type]
             for t in triples
@@ -201,8 +259,17 @@ def rename(draw: random.Random, triples: Triples) -> None:
 
 
 MUTATIONS: tuple[Callable[[random.Random, Triples], None], ...] = (
-    delete, delete_node, double, swap, retype, other_end, other_end, other_property, axiom, rename,
-)  # fmt: skip
+    delete,
+    delete_node,
+    double,
+    swap,
+    retype,
+    other_end,
+    other_end,
+    other_property,
+    axiom,
+    rename,
+)
 
 
 def mutated_bytes(draw: random.Random, file: Path) -> None:
@@ -261,7 +328,10 @@ def mutated_json(draw: random.Random, data: Any) -> Any:
             case 1:
                 return {**data, key: draw.choice(odd)}
             case 2:
-                return {**data, draw.choice(("steps", "path", "id", "level", "arguments", "bindings", "rank")): draw.choice(odd)}
+                return {
+                    **data,
+                    draw.choice(("steps", "path", "id", "level", "arguments", "bindings", "rank")): draw.choice(odd),
+                }
             case _:
                 return {**data, key: mutated_json(draw, data[key])}
     if isinstance(data, list) and data and draw.random() < 0.85:
@@ -299,7 +369,7 @@ def _broken(draw: random.Random, folder: Path) -> str:
 
 def plan(draw: random.Random, folder: Path) -> Call:
     """Plan in a scene whose structure is broken."""
-    modes = (["--mode", "paper"], ["--optimal"], ["--memory", str(folder / "memory.ttl")], [], [], [])
+    modes: tuple[Call, ...] = (["--mode", "paper"], ["--optimal"], ["--memory", str(folder / "memory.ttl")], [], [], [])
     return ["plan", _broken(draw, folder), "--time-limit", "5", "--json", *draw.choice(modes)]
 
 
@@ -311,18 +381,27 @@ def validate(draw: random.Random, folder: Path) -> Call:
 def look(draw: random.Random, folder: Path) -> Call:
     """Ask what its objects afford; draw, export, explain or learn from it."""
     scene, memory = _broken(draw, folder), str(folder / "memory.ttl")
-    return draw.choice([
-        ["query", scene, "--affords", "all"],
-        ["query", scene, "--show", draw.choice(("B1_WASH", "SAIL", "B1_MOVE"))],
-        ["picture", scene, "--classes", "-o", str(folder / "out.svg")],
-        ["picture", scene, "--behavior", draw.choice(("B1_WASH", "SAIL", "B1_MOVE")), "-o", str(folder / "out.svg")],
-        ["export", scene, "-o", str(folder / "out")],
-        ["explain", scene, "--memory", memory],
-        ["learn", scene, "--memory", memory],
-        ["execute", scene, "--memory", memory, "--learn", "--save", str(folder / "out.ttl")],
-        ["plan", scene, "--from-observed", str(folder / "observed.ttl"), "--time-limit", "5"],
-        ["plan", scene, "--diff", str(folder / "scene.ttl"), "--mode", "guarded"],
-    ])  # fmt: skip
+    return draw.choice(
+        [
+            ["query", scene, "--affords", "all"],
+            ["query", scene, "--show", draw.choice(("B1_WASH", "SAIL", "B1_MOVE"))],
+            ["picture", scene, "--classes", "-o", str(folder / "out.svg")],
+            [
+                "picture",
+                scene,
+                "--behavior",
+                draw.choice(("B1_WASH", "SAIL", "B1_MOVE")),
+                "-o",
+                str(folder / "out.svg"),
+            ],
+            ["export", scene, "-o", str(folder / "out")],
+            ["explain", scene, "--memory", memory],
+            ["learn", scene, "--memory", memory],
+            ["execute", scene, "--memory", memory, "--learn", "--save", str(folder / "out.ttl")],
+            ["plan", scene, "--from-observed", str(folder / "observed.ttl"), "--time-limit", "5"],
+            ["plan", scene, "--diff", str(folder / "scene.ttl"), "--mode", "guarded"],
+        ]
+    )
 
 
 def files(draw: random.Random, folder: Path) -> Call:
@@ -332,15 +411,20 @@ def files(draw: random.Random, folder: Path) -> Call:
     if catalog.is_file() and draw.random() < 0.2:
         mutated_bytes(draw, catalog)
         return ["plan", str(scene), "--time-limit", "5"]
-    kind, form = draw.choice(((".ttl", ox.RdfFormat.TURTLE), (".nt", ox.RdfFormat.N_TRIPLES), (".owl", ox.RdfFormat.RDF_XML)))
+    kind, form = draw.choice(
+        ((".ttl", ox.RdfFormat.TURTLE), (".nt", ox.RdfFormat.N_TRIPLES), (".owl", ox.RdfFormat.RDF_XML))
+    )
     triples = [quad.triple for quad in ox.parse(path=str(scene), format=ox.RdfFormat.TURTLE, base_iri="urn:fuzz:base")]
     scene.unlink()
     scene = scene.with_suffix(kind)
     content = ox.serialize(triples, format=form, prefixes={"c": CORE, "owl": OWL}) or b""
     if kind == ".owl" and draw.random() < 0.5:
         entity = draw.choice(("a", "b", "owl"))
-        doctype = f'<!DOCTYPE rdf:RDF [<!ENTITY {entity} "{draw.choice(("x", "&b;", "http://x.org/", "%p;"))}"> <!ENTITY b "{"y" * 99}">]>'
-        content = content.replace(b"<rdf:RDF", doctype.encode() + b"<rdf:RDF", 1).replace(b"urn:fuzz", b"&a;", draw.randrange(3))
+        value = draw.choice(("x", "&b;", "http://x.org/", "%p;"))
+        doctype = f'<!DOCTYPE rdf:RDF [<!ENTITY {entity} "{value}"> <!ENTITY b "{"y" * 99}">]>'
+        content = content.replace(b"<rdf:RDF", doctype.encode() + b"<rdf:RDF", 1).replace(
+            b"urn:fuzz", b"&a;", draw.randrange(3)
+        )
     scene.write_bytes(content)
     if draw.random() < 0.9:
         mutated_bytes(draw, scene)
@@ -356,14 +440,34 @@ QUERIES = (
     "SELECT ?x WHERE { ?x (rdfs:subClassOf|^rdf:first)* ?y . BIND(REPLACE(STR(?x), '(a+)+$', 'b') AS ?z) }",
     "DESCRIBE :Object",
 )
-TOKENS = ("SERVICE", "SELECT", "{", "}", "(", ")", "?x", "FILTER", "*", "GRAPH", "<http://127.0.0.1:9/>", "EXISTS", "UNION", "REGEX", '"')
+TOKENS = [
+    "SERVICE",
+    "SELECT",
+    "{",
+    "}",
+    "(",
+    ")",
+    "?x",
+    "FILTER",
+    "*",
+    "GRAPH",
+    "<http://127.0.0.1:9/>",
+    "EXISTS",
+    "UNION",
+    "REGEX",
+    '"',
+]
 
 
 def sparql(draw: random.Random, folder: Path) -> Call:
     """Ask a broken query."""
     text = draw.choice(QUERIES)
     text = mutated_words(draw, text, TOKENS) if draw.random() < 0.95 else "SELECT * WHERE " + "{" * 2000 + "}" * 2000
-    more = ["-o", str(folder / "out.ttl")] if draw.random() < 0.2 else ["--format", draw.choice(("table", "csv", "json", "x"))]
+    more = (
+        ["-o", str(folder / "out.ttl")]
+        if draw.random() < 0.2
+        else ["--format", draw.choice(("table", "csv", "json", "x"))]
+    )
     return ["query", str(folder / "scene.ttl"), text, "--time-limit", "3", "--rows", "1000", *more]
 
 
@@ -372,7 +476,23 @@ def pddl(draw: random.Random, folder: Path) -> Call:
     which = draw.choice(("domain", "problem"))
     for name in ("domain", "problem"):
         text = (HERE.parent / "docs" / "examples" / "ferry" / f"{name}.pddl").read_text()
-        words = (":typing", "(", ")", "?x", "-", "either", "not", "and", "or", "when", "forall", "exists", "=", "increase", ":requirements")
+        words = (
+            ":typing",
+            "(",
+            ")",
+            "?x",
+            "-",
+            "either",
+            "not",
+            "and",
+            "or",
+            "when",
+            "forall",
+            "exists",
+            "=",
+            "increase",
+            ":requirements",
+        )
         (folder / f"{name}.pddl").write_text(mutated_words(draw, text, words) if name == which else text)
     return ["import", str(folder / "domain.pddl"), str(folder / "problem.pddl"), "-o", str(folder / "out.ttl")]
 
@@ -400,21 +520,52 @@ def memory(draw: random.Random, folder: Path) -> Call:
         mutated_triples(draw, broken)
     else:
         mutated_bytes(draw, broken)
-    return draw.choice([
-        ["memory", "show", str(broken), "--most", "3"],
-        ["memory", "merge", str(good), str(broken), "-o", str(good), *draw.choice(([], ["--trust"]))],
-        ["memory", "merge", str(broken), str(good), "-o", str(good)],
-        ["memory", "trust", str(broken), draw.choice(("all", "x", *ODD))],
-        ["memory", "migrate", str(broken), f"{draw.choice(('Cup', 'Plate', 'B1_WASH', 'B1_MOVE', *ODD))}={draw.choice(('Mug', *ODD))}"],
-        ["plan", scene, "--memory", str(broken), "--json", "--time-limit", "5", "--mode", draw.choice(("guarded", "leading", "strict", "paper"))],
-        ["learn", scene, "--memory", str(broken)],
-        ["explain", scene, "--memory", str(broken)],
-        ["execute", scene, "--memory", str(broken), "--learn"],
-    ])  # fmt: skip
+    return draw.choice(
+        [
+            ["memory", "show", str(broken), "--most", "3"],
+            ["memory", "merge", str(good), str(broken), "-o", str(good), *draw.choice(([], ["--trust"]))],
+            ["memory", "merge", str(broken), str(good), "-o", str(good)],
+            ["memory", "trust", str(broken), draw.choice(("all", "x", *ODD))],
+            [
+                "memory",
+                "migrate",
+                str(broken),
+                f"{draw.choice(('Cup', 'Plate', 'B1_WASH', 'B1_MOVE', *ODD))}={draw.choice(('Mug', *ODD))}",
+            ],
+            [
+                "plan",
+                scene,
+                "--memory",
+                str(broken),
+                "--json",
+                "--time-limit",
+                "5",
+                "--mode",
+                draw.choice(("guarded", "leading", "strict", "paper")),
+            ],
+            ["learn", scene, "--memory", str(broken)],
+            ["explain", scene, "--memory", str(broken)],
+            ["execute", scene, "--memory", str(broken), "--learn"],
+        ]
+    )
 
 
-FACTS = ("plate1 PLACE shelf", "plate2 CLEANLINESS dirty", "cup1 LOCATION location3", "red AT south", "goal plate1 PLACE sink",
-         "drop-goal plate1 CLEANLINESS", "remove plate2", "add Plate plate9 PLACE sink CLEANLINESS dirty", "remove plate1", "add Cup cup9 LOCATION location1")  # fmt: skip
+FACTS = (
+    *(
+        "plate1 PLACE shelf",
+        "plate2 CLEANLINESS dirty",
+        "cup1 LOCATION location3",
+        "red AT south",
+        "goal plate1 PLACE sink",
+    ),
+    *(
+        "drop-goal plate1 CLEANLINESS",
+        "remove plate2",
+        "add Plate plate9 PLACE sink CLEANLINESS dirty",
+        "remove plate1",
+    ),
+    "add Cup cup9 LOCATION location1",
+)
 
 
 def interventions(draw: random.Random, folder: Path) -> Call:
@@ -432,30 +583,84 @@ def options(draw: random.Random, folder: Path) -> Call:
     scene, out = str(folder / "scene.ttl"), str(folder / "out")
     calls = (
         ["plan", scene, "--goal", mutated_words(draw, draw.choice(FACTS)), "--time-limit", "5"],
-        ["plan", scene, "--goal", draw.choice(FACTS), "--mode", draw.choice(("guarded", "paper", "strict")), "--time-limit", "5"],
+        [
+            "plan",
+            scene,
+            "--goal",
+            draw.choice(FACTS),
+            "--mode",
+            draw.choice(("guarded", "paper", "strict")),
+            "--time-limit",
+            "5",
+        ],
         ["plan", draw.choice(ODD), "--mode", draw.choice(ODD), "--time-limit", draw.choice(ODD)],
-        ["plan", scene, draw.choice(("--mode", "--time-limit", "--memory", "--goal", "--diff", "--from-observed", "--scene")), draw.choice(ODD)],
-        ["query", scene, draw.choice(("--show", "--affords", "--format", "--rows", "--time-limit", "-o")), draw.choice(ODD)],
-        ["generate", draw.choice(("served", "swap", "full", "handover", *ODD)), "-o", out + draw.choice((".ttl", *ODD[:20])),
-         "--objects", draw.choice(("0", "1", "3", "5", *ODD)), "--hands", draw.choice(("0", "1", "2", *ODD))],
-        ["picture", scene, "-o", out + draw.choice((".svg", ".png", *ODD)), "--behavior", draw.choice(("B1_WASH", *ODD))],
-        ["explain", scene, "--memory", str(folder / "memory.ttl"), draw.choice(("--step", "--level", "--against", "--plot")), draw.choice(ODD)],
+        [
+            "plan",
+            scene,
+            draw.choice(("--mode", "--time-limit", "--memory", "--goal", "--diff", "--from-observed", "--scene")),
+            draw.choice(ODD),
+        ],
+        [
+            "query",
+            scene,
+            draw.choice(("--show", "--affords", "--format", "--rows", "--time-limit", "-o")),
+            draw.choice(ODD),
+        ],
+        [
+            "generate",
+            draw.choice(("served", "swap", "full", "handover", *ODD)),
+            "-o",
+            out + draw.choice((".ttl", *ODD[:20])),
+            "--objects",
+            draw.choice(("0", "1", "3", "5", *ODD)),
+            "--hands",
+            draw.choice(("0", "1", "2", *ODD)),
+        ],
+        [
+            "picture",
+            scene,
+            "-o",
+            out + draw.choice((".svg", ".png", *ODD)),
+            "--behavior",
+            draw.choice(("B1_WASH", *ODD)),
+        ],
+        [
+            "explain",
+            scene,
+            "--memory",
+            str(folder / "memory.ttl"),
+            draw.choice(("--step", "--level", "--against", "--plot")),
+            draw.choice(ODD),
+        ],
         ["export", scene, "-o", out, "--level", draw.choice(ODD)],
         ["import", scene, scene, "-o", out + ".ttl", "--level", draw.choice(ODD)],
         ["new", draw.choice(ODD), "--folder", out],
         ["memory", "show", str(folder / "memory.ttl"), "--most", draw.choice(ODD)],
-        ["execute", scene, draw.choice(("--world", "--plan", "--mode", "--seed", "--save", "--intervene")), draw.choice(ODD)],
+        [
+            "execute",
+            scene,
+            draw.choice(("--world", "--plan", "--mode", "--seed", "--save", "--intervene")),
+            draw.choice(ODD),
+        ],
         [draw.choice(("plan", "query", "learn", "memory", *ODD)), draw.choice(ODD), draw.choice(ODD)],
         ["fetch", draw.choice(("http://[bad", "http://127.0.0.1:9/x", *ODD)), "--into", out],
         ["plan", draw.choice(("http://[bad", "http://127.0.0.1:9/query", "http://x y/", "https://"))],
-    )  # fmt: skip
+    )
     return _without_zeros(list(draw.choice(calls)))
 
 
 def observed(draw: random.Random, folder: Path) -> Call:
     """Start from what was seen, in a broken file."""
     draw.choice((mutated_triples, mutated_triples, mutated_bytes))(draw, folder / "observed.ttl")
-    return ["plan", str(folder / "scene.ttl"), "--from-observed", str(folder / "observed.ttl"), "--json", "--time-limit", "5"]
+    return [
+        "plan",
+        str(folder / "scene.ttl"),
+        "--from-observed",
+        str(folder / "observed.ttl"),
+        "--json",
+        "--time-limit",
+        "5",
+    ]
 
 
 def bodies(draw: random.Random, folder: Path) -> Call:
@@ -569,7 +774,11 @@ def _check_answer(call: Call, case: Path, out: Path) -> None:
     from confab.memory import Memory
 
     memory = case / "memory.ttl"
-    if call[0] in ("learn", "memory", "execute") and str(memory) in call and call[1] not in ("show", "migrate", "trust"):
+    if (
+        call[0] in ("learn", "memory", "execute")
+        and str(memory) in call
+        and call[1] not in ("show", "migrate", "trust")
+    ):
         with redirect_stdout(io.StringIO()):
             Memory.load(memory)
     if call[0] == "plan" and "--json" in call and "--from-observed" not in call:
@@ -592,7 +801,9 @@ def _check_plan(call: Call, case: Path) -> None:
     assert not faults, f"no plan of what was read: {faults[0]}"
     whole: list[Any] = []
     with suppress(KnowledgeError):  # what the task doesn't need may be broken
-        whole = [fault for fault in validate_plan(with_goals(scene.reading, ()), result.plan) if "its ID" not in str(fault)]
+        whole = [
+            fault for fault in validate_plan(with_goals(scene.reading, ()), result.plan) if "its ID" not in str(fault)
+        ]
     assert not whole, f"no plan of the whole scene: {whole[0]}"
 
 
@@ -601,10 +812,28 @@ def _check_plan(call: Call, case: Path) -> None:
 
 def _import_all() -> None:
     """Import what the cases need, once for all of them."""
-    for name in ("confab.cli", "confab.execution", "confab.explaining", "confab.picturing", "confab.pddl_commands", "confab.authoring",
-                 "confab.reaching", "confab.show", "confab.live", "matplotlib.figure", "pyshacl", "reasoner.validation.validate",
-                 "planner.acting.executive", "planner.experience.portfolio", "planner.experience.demonstrations", "planner.hierarchical.bounds",
-                 "planner.paper.hierarchy", "reasoner.graph.apart", "reasoner.reading.affordance"):  # fmt: skip
+    rooms = (
+        *(
+            "confab." + name
+            for name in [
+                "cli",
+                "execution",
+                "explaining",
+                "picturing",
+                "pddl_commands",
+                "authoring",
+                "reaching",
+                "show",
+                "live",
+            ]
+        ),
+        *(
+            "planner." + name
+            for name in ["acting.executive", "experience.portfolio", "hierarchical.bounds", "paper.hierarchy"]
+        ),
+        *("reasoner." + name for name in ["validation.validate", "graph.apart", "reading.affordance"]),
+    )
+    for name in (*rooms, "matplotlib.figure", "pyshacl"):
         import_module(name)
     gc.freeze()
 
@@ -616,7 +845,9 @@ def known() -> Iterator[tuple[str, int]]:
             yield match[1], int(match[2])
 
 
-def fuzz(cases: int, doors: Sequence[str], first: dict[str, int], tell: bool = True) -> tuple[Counter[str], list[Failure]]:
+def fuzz(
+    cases: int, doors: Sequence[str], first: dict[str, int], tell: bool = True
+) -> tuple[Counter[str], list[Failure]]:
     """Run so many cases, door by door in turn; return how many were tried at each, and what broke."""
     tried: Counter[str] = Counter()
     broke: list[Failure] = []
@@ -634,7 +865,11 @@ def fuzz(cases: int, doors: Sequence[str], first: dict[str, int], tell: bool = T
                 if tell:
                     print(failure, flush=True)
             if tell and number % 1000 == 999:
-                print(f"{number + 1:,} cases in {time.monotonic() - begin:.0f} s, {len(broke)} broke", file=sys.stderr, flush=True)
+                print(
+                    f"{number + 1:,} cases in {time.monotonic() - begin:.0f} s, {len(broke)} broke",
+                    file=sys.stderr,
+                    flush=True,
+                )
     return tried, broke
 
 

@@ -20,7 +20,7 @@ def main() -> None:
         resource.setrlimit(limit, (value, value))
     store = ox.Store()
     store.bulk_extend(ox.parse(asked["quads"], format=ox.RdfFormat.N_QUADS))
-    graphs = [ox.NamedNode(name) for name in asked["graphs"]]
+    graphs: list[ox.NamedNode | ox.BlankNode | ox.DefaultGraph] = [ox.NamedNode(name) for name in asked["graphs"]]
     if not asked["service"]:
         resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))  # stdin, stdout, stderr: there is no further one to be had
     try:

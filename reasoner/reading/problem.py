@@ -175,7 +175,9 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     KnowledgeError
         An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
     """
-    members = [(text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)]
+    members = [
+        (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
+    ]
     facts = [link(row) for row in graph.select(FACTS, SCENE)]
     tuples = _nodes(_core_triple(row) for row in graph.select(TUPLES, SCENE))
     schema = read_schema(graph) if schema is None else schema

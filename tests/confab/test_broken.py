@@ -54,7 +54,18 @@ def change(file: Path, old: str, new: str) -> None:
 # ---------------------------------------------------------------------------------------------- a memory is never lost
 
 
-ODD_NAMES = ["robot 1", "a;b", 'say "hi"', "back\\slash", "line\rbreak\n", "tab\t", "m:x . # y", "µ²…\u2028", "", "a" * 300]
+ODD_NAMES = [
+    "robot 1",
+    "a;b",
+    'say "hi"',
+    "back\\slash",
+    "line\rbreak\n",
+    "tab\t",
+    "m:x . # y",
+    "µ²…\u2028",
+    "",
+    "a" * 300,
+]
 
 
 def lived(replica: str, word: str = "yes") -> Experience:
@@ -86,7 +97,11 @@ def test_what_cannot_be_read_again_replaces_nothing(
     memory.experience = lived("me")
     memory.save(file)
     good = file.read_bytes()
-    for broken in (["@prefix : <x"], [good.decode().replace(":chosen 1", ":chosen 2")], [good.decode().replace('"me"', '"you"')]):
+    for broken in (
+        ["@prefix : <x"],
+        [good.decode().replace(":chosen 1", ":chosen 2")],
+        [good.decode().replace('"me"', '"you"')],
+    ):
         monkeypatch.setattr("confab.memory.turtle", lambda *_, lines=broken: iter(lines))
         with pytest.raises(KnowledgeError):
             memory.save(file)
@@ -96,7 +111,12 @@ def test_what_cannot_be_read_again_replaces_nothing(
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [(":episodes 1", ":episodes -1"), (":epoch 0", ":epoch -1"), (":chosen 1", ":chosen -1"), (":episodes 1", ":episodes 1e9")],
+    [
+        (":episodes 1", ":episodes -1"),
+        (":epoch 0", ":epoch -1"),
+        (":chosen 1", ":chosen -1"),
+        (":episodes 1", ":episodes 1e9"),
+    ],
 )
 def test_counts_that_cannot_be_are_refused(tmp_path: Path, tearoom: Path, old: str, new: str) -> None:
     memory = Memory.of(confab.load(tearoom))
@@ -150,8 +170,11 @@ def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: P
     (tmp_path / "m.ttl").write_text("old")
     done = subprocess.run(
         [sys.executable, "-c", program, str(tmp_path / "m.ttl")],
-        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
     assert done.stdout.startswith(f"{tmp_path / 'm.ttl'} "), done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["m.ttl"]
     assert (tmp_path / "m.ttl").read_text() == "old"
@@ -201,16 +224,24 @@ BODY = '<owl:Ontology rdf:about="https://x.org/s"><rdfs:label>&i;</rdfs:label></
 @pytest.mark.parametrize(
     ("prolog", "body", "said"),
     [
-        (f'<!-- <rdf:RDF --><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{BOMB}]>', BODY, "entity 'b' reads another file or grows"),
+        (
+            f'<!-- <rdf:RDF --><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{BOMB}]>',
+            BODY,
+            "entity 'b' reads another file or grows",
+        ),
         (f'<?pi <rdf:RDF ?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{BOMB}]>', BODY, "entity 'b'"),
         ('<!DOCTYPE x SYSTEM "file:///etc/hostname">', BODY, "reads 'file:///etc/hostname'"),
         ('<!DOCTYPE x [<!ENTITY i SYSTEM "file:///etc/hostname">]>', BODY, "entity 'i'"),
         ('<!DOCTYPE x [<!ENTITY % i "x"> %i;]>', BODY, "entity 'i'"),
-        (f'<!DOCTYPE x [<!ENTITY i "{"x" * 60_000}">]>', BODY.replace("&i;", "&i;" * 1_000), "grow to 60,000,000 bytes"),
+        (
+            f'<!DOCTYPE x [<!ENTITY i "{"x" * 60_000}">]>',
+            BODY.replace("&i;", "&i;" * 1_000),
+            "grow to 60,000,000 bytes",
+        ),
         ("", BODY.replace("&i;", '<!DOCTYPE x [<!ENTITY i "x">]>'), "stands inside the document"),
         ("<", BODY, "no XML"),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("command", ["plan", "validate"])
 def test_xml_that_reads_files_or_grows_is_refused(
     tmp_path: Path, ask: Ask, command: str, prolog: str, body: str, said: str
@@ -248,14 +279,24 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ("", "c:level 1", "c:level 1 ; c:cost -1", ":cost is '-1'"),
         ("", "c:level 1", 'c:level 1 ; c:cost "NaN"^^<http://www.w3.org/2001/XMLSchema#double>', ":cost is 'NaN'"),
         ("", "c:level 1", 'c:level 1 ; c:cost "INF"^^<http://www.w3.org/2001/XMLSchema#double>', ":cost is 'INF'"),
-        ("", "c:parameter :B1_CARRY.item,", "c:parameter :B1_CARRY.thing,", "B1_CARRY.thing> is used as a parameter but"),
-        ("", "c:precondition :B1_CARRY.free", "c:precondition :B1_CARRY.fre", "B1_CARRY.fre> is used as a condition but"),
-        ("", "c:situationType :PLACE ; c:value :B1_CARRY.place", "c:situationType :PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
+        (
+            "",
+            "c:parameter :B1_CARRY.item,",
+            "c:parameter :B1_CARRY.thing,",
+            "B1_CARRY.thing> is used as a parameter but",
+        ),
+        (
+            "",
+            "c:precondition :B1_CARRY.free",
+            "c:precondition :B1_CARRY.fre",
+            "B1_CARRY.fre> is used as a condition but",
+        ),
+        ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
         ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY speaks of PLACE with 0 arguments; it has 1"),
         ("", "c:AbsenceCondition ;", 'c:AbsenceCondition ; c:negated "perhaps" ;', ":negated is 'perhaps'"),
-        ("", "c:precondition :B1_CARRY.free", "c:precondition :N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY c:precondition :B1_CARRY.free", "the condition contains itself"),
+        ("", ":B1_CARRY.free ;", ":N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY", "the condition contains itself"),
     ],
-)  # fmt: skip
+)
 def test_a_scene_that_cannot_be_meant_is_refused_in_one_line_by_plan_and_validate(
     tearoom: Path, ask: Ask, file: str, old: str, new: str, said: str
 ) -> None:
@@ -275,9 +316,8 @@ def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> N
         for i in range(deep):
             group = f":N{i} a c:AnyOf ; c:alternative :N{i + 1}, :B1_CARRY.free"
             more.append(group + (f", :A{i} . :A{i} a c:AllOf ; c:condition :N{i + 1} ." if wide == 2 else " ."))
-        domain.write_text("\n".join([text, *more, f":N{deep} a c:AllOf ; c:condition :B1_CARRY.free ."]).replace(
-            f":N{deep} a c:AllOf ; c:condition :B1_CARRY.free", f":N{deep} a c:AbsenceCondition ; c:ofClass :Item ; c:situationType :PLACE ; c:value :B1_CARRY.place"
-        ))  # fmt: skip
+        last = "c:AbsenceCondition ; c:ofClass :Item ; c:situationType :PLACE ; c:value :B1_CARRY.place ."
+        domain.write_text("\n".join([text, *more, f":N{deep} a {last}"]))
         assert ask("plan", tearoom)[0] == code
 
 
@@ -311,19 +351,23 @@ def test_dollars_in_labels_are_drawn(tmp_path: Path, tearoom: Path, ask: Ask) ->
 # ------------------------------------------------------------------------------------------------- other doors
 
 
+STEP = '{"behavior": "B1_WASH", "arguments": ["plate1"]'
+STEPS = '{"steps": [' + STEP
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ('{"steps": 5}', "it has no 'steps'"),
         ('{"steps": [{"behavior": "B1_WASH", "arguments": 5}]}', "'arguments' is 5; wanted a list"),
-        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "bindings": 5}]}', "'bindings' is 5; wanted an object"),
-        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": {"a": 1}}]}', "'steps' is {\"a\": 1}; wanted a list"),
+        (STEPS + ', "bindings": 5}]}', "'bindings' is 5; wanted an object"),
+        (STEPS + ', "steps": {"a": 1}}]}', "'steps' is {\"a\": 1}; wanted a list"),
         ("[" * 100_000, "nested too deeply"),
-        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "id": ' + "9" * 5000 + "}]}", "not JSON"),
-        ('{"steps": [{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": [' + '{"behavior": "B1_WASH", "arguments": ["plate1"], "steps": [' * 200 + "]}" * 201 + "]}", "lies inside more than"),
+        (STEPS + ', "id": ' + "9" * 5000 + "}]}", "not JSON"),
+        (STEPS + ', "steps": [' + (STEP + ', "steps": [') * 200 + "]}" * 201 + "]}", "lies inside more than"),
         ("\ufeff", "not JSON"),
     ],
-)  # fmt: skip
+)
 def test_a_plan_that_is_none_is_refused_in_one_line(
     tmp_path: Path, tearoom: Path, ask: Ask, text: str, said: str
 ) -> None:
@@ -345,7 +389,9 @@ def test_files_may_have_any_name(tmp_path: Path, tearoom: Path, ask: Ask, monkey
     assert ask("validate", "Küche 1.ttl")[:2] == (YES, "nothing is wrong\n")
 
 
-@pytest.mark.parametrize("url", ["http://[bad", "http://[::1", "https://", "http://x y/", "http://x:99999999/", "http://\x1b"])
+@pytest.mark.parametrize(
+    "url", ["http://[bad", "http://[::1", "https://", "http://x y/", "http://x:99999999/", "http://\x1b"]
+)
 @pytest.mark.parametrize("command", ["plan", "fetch"])
 def test_an_address_that_is_none_is_refused_in_one_line(tmp_path: Path, ask: Ask, command: str, url: str) -> None:
     code, _, err = ask(command, url, *(["--into", tmp_path] if command == "fetch" else []))
@@ -398,7 +444,7 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
     scene, url = confab.load("living-room"), f"<http://127.0.0.1:{server.server_port}/q>"
     query = f"SELECT * WHERE {{ SERVICE SILENT {url} {{ ?a ?b ?c }} }}"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(apart, "SERVICE", apart.re.compile("(?!)"))
+        patch.setattr(apart, "SERVICE", re.compile("(?!)"))
         scene.query(query)
     assert not asked
     scene.query(query, apart.QueryLimits(service=True))
@@ -449,9 +495,13 @@ def test_limits_and_interrupts_have_codes_of_their_own(
 def test_streams_may_be_closed_or_full(tmp_path: Path, where: str, said: str) -> None:
     run = f'"{sys.executable}" -c "from confab.cli import main; main()" plan living-room {where}'
     done = subprocess.run(
-        ["/bin/sh", "-c", run], capture_output=True, text=True, cwd=tmp_path, check=False,
+        ["/bin/sh", "-c", run],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )  # fmt: skip
+    )
     assert "Traceback" not in done.stderr
     assert "Exception ignored" not in done.stderr
     assert said in done.stderr
