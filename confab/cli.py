@@ -393,20 +393,20 @@ def validate(
     as_json: AsJson = False,
 ) -> None:
     """Check ontologies: what is wrong where, why, and what to do."""
+    from reasoner.validation.findings import ERROR, WARNING
     from reasoner.validation.validate import validate as check
 
     findings = check(files, deep=deep)
-    errors = sum(finding.serious for finding in findings)
+    errors, warnings = (sum(finding.severity == kind for finding in findings) for kind in (ERROR, WARNING))
     if as_json:
         _print([finding.as_dict() for finding in findings])
     else:
-        _print("\n".join(map(str, findings)) or "nothing is wrong")
-        if findings:
+        _print("\n".join([*map(str, findings), *([] if errors or warnings else ["nothing is wrong"])]))
+        if errors or warnings:
             from confab.memory import counted
 
-            said = (counted(errors, "error"), counted(len(findings) - errors, "warning"))
-            print(", ".join(said), file=sys.stderr)
-    raise typer.Exit(NO if errors or (strict and findings) else YES)
+            print(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}", file=sys.stderr)
+    raise typer.Exit(NO if errors or (strict and warnings) else YES)
 
 
 @app.command()

@@ -13,7 +13,7 @@ import pyoxigraph as ox
 from reasoner.graph.knowledge import KnowledgeGraph, readable
 from reasoner.names import local_name
 
-ERROR, WARNING = "error", "warning"
+ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")
 """Rules whose findings come first: others may follow from them."""
 
@@ -37,7 +37,7 @@ class Finding:
     what, why, remedy : str
         What is wrong, why that matters, and what to do about it.
     severity : str
-        ``error``, or ``warning`` for what can be planned with all the same.
+        ``error``; ``warning`` for what can be planned with all the same; ``remark`` for a choice to be aware of.
     """
 
     file: str

@@ -83,7 +83,7 @@ def rows(folder: Path) -> Iterator[str]:
         finding = next(f for f in found(fault, place) if f.rule == fault.rule)
         words = (
             fault.title,
-            f"`{fault.rule}`" + ("" if finding.serious else " (warning)"),
+            f"`{fault.rule}`" + ("" if finding.serious else f" ({finding.severity})"),
             finding.what,
             finding.remedy,
         )
