@@ -34,17 +34,13 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import CORE, KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 
 HERE = Path(__file__).resolve().parent
 SEEDS = HERE / "fuzz-seeds.txt"
 PROGRESS = Path("confab-out") / "fuzz.json"
 SECONDS, MEGABYTES = 30, 4_000
-OWL, RDF, XSD = (
-    "http://www.w3.org/2002/07/owl#",
-    "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
-    "http://www.w3.org/2001/XMLSchema#",
-)
 TYPE = ox.NamedNode(RDF + "type")
 ODD = (
     *(
@@ -235,7 +231,7 @@ def axiom(draw: random.Random, triples: Triples) -> None:
     """Add a statement of OWL or of the core between two nodes."""
     if triples:
         said = [OWL + word for word in OWL_WORDS.split()] + [CORE + word for word in CORE_WORDS.split()]
-        said += [RDF + "rest", RDF + "first", "http://www.w3.org/2000/01/rdf-schema#subClassOf"]
+        said += [RDF + "rest", RDF + "first", RDFS + "subClassOf"]
         one, other = draw.choice(triples).subject, draw.choice(triples)
         triples.append(ox.Triple(one, ox.NamedNode(draw.choice(said)), draw.choice((other.subject, other.object))))
 

@@ -15,9 +15,10 @@ import ontology
 from confab.memory import Memory
 from planner.paper.transitions import ground
 from reasoner.files import alone, write_whole
-from reasoner.graph.knowledge import CORE, KnowledgeError, KnowledgeGraph
-from reasoner.memory.counts_file import SPACE, Lines
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.memory.counts_file import Lines
 from reasoner.names import local_name, nearest
+from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -29,7 +30,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 </catalog>
 """
 TERMS = [CORE + name for name in ("behavior", "situationType", "relation")]
-ROLES = [CORE + "about", *(f"{CORE}argument{place}" for place in range(2, 10))]
+ROLES = [CORE + name for name in ARGUMENTS]
 
 
 def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
@@ -150,7 +151,7 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     known = {quad.subject.value for quad in graph.store if isinstance(quad.subject, ox.NamedNode)}
     spoken: set[str] = set()
     with suppress(SyntaxError):  # of which reading the memory tells
-        quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=SPACE))
+        quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY))
         counters = {q.subject for q in quads if q.predicate.value == CORE + "epoch"}
         spoken = {
             q.object.value

@@ -10,10 +10,11 @@ import pyoxigraph as ox
 import ontology
 from confab.scene import Scene
 from reasoner.graph.knowledge import BASE, KnowledgeError
+from reasoner.vocabulary import EMBODIMENT
 
 log = logging.getLogger(__name__)
-ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
-SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
+ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
+SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 
 
 def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:

@@ -8,10 +8,10 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph.knowledge import CORE, PREFIXES, KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.names import Names
+from reasoner.vocabulary import CORE, OWL, PROV, RDF
 
-PROV = "http://www.w3.org/ns/prov#"
 RELATIONS = "SELECT DISTINCT ?relation WHERE { ?relation a :ReachRelation } ORDER BY ?relation"
 HASHES = "SELECT DISTINCT ?hash WHERE { ?ontology :inputsHash ?hash }"
 
@@ -55,9 +55,9 @@ def save_reach(
     """
     relation = ox.NamedNode(reach_relation(graph))
     iri = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach")
-    kind, hash_property = ox.NamedNode(PREFIXES["rdf"] + "type"), ox.NamedNode(CORE + "inputsHash")
+    kind, hash_property = ox.NamedNode(RDF + "type"), ox.NamedNode(CORE + "inputsHash")
     by = ox.NamedNode(PROV + "wasGeneratedBy")
-    owl = PREFIXES["owl"]
+    owl = OWL
     triples = [
         ox.Triple(iri, kind, ox.NamedNode(owl + "Ontology")),
         ox.Triple(iri, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),

@@ -31,12 +31,13 @@ from reasoner.embodiment.values import (
 )
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import local_name
+from reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
 
 PREFIXES = {
-    "": "https://w3id.org/confab/embodiment#",
-    "c": "https://w3id.org/confab/core#",
-    "owl": "http://www.w3.org/2002/07/owl#",
-    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "": EMBODIMENT,
+    "c": CORE,
+    "owl": OWL,
+    "rdfs": RDFS,
 }
 ATTRIBUTES = (
     "SELECT DISTINCT ?node ?property ?value WHERE { ?property rdfs:subPropertyOf+ :attribute . ?node ?property ?value }"

@@ -8,7 +8,8 @@ import pyoxigraph as ox
 
 from reasoner.files import as_iri_part, write_whole
 from reasoner.graph.apart import QueryLimits, ask
-from reasoner.graph.knowledge import PREFIXES, KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.vocabulary import OWL, RDF
 
 
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
@@ -31,7 +32,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     found = sorted({ox.Triple(*triple) for triple in answer}, key=str)  # type: ignore[arg-type]
     if not found:
         raise KnowledgeError("the query gives no triples, so no file was written")
-    owl, type_ = PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
+    owl, type_ = OWL, ox.NamedNode(RDF + "type")
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     head = [
         ox.Triple(name, type_, ox.NamedNode(owl + "Ontology")),

@@ -21,6 +21,7 @@ import ontology
 from reasoner.files import write_whole
 from reasoner.graph.documents import DocumentError, plain_xml
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.vocabulary import OWL
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0
@@ -37,7 +38,6 @@ SUFFIX = {
     "text/xml": ".owl",
 }
 FORM = {".ttl": ox.RdfFormat.TURTLE, ".nt": ox.RdfFormat.N_TRIPLES, ".owl": ox.RdfFormat.RDF_XML}
-OWL = "http://www.w3.org/2002/07/owl#"
 CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 <catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
 </catalog>

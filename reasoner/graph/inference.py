@@ -15,12 +15,10 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, CORE, KnowledgeError, KnowledgeGraph, text
+from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import local_name
+from reasoner.vocabulary import CORE, OWL, RDF, RDFS
 
-RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
-RDFS = "http://www.w3.org/2000/01/rdf-schema#"
-OWL = "http://www.w3.org/2002/07/owl#"
 TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
 GIVEN = ("asserted", "reach")
 WORLD = {CORE + name for name in ("Object", "Robot", "Hand")}

@@ -21,8 +21,8 @@ import pyoxigraph as ox
 import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
+from reasoner.vocabulary import PREFIXES
 
-CORE = "https://w3id.org/confab/core#"
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
 SCENE = ("asserted", "inferred", "reach")
@@ -31,14 +31,6 @@ TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
 """What a file has in it that speaks of triples, in one of the three notations."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
 NO_ROWS = "wanted a SELECT query, whose answer is rows; ASK gives none, and CONSTRUCT goes into a file: -o FILE.ttl"
-PREFIXES = {
-    "": CORE,
-    "owl": "http://www.w3.org/2002/07/owl#",
-    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
-    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
-    "skos": "http://www.w3.org/2004/02/skos/core#",
-    "xsd": "http://www.w3.org/2001/XMLSchema#",
-}
 
 Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
 Row = tuple[Term, ...]

@@ -23,13 +23,12 @@ from urllib.request import Request, urlopen
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph.knowledge import CORE, PREFIXES, KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.counts import Conclusion, Experience, Pattern, Tally
 from reasoner.names import Names
+from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDFS
 
 FORMAT = 2
-SPACE = "https://w3id.org/confab/memory#"
-ROLES = ("about", *(f"argument{position}" for position in range(2, 10)))
 TALLY = ("chosen", "passedOver", "failed")
 BETWEEN = " | "  # facts of a pattern; no line break, which the OWL API turns into an n when it saves Turtle
 PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
@@ -75,7 +74,7 @@ def lines(text: str) -> Lines:
         at = match.end()
         pattern, said, counter, about, *counts = match.groups()
         if pattern is not None:
-            facts[SPACE + pattern] = said
+            facts[MEMORY + pattern] = said
         else:
             links.append((counter, about, Tally(*map(int, counts))))
     return Lines(facts, links, "".join([*rest, text[at:]]))
@@ -117,14 +116,14 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 def turtle(experience: Experience, names: Names, domain: str, only: str | None = None) -> Iterator[str]:
     """Yield a memory as Turtle, counter by counter; `only` those of one replica."""
     iri = _node("urn:uuid:", experience.replica)
-    prefixes = {"core": CORE, "owl": PREFIXES["owl"], "rdfs": PREFIXES["rdfs"], "space": SPACE}
+    prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
     replica = _text(experience.replica)
     yield HEAD.format(**prefixes, iri=iri, domain=ox.NamedNode(domain), format=FORMAT, replica=replica)
     for replica in sorted(experience.trusts) if only is None else ():
         yield f"{iri} :trusts {_text(replica)} .\n"
     for replica, episodes in sorted(experience.episodes.items()):
         if only in (None, replica):
-            node = _node(SPACE, "replica_" + replica)
+            node = _node(MEMORY, "replica_" + replica)
             yield f"{node} a owl:NamedIndividual, :Replica ; :replica {_text(replica)} ; :episodes {episodes} .\n"
     written: set[Pattern] = set()
     ids: dict[Pattern, str] = {}
@@ -134,7 +133,7 @@ def turtle(experience: Experience, names: Names, domain: str, only: str | None =
         for conclusion, patterns in sorted(tallies.items()):
             counter = _counter(replica, epoch, conclusion)
             roles = " ; ".join(
-                f":{role} {_term(kind, names)}" for role, kind in zip(ROLES, conclusion.classes, strict=False)
+                f":{role} {_term(kind, names)}" for role, kind in zip(ARGUMENTS, conclusion.classes, strict=False)
             )
             yield (
                 f"m:{counter} a owl:NamedIndividual, :Counter ; :replica {_text(replica)} ; :epoch {epoch} ; "
@@ -163,7 +162,7 @@ def _pattern(pattern: Pattern) -> str:
 
 def _term(name: str, names: Names) -> str:
     """Return a behaviour or class as an IRI; what the scene doesn't know is kept under its name."""
-    return str(ox.NamedNode(names.iri(name))) if name in names else _node(SPACE, name)
+    return str(ox.NamedNode(names.iri(name))) if name in names else _node(MEMORY, name)
 
 
 def _node(space: str, name: str) -> str:
@@ -198,7 +197,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
 def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
     """Read a memory; `source` names it in messages."""
     try:
-        triples = [q.triple for q in ox.parse(found.rest, format=ox.RdfFormat.TURTLE, base_iri=SPACE)]
+        triples = [q.triple for q in ox.parse(found.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
     except SyntaxError as error:
         raise KnowledgeError(f"{source}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     return _experience(triples, found, source, names)
@@ -246,18 +245,16 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             if "episodes" in node:
                 experience.episodes[node["replica"]] = _count(node["episodes"], "episodes")
             if "chosen" in node:  # the paper's links have a probability alone
-                counter, pattern = (
-                    _local(node[PREFIXES["owl"] + end]) for end in ("annotatedSource", "annotatedTarget")
-                )
+                counter, pattern = (_local(node[OWL + end]) for end in ("annotatedSource", "annotatedTarget"))
                 links.append((counter, pattern, Tally(*(int(node.get(key, "0")) for key in TALLY))))
         counters = {key: _meaning(node, names) for key, node in nodes.items() if "epoch" in node}
         facts |= {key: node["facts"] for key, node in nodes.items() if "facts" in node}
         pairs = Pairs()
         patterns = {key: _facts(text, _local(key), source, pairs) for key, text in facts.items()}
         for counter, pattern, tally in links:
-            who, conclusion = counters[SPACE + counter]
+            who, conclusion = counters[MEMORY + counter]
             table = experience.counts.setdefault(who, {}).setdefault(conclusion, {})
-            key = patterns[SPACE + pattern]
+            key = patterns[MEMORY + pattern]
             if not 0 <= min(tally.chosen, tally.passed_over, tally.failed) <= sum(astuple(tally)) < MOST:
                 raise ValueError(f"{counter} counts {tally}; wanted numbers from 0 to {MOST}")
             table[key] = table[key] | tally if key in table else tally
@@ -270,11 +267,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
 
 def _meaning(node: Mapping[str, str], names: Names | None) -> tuple[tuple[str, int], Conclusion]:
     def short(iri: str) -> str:
-        if iri.startswith(SPACE):  # what the scene didn't know is kept under its name
-            return unquote(iri.removeprefix(SPACE))
+        if iri.startswith(MEMORY):  # what the scene didn't know is kept under its name
+            return unquote(iri.removeprefix(MEMORY))
         return names.short(iri) if names is not None else _local(iri)
 
-    classes = tuple(short(node[role]) for role in ROLES if role in node)
+    classes = tuple(short(node[role]) for role in ARGUMENTS if role in node)
     return (node["replica"], _count(node["epoch"], "epoch")), Conclusion(short(node["behavior"]), classes)
 
 
@@ -313,7 +310,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
 
     Each replica has a named graph of its own there, so that writers never meet. An endpoint without memory gives an empty one.
     """
-    query = f'CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{SPACE}graph/")) }}'
+    query = f'CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{MEMORY}graph/")) }}'
     answer = _ask(endpoint, {"query": query}, timeout)
     own = replica or new_replica()
     triples = [q.triple for q in ox.parse(answer, format=ox.RdfFormat.N_TRIPLES)]
@@ -326,7 +323,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
 
 def push(endpoint: str, experience: Experience, names: Names, domain: str, timeout: float = 60.0) -> None:
     """Replace this replica's own graph at a SPARQL endpoint by what it has counted; no other replica's is touched."""
-    graph = _node(SPACE + "graph/", experience.replica)
+    graph = _node(MEMORY + "graph/", experience.replica)
     text = "".join(turtle(experience, names, domain, only=experience.replica))
     data = ox.serialize([q.triple for q in ox.parse(text, format=ox.RdfFormat.TURTLE)], format=ox.RdfFormat.N_TRIPLES)
     body = (data or b"").decode("utf-8")

@@ -22,14 +22,10 @@ from typing import Any
 import pyoxigraph as ox
 
 from reasoner.files import as_iri_part, write_whole
-from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeGraph
+from reasoner.graph.knowledge import BASE, KnowledgeGraph
 from reasoner.names import Names
+from reasoner.vocabulary import ARGUMENTS, CORE, EPISODES, OWL, PROV, RDF, XSD
 
-VOCABULARY = "https://w3id.org/confab/episodes"
-EPISODES = VOCABULARY + "#"
-PROV = "http://www.w3.org/ns/prov#"
-ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
-XSD = "http://www.w3.org/2001/XMLSchema#"
 Data = Mapping[str, Any]
 
 
@@ -46,7 +42,7 @@ def save_episode(path: Path, episode: Data, names: Names) -> None:
     """
     name = path.stem  # who looks for an ontology finds it by the last part of its IRI
     iri = ontology_of(episode, name)
-    prefixes = {"": iri + "#", "e": EPISODES, "c": CORE, "prov": PROV, "owl": PREFIXES["owl"], "xsd": XSD}
+    prefixes = {"": iri + "#", "e": EPISODES, "c": CORE, "prov": PROV, "owl": OWL, "xsd": XSD}
     triples = [*_header(iri, episode), *triples_of(episode, names, name)]
     write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
@@ -118,10 +114,8 @@ class _Describe:
         return ox.NamedNode(self.base + name)
 
     def individual(self, node: ox.NamedNode, kind: str, /, **values: object) -> Iterator[ox.Triple]:
-        yield self.link(node, PREFIXES["rdf"] + "type", ox.NamedNode(PREFIXES["owl"] + "NamedIndividual"))
-        yield self.link(
-            node, PREFIXES["rdf"] + "type", ox.NamedNode((CORE if kind == "GroundBehavior" else EPISODES) + kind)
-        )
+        yield self.link(node, RDF + "type", ox.NamedNode(OWL + "NamedIndividual"))
+        yield self.link(node, RDF + "type", ox.NamedNode((CORE if kind == "GroundBehavior" else EPISODES) + kind))
         for name, value in values.items():
             if value is not None:
                 yield from self.value(node, name, value)
@@ -186,9 +180,9 @@ class _Describe:
 
 
 def _header(iri: str, episode: Data) -> Iterator[ox.Triple]:
-    ontology, owl = ox.NamedNode(iri), PREFIXES["owl"]
-    yield ox.Triple(ontology, ox.NamedNode(PREFIXES["rdf"] + "type"), ox.NamedNode(owl + "Ontology"))
-    for imported in (str(episode["scene"]), VOCABULARY):
+    ontology, owl = ox.NamedNode(iri), OWL
+    yield ox.Triple(ontology, ox.NamedNode(RDF + "type"), ox.NamedNode(owl + "Ontology"))
+    for imported in (str(episode["scene"]), EPISODES.rstrip("#")):
         yield ox.Triple(ontology, ox.NamedNode(owl + "imports"), ox.NamedNode(imported))
     yield ox.Triple(ontology, ox.NamedNode(EPISODES + "scene"), ox.NamedNode(str(episode["scene"])))
 

@@ -15,13 +15,13 @@ from urllib.parse import quote
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, text
+from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
 from reasoner.memory.counts_file import Lines, lines
 from reasoner.memory.links import Links
 from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE, Symbol
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF, RDFS, XSD
 
-ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
 ASSERTED = """
 SELECT DISTINCT ?node ?property ?value WHERE {
   VALUES ?kind { :GroundBehavior :SituatedObjectInstance :Counter } ?node a ?kind ; ?property ?value
@@ -101,7 +101,7 @@ def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
         IRI of the scene, which the file imports.
     """
     iri = f"{scene.rstrip('#/')}.memory"
-    prefixes = {**{p: PREFIXES[p] for p in ("owl", "rdfs", "xsd")}, "": CORE, "m": iri + "#"}
+    prefixes = {"owl": OWL, "rdfs": RDFS, "xsd": XSD, "": CORE, "m": iri + "#"}
     triples = list(_triples(links, names, scene, iri))
     write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
@@ -144,7 +144,7 @@ def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
 
 
 def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Triple]:
-    owl, rdf = PREFIXES["owl"], PREFIXES["rdf"]
+    owl, rdf = OWL, RDF
 
     def node(name: str) -> ox.NamedNode:
         return ox.NamedNode(name)
@@ -188,9 +188,7 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
         yield ox.Triple(axiom, node(owl + "annotatedTarget"), fact)
         # a decimal, since some programs cut doubles to seven digits when they write Turtle
         decimal = f"{Decimal(repr(probability)):f}"
-        yield ox.Triple(
-            axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(PREFIXES["xsd"] + "decimal"))
-        )
+        yield ox.Triple(axiom, node(CORE + "probability"), ox.Literal(decimal, datatype=node(XSD + "decimal")))
 
 
 def _readable(*words: str) -> str:

@@ -25,21 +25,22 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS
 
-HEADER = """\
-@prefix :        <{scene}#> .
-@prefix c:       <https://w3id.org/confab/core#> .
-@prefix owl:     <http://www.w3.org/2002/07/owl#> .
-@prefix rdfs:    <http://www.w3.org/2000/01/rdf-schema#> .
-@prefix skos:    <http://www.w3.org/2004/02/skos/core#> .
+HEADER = f"""\
+@prefix :        <{{scene}}#> .
+@prefix c:       <{CORE}> .
+@prefix owl:     <{OWL}> .
+@prefix rdfs:    <{RDFS}> .
+@prefix skos:    <{SKOS}> .
 @prefix dcterms: <http://purl.org/dc/terms/> .
 
-<{scene}> a owl:Ontology ;
+<{{scene}}> a owl:Ontology ;
   owl:imports <https://w3id.org/confab/core> ;
-  owl:versionIRI <{scene}/1> ;
+  owl:versionIRI <{{scene}}/1> ;
   c:symbolicOnly true ;
-  dcterms:title {title}@en ;
-  dcterms:description {description}@en .
+  dcterms:title {{title}}@en ;
+  dcterms:description {{description}}@en .
 """
 CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
@@ -204,7 +205,7 @@ class _Writer:
         return " ; ".join(said)
 
     def arguments(self, terms: Sequence[str]) -> list[str]:
-        names = ("c:about", *(f"c:argument{i}" for i in range(2, 10)))
+        names = (f"c:{name}" for name in ARGUMENTS)
         return [f"{name} {self.put(term)}" for name, term in zip(names, terms, strict=False)]
 
     def condition(self, one: Condition) -> str:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, CORE, SCENE, KnowledgeGraph, text
+from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.reading.problem import Reading
 from reasoner.symbols import (
     FALSE,
@@ -39,14 +39,14 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
+from reasoner.vocabulary import ARGUMENTS, CORE, RDF
 
 SITUATION = BASE + "situation"
-ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
 RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
-TYPE = ox.NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type")
+TYPE = ox.NamedNode(RDF + "type")
 
 
 @dataclass(frozen=True, order=True)

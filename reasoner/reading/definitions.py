@@ -36,9 +36,8 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+from reasoner.vocabulary import OWL, RDF
 
-OWL = "http://www.w3.org/2002/07/owl#"
-RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 THING = OWL + "Thing"
 EXPRESSIONS = """{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(isBlank(?value)) } UNION
     { ?class owl:equivalentClass ?expression .

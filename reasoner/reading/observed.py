@@ -14,12 +14,12 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from reasoner.files import write_whole
-from reasoner.graph.knowledge import BASE, CORE, PREFIXES, KnowledgeError, KnowledgeGraph, read_into, text
+from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from reasoner.names import Names
 from reasoner.reading.problem import Reading
 from reasoner.symbols import State, Symbol
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
 
-ARGUMENTS = ("about", *(f"argument{position}" for position in range(2, 10)))
 FACTS = """
 SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property"""
 
@@ -37,7 +37,7 @@ def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
     scene : str
         IRI of the scene, which the file imports.
     """
-    prefixes = {"owl": PREFIXES["owl"], "": CORE, "s": observed_iri(scene) + "#"}
+    prefixes = {"owl": OWL, "": CORE, "s": observed_iri(scene) + "#"}
     write_whole(path, ox.serialize(_triples(state, names, scene), format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
 
@@ -86,7 +86,7 @@ def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symb
 
 
 def _triples(state: State, names: Names, scene: str) -> list[ox.Triple]:
-    iri, owl, kind = observed_iri(scene), PREFIXES["owl"], ox.NamedNode(PREFIXES["rdf"] + "type")
+    iri, owl, kind = observed_iri(scene), OWL, ox.NamedNode(RDF + "type")
     triples = [
         ox.Triple(ox.NamedNode(iri), kind, ox.NamedNode(owl + "Ontology")),
         ox.Triple(ox.NamedNode(iri), ox.NamedNode(owl + "imports"), ox.NamedNode(scene)),

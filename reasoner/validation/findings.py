@@ -12,12 +12,13 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import KnowledgeGraph, readable
 from reasoner.names import local_name
+from reasoner.vocabulary import RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")
 """Rules whose findings come first: others may follow from them."""
 
-LABEL = ox.NamedNode("http://www.w3.org/2000/01/rdf-schema#label")
+LABEL = ox.NamedNode(RDFS + "label")
 
 
 @dataclass(frozen=True, order=True)

@@ -26,21 +26,21 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import PREFIXES, SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Behavior, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
+from reasoner.vocabulary import OWL, RDF
 
 PROTOTYPE = "urn:confab:prototype:"
 NUMBER = "urn:confab:number:"
-OWL, RDF = (PREFIXES[prefix] for prefix in ("owl", "rdf"))
 TYPE, FIRST, REST = (ox.NamedNode(RDF + name) for name in ("type", "first", "rest"))
 MEMBERS = (ox.NamedNode(OWL + "distinctMembers"), ox.NamedNode(OWL + "members"))
 CARDINALITY = re.compile(rb" <%s(min|max|)([qQ]ualified)?[cC]ardinality> " % OWL.encode())
 MEMORY = "-Xmx2000M"
 QUICK_START = ("-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1")  # in so short a run, thorough compilation doesn't pay
 UTF_8 = ("-Dfile.encoding=UTF-8", "-Dstdout.encoding=UTF-8")  # older and newer names of what it prints with
-IMPORTS = "http://www.w3.org/2002/07/owl#imports"
+IMPORTS = OWL + "imports"
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation"
 
 
@@ -231,7 +231,7 @@ def _iri(behavior: Behavior, term: str) -> str:
 def _prototypes(graph: KnowledgeGraph, reading: Reading) -> Iterator[str]:
     """Yield a class in Turtle for each term of each behaviour."""
     properties = {s.value: p.value for s, p in graph.select(VALUE_PROPERTIES, SCENE)}  # type: ignore[union-attr]
-    yield "@prefix owl: <http://www.w3.org/2002/07/owl#> ."
+    yield f"@prefix owl: <{OWL}> ."
     for behavior in reading.problem.domain.behaviors.values():
         writer = _Writer(reading, properties, behavior)
         for term in (*behavior.parameters, *behavior.variables):

@@ -20,14 +20,11 @@ from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.problem import Reading
 from reasoner.symbols import FALSE, AnyOf, Behavior, Condition, Problem, ValueCondition, Witness
+from reasoner.vocabulary import OWL, RDF, RDFS, XSD
 
 Fault = tuple[str, str, str, str]
 """Node, what, why, remedy."""
 
-OWL = "http://www.w3.org/2002/07/owl#"
-RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
-RDFS = "http://www.w3.org/2000/01/rdf-schema#"
-XSD = "http://www.w3.org/2001/XMLSchema#"
 BUILT_IN = (OWL, RDF, RDFS, XSD)
 PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
 

@@ -25,11 +25,12 @@ import ontology
 from reasoner.embodiment import measures
 from reasoner.embodiment.reading import EmbodimentError, read_embodiment
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import BASE, CORE, GRAPHS, PREFIXES, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
 from reasoner.validation.rules import RULES, Case, misread
+from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:
     import rdflib
@@ -47,12 +48,11 @@ CONSEQUENCES = {
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
 
-ROBOTS = """PREFIX e: <https://w3id.org/confab/embodiment#>
-SELECT ?robot WHERE { ?robot e:urdf ?file . FILTER NOT EXISTS { ?ontology :symbolicOnly true } }"""
-SHACL = "http://www.w3.org/ns/shacl#"
+ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
+SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
 """Namespaces of the properties that shapes look at: not at the facts of scenes, which are many."""
-LISTS = (PREFIXES["rdf"] + "first", PREFIXES["rdf"] + "rest")
+LISTS = (RDF + "first", RDF + "rest")
 
 
 def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding]:

@@ -16,8 +16,9 @@ from planner.acting.episode import Change
 from planner.acting.executive import Moment
 from planner.acting.symbolic_world import SymbolicWorld
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
-from reasoner.memory.episodes import EPISODES, PROV, assert_episode
+from reasoner.memory.episodes import assert_episode
 from reasoner.validation.validate import validate
+from reasoner.vocabulary import EPISODES, PROV
 
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 
