@@ -82,6 +82,8 @@ class _Check:
 
     def __init__(self, problem: Problem, depth: int) -> None:
         self.problem = problem
+        self.levels = problem.domain.levels
+        self.rests = {name: kind.rest for name, kind in problem.domain.situations.items() if kind.rest is not None}
         self.depth = depth  # the lowest level that the plan speaks of
         self.rules = Rules(problem)
         self.facts = Facts(problem, problem.initial)
@@ -90,28 +92,33 @@ class _Check:
     def fault(self, path: tuple[int, ...], text: str) -> None:
         self.faults.append(Fault(path, text))
 
-    def carried_out(self, steps: Sequence[Step], above: int, path: tuple[int, ...], name: str) -> bool:
+    def carried_out(
+        self, steps: Sequence[Step], above: int, path: tuple[int, ...], name: str, inside: bool = False
+    ) -> bool:
         """Carry out steps that together refine one of level `above`, or the task (level 0); whether all could be done.
+
+        What the goal says of a symbol comes before its rest value, but not `inside` of a step, which knows no goal.
 
         Among the steps of the next level may be stretches of lower ones, each of which stands in the place of such a step.
         """
-        level = next((level for level in self.problem.domain.levels if level > above), above)
+        level = next((level for level in self.levels if level > above), above)
         touched: dict[Cell, None] = {}
         for part in stretches(steps, level):
             mark = len(self.facts.log)
             if part[0].level > level:
-                done = self.carried_out(part, level, part[0].path, f"the stretch from {part[0]} to {part[-1]}")
+                done = self.carried_out(part, level, part[0].path, f"the stretch from {part[0]} to {part[-1]}", inside)
             else:
                 done = self.step(part[0])
             if not done:
                 return False
             touched.update(dict.fromkeys(self.facts.since(mark)))
         for situation, arguments in touched:
-            symbol, rest = Symbol(situation, arguments), self.problem.domain.situations[situation].rest
-            if rest is None or not above < self.problem.first_level(symbol) <= level or symbol in self.problem.goal:
+            rest = self.rests.get(situation)
+            if rest is None or self.facts.value(situation, arguments) == rest:
                 continue
-            got = self.facts.value(situation, arguments)
-            if got != rest:
+            symbol = Symbol(situation, arguments)
+            if above < self.problem.first_level(symbol) <= level and (inside or symbol not in self.problem.goal):
+                got = self.facts.value(situation, arguments)
                 self.fault(path, f"{name} touches {symbol} and leaves it {got}; at rest it is {rest}")
         return True
 
@@ -136,14 +143,13 @@ class _Check:
                 self.fault(step.path, f"{step}: it isn't refined, and other steps are")
             return True
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
-        if not self.carried_out(step.steps, behavior.level, step.path, str(step)):
+        if not self.carried_out(step.steps, behavior.level, step.path, str(step), inside=True):
             return False
-        before = self.facts.since(mark)
-        for cell in sorted({**before, **wanted}):
+        said = {**self.facts.since(mark), **wanted}  # what isn't named stays as it was before
+        for cell in sorted(cell for cell, value in said.items() if self.facts.value(*cell) != value):
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
-            said = wanted.get(cell, before.get(cell, got))
-            if got != said and (cell in wanted or self.problem.sees(behavior.level, symbol, said)):
-                self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said}")
+            if cell in wanted or self.problem.sees(behavior.level, symbol, said[cell]):
+                self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
         return True
 
 
@@ -224,10 +230,12 @@ class Rules:
 
     def fits(self, behavior: Behavior, arguments: Arguments) -> bool:
         """Whether the arguments are of the classes of the behaviour's parameters."""
-        return len(arguments) == len(behavior.parameters) and all(
-            argument in self.problem.members(parameter.kind)
-            for parameter, argument in zip(behavior.parameters, arguments, strict=True)
-        )
+        if len(arguments) != len(behavior.parameters):
+            return False
+        for parameter, argument in zip(behavior.parameters, arguments, strict=True):
+            if argument not in self.problem.members(parameter.kind):
+                return False
+        return True
 
     def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[Change] | None:
         """Return the values that a behaviour gives to arguments that fit, in order; None if it isn't applicable."""
