@@ -103,6 +103,17 @@ def plan(
     diff: Annotated[
         str | None, typer.Option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
     ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            "--engine",
+            metavar="NAME",
+            help="A planner that unified-planning knows, or none: not even where ours gives up.",
+        ),
+    ] = None,
+    level: Annotated[
+        int | None, typer.Option("--level", metavar="N", help="The level the engine plans; the lowest.")
+    ] = None,
     iri: SceneIri = None,
     as_json: AsJson = False,
 ) -> None:
@@ -115,7 +126,7 @@ def plan(
         _print(changed.json() if as_json else str(changed))
         raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
-    result = loaded.plan(goal or (), remembered, mode, time_limit, optimal, observed)
+    result = loaded.plan(goal or (), remembered, mode, time_limit, optimal, observed, engine, level)
     _print(result.json() if as_json else result)
     raise typer.Exit(EXIT[result.outcome.status.value])
 

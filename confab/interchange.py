@@ -40,6 +40,8 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         data["steps"] = [step_json(step) for step in outcome.plan.steps]
     if outcome.bound is not None:
         data["bound"] = outcome.bound
+    if outcome.engine is not None:
+        data["engine"] = outcome.engine
     if outcome.reason is not None:
         data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
     data["search"] = {

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from planner.grounded.grounding import ground
-from planner.grounded.plan_windows import regrouped
+from planner.grounded.plan_windows import regrouped, shortened
 from planner.grounded.task import Task
 from planner.paper.transitions import Model, Values
 from planner.plan import Plan, Step
@@ -65,11 +65,14 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     return paths
 
 
-def read_pddl_plan(problem: Problem, level: int | None, text: str, regroup: bool = False) -> Plan:
+def read_pddl_plan(
+    problem: Problem, level: int | None, text: str, regroup: bool = False, shorten: bool = False
+) -> Plan:
     """Read a plan that another planner found for the export of a level, as a plan of ours.
 
     A planner without hierarchy interleaves steps that don't depend on one another as it happens: one hand waits at a place
-    where the other has to go. With `regroup` each step stands behind the latest that it depends on.
+    where the other has to go. With `regroup` each step stands behind the latest that it depends on, with `shorten` besides those
+    that the goal doesn't need are left out.
 
     What a behaviour's variables stand for (the object that is grasped) follows from the state before it, and is what a robot
     has to be told; behind a step that isn't applicable it is left open, and validation says so.
@@ -84,8 +87,8 @@ def read_pddl_plan(problem: Problem, level: int | None, text: str, regroup: bool
         found = plan_of(to_pddl(problem, level), text)
     except ValueError as error:
         raise KnowledgeError(str(error)) from error
-    if regroup:
-        found = _regrouped(problem, level, found)
+    if regroup or shorten:
+        found = _regrouped(problem, level, found, shorten)
     model = Model(problem)
     values: Values | None = model.values(problem.initial)
     steps = []
@@ -97,7 +100,7 @@ def read_pddl_plan(problem: Problem, level: int | None, text: str, regroup: bool
     return Plan(tuple(steps))
 
 
-def _regrouped(problem: Problem, level: int, plan: list[Ground]) -> list[Ground]:
+def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:
     """Return the steps regrouped; as they are, if they don't lead to the goal."""
     task = ground(problem, level)
     if not isinstance(task, Task):
@@ -114,4 +117,6 @@ def _regrouped(problem: Problem, level: int, plan: list[Ground]) -> list[Ground]
             return plan
         chosen.append(after[0])
         state = after[1]
+    if shorten and state & task.goal == task.goal:
+        chosen = shortened(task, chosen)
     return [task.describe(operator)[:2] for operator in regrouped(task, chosen)]

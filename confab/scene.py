@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -215,6 +216,8 @@ class Scene:
         time_limit: float | None = None,
         optimal: bool = False,
         observed: str | Path | None = None,
+        engine: str | None = None,
+        level: int | None = None,
     ) -> Result:
         """Plan in this scene.
 
@@ -234,12 +237,23 @@ class Scene:
             Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
         observed : str or Path, optional
             File of observed facts, which replace the scene's.
+        engine : str, optional
+            A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
+            where ours gives up at a limit other than that of time; with ``none`` none is.
+        level : int, optional
+            The level that the engine plans; the lowest if left out.
 
         Raises
         ------
         KnowledgeError
             A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
         """
+        from confab.engines import NONE, plan_by_engine
+
+        if level is not None and engine in (None, NONE):
+            raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
+        if engine not in (None, NONE) and (mode == "paper" or optimal):
+            raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
         if optimal and (mode == "paper" or memory is not None):
             raise KnowledgeError("the optimal search uses neither memory nor the paper's mode; leave one out")
         self._pull()
@@ -264,12 +278,23 @@ class Scene:
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
 
             def search(problem: Problem) -> Outcome:
+                if engine not in (None, NONE):
+                    return plan_by_engine(problem, engine, level, time_limit)
                 using = compiled(problem)
                 if optimal:
                     from planner.hierarchical.bounds import plan as optimal_plan
 
                     return optimal_plan(problem, limits=limits, using=using)
-                return guided_plan(problem, advisor, mode, limits=limits, using=using)
+                outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
+                if outcome.status is not Status.GAVE_UP or engine == NONE:
+                    return outcome
+                left = None if time_limit is None else time_limit - (perf_counter() - begin)
+                if left is not None and left <= 0:
+                    return outcome
+                with suppress(KnowledgeError):  # none is installed, or none takes such a problem
+                    other = plan_by_engine(problem, None, None, left)
+                    return other if other.status is Status.SOLVED else outcome
+                return outcome
 
             if observed:
                 problem = with_goals(self._seen(self.reading, observed), goals)

@@ -76,7 +76,8 @@ def summary(outcome: Outcome) -> str:
         effort += (
             f", refinements {outcome.hits} from the cache and {outcome.misses} searched, {outcome.fallbacks} fallbacks"
         )
-    return f"solved: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
+    by = f" by {outcome.engine}" if outcome.engine else ""
+    return f"solved{by}: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
 
 
 def plan_html(plan: Plan, notes: Notes | None = None) -> str:

@@ -102,7 +102,7 @@ class Outcome:
     `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
     calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it; `hits` and `misses`
     count the refinements that the cache had and those that had to be searched.
-    `bound` is what any plan costs at least on the lowest level, where that was proved.
+    `bound` is what any plan costs at least on the lowest level, where that was proved; `engine` the other planner whose plan it is.
     """
 
     status: Status
@@ -114,6 +114,7 @@ class Outcome:
     bound: float | None = None
     hits: int = 0
     misses: int = 0
+    engine: str | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,191 @@
+"""A level handed to a planner that people already have, through unified-planning: exported, planned, read back, put in order.
+
+The plan is one of ours then: its steps stand behind what they depend on, and under behaviours of the levels above wherever a run of
+steps does what one of them says; `planner.validation` has the last word.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from dataclasses import replace
+from time import perf_counter
+
+from confab.pddl_commands import read_pddl_plan
+from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.novelty import successors
+from planner.grounded.task import Task
+from planner.plan import Outcome, Plan, Reason, Status, Step
+from planner.validation import successor, validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.pddl.exporting import to_pddl
+from reasoner.symbols import FALSE, Problem, State, Symbol
+
+NONE = "none"
+"""In place of an engine's name: no engine at all."""
+LONGEST = 60  # steps that may stand under one of the level above
+
+Answer = tuple[str, str, list[str]]
+"""An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""
+
+
+def plan_by_engine(
+    problem: Problem, engine: str | None, level: int | None = None, seconds: float | None = None
+) -> Outcome:
+    """Plan one level of a problem, the lowest if none is given, with an engine of unified-planning.
+
+    Parameters
+    ----------
+    problem : Problem
+    engine : str, optional
+        As unified-planning calls it, e.g. ``fast-downward``; any installed one that takes the problem if left out.
+    level : int, optional
+    seconds : float, optional
+        What the engine may take, where it can be told.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such engine, or no such level.
+    """
+    began = perf_counter()
+    level = problem.domain.levels[-1] if level is None else level
+    if level not in problem.domain.levels:
+        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
+    wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
+    exported = to_pddl(wanted, level)
+    name, said, lines = answer(exported.domain, exported.problem, engine, seconds)
+
+    def outcome(status: Status, plan: Plan | None = None, reason: str = "") -> Outcome:
+        why = Reason(f"{name}: {reason}") if reason else None
+        return Outcome(status, plan, why, seconds=perf_counter() - began, engine=name)
+
+    if said.startswith("UNSOLVABLE"):
+        return outcome(Status.UNSOLVABLE, reason=f"no plan exists on level {level}")
+    if not said.startswith("SOLVED"):
+        return outcome(Status.GAVE_UP, reason=said.lower().replace("_", " "))
+    found = read_pddl_plan(wanted, level, "".join(f"({line})\n" for line in lines), regroup=True, shorten=True)
+    for plan in (under_the_levels_above(problem, found), found):
+        faults = validate(problem, plan)
+        if not faults:
+            return outcome(Status.SOLVED, plan)
+    return outcome(Status.GAVE_UP, reason=f"its plan is none here: {faults[0].text}")
+
+
+def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
+    """Return the rest values that hold in the beginning, of what only levels below the first know: a plan has to restore them."""
+    situations, first = problem.domain.situations, problem.domain.levels[0]
+    return {
+        symbol: value
+        for symbol, value in problem.initial.items()
+        if value == situations[symbol.situation].rest and first < problem.first_level(symbol) <= level
+    }
+
+
+def answer(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
+    """Ask unified-planning for a plan.
+
+    Raises
+    ------
+    KnowledgeError
+        unified-planning isn't installed, or has no such engine, or none for such a problem.
+    """
+    try:
+        from unified_planning.environment import Environment
+        from unified_planning.exceptions import UPException
+        from unified_planning.io import PDDLReader
+    except ImportError:
+        raise KnowledgeError("engines need unified-planning; install the extra pddl") from None
+    environment = Environment()
+    environment.error_used_name, environment.credits_stream = False, None  # a type may be called as a predicate is
+    factory = environment.factory
+    if engine is not None and engine not in factory.engines:
+        known = ", ".join(name for name in factory.engines if factory.engine(name).is_oneshot_planner()) or "none"
+        raise KnowledgeError(
+            f"no engine '{engine}' is installed (installed: {known}); pip install up-{engine} may bring it"
+        )
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        task = PDDLReader(environment).parse_problem_string(domain, problem)
+        try:
+            chosen = {"name": engine} if engine else {"problem_kind": task.kind}
+            with factory.OneshotPlanner(**chosen) as planner:
+                planner.skip_checks = True  # some say no to action costs, which they take
+                result = planner.solve(task, timeout=seconds)
+                name = engine or planner.name
+        except UPException as error:
+            raise KnowledgeError(f"no engine takes this problem: {' '.join(str(error).split())}") from None
+    actions = result.plan.actions if result.plan is not None else ()
+    lines = [" ".join((action.action.name, *map(str, action.actual_parameters))) for action in actions]
+    return name, result.status.name, lines
+
+
+def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
+    """Return a plan of one level with its steps under those of the levels above, as far up as every step finds a place."""
+    steps = list(plan.steps)
+    for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
+        grouped = _grouped(problem, steps, level)
+        if grouped is None:
+            break
+        steps = grouped
+    return Plan(tuple(_placed(step, (i,)) for i, step in enumerate(steps)))
+
+
+def _grouped(problem: Problem, steps: Sequence[Step], level: int) -> list[Step] | None:
+    """Return as few steps of a level as have all these steps under them, each run doing what its step says; None if none have."""
+    try:
+        task = ground(problem, level)
+    except (TooLargeError, OutOfTimeError):
+        return None
+    if not isinstance(task, Task):
+        return None
+    values: list[State] = [dict(problem.initial)]
+    for step in steps:
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, values[-1])
+        if after is None:
+            return None
+        values.append(after)
+    states = [_state(task, value) for value in values]
+    tree, situations = successors(task), problem.domain.situations
+    best: list[tuple[int, int, int] | None] = [(0, 0, -1), *[None] * len(steps)]  # number of steps, begin, operator
+    for i, state in enumerate(states[:-1]):
+        here = best[i]
+        if here is None:
+            continue
+        ways = {task.applied(state, operator): operator for operator in tree.of(state)}
+        touched: set[object] = set()
+        for j in range(i + 1, min(i + LONGEST, len(steps)) + 1):
+            touched |= {s for s, value in values[j].items() if values[j - 1].get(s, FALSE) != value}
+            there = best[j]
+            if states[j] == state or states[j] not in ways or (there is not None and there[0] <= here[0] + 1):
+                continue
+            at_rest = all(
+                value == situations[s.situation].rest
+                for s, value in values[j].items()
+                if s in touched and situations[s.situation].level > level and situations[s.situation].rest is not None
+            )
+            if at_rest:
+                best[j] = (here[0] + 1, i, ways[states[j]])
+    found: list[Step] = []
+    end = len(steps)
+    while end:
+        entry = best[end]
+        if entry is None:
+            return None
+        _, begin, operator = entry
+        found.append(replace(task.steps([operator])[0], steps=tuple(steps[begin:end])))
+        end = begin
+    return found[::-1]
+
+
+def _state(task: Task, values: State) -> int:
+    """Return the state of a level's task in which the symbols have some values."""
+    facts = sum(1 << bit for bit, fact in enumerate(task.facts) if values.get(fact.symbol, FALSE) == fact.value)
+    absent = sum(1 << bit for bit, fact in task.complements.items() if values.get(fact.symbol, FALSE) != fact.value)
+    return task.completed(facts | absent)
+
+
+def _placed(step: Step, path: tuple[int, ...]) -> Step:
+    return replace(step, path=path, steps=tuple(_placed(below, (*path, i)) for i, below in enumerate(step.steps)))

@@ -1,0 +1,108 @@
+"""Levels handed to other planners: what comes back is a plan of ours, or is said to be none."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+import confab
+from confab import engines
+from confab.cli import app
+from confab.engines import Answer, at_rest, plan_by_engine
+from planner.grounded.best_first import search
+from planner.grounded.grounding import ground
+from planner.grounded.task import Task
+from planner.plan import Outcome, Reason, Status
+from planner.validation import validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
+
+SCENE = "beverage-serving-moved"
+
+
+def stand_in(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
+    """Plan the PDDL that an engine would get, with what is at hand."""
+    read = imported(parse(domain, problem))
+    task = ground(read.problem)
+    assert isinstance(task, Task)
+    found = search(task)
+    return engine or "any", "SOLVED_SATISFICING", [read.line(*task.describe(operator)[:2]) for operator in found.plan]
+
+
+@pytest.fixture(autouse=True)
+def no_engine_but_the_stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engines, "answer", stand_in)
+
+
+def test_an_engines_plan_stands_under_the_levels_above_and_is_valid() -> None:
+    problem = confab.load(SCENE).problem
+    outcome = plan_by_engine(problem, "stand-in")
+    assert outcome.status is Status.SOLVED and outcome.engine == "stand-in" and outcome.plan is not None
+    assert outcome.plan.length.keys() == {1, 2, 3}
+    assert validate(problem, outcome.plan) == []
+    assert at_rest(problem, 3).keys() and not at_rest(problem, 1)
+
+
+def test_a_level_of_ones_choice_is_planned() -> None:
+    outcome = plan_by_engine(confab.load(SCENE).problem, "stand-in", 2)
+    assert outcome.plan is not None and 3 not in outcome.plan.length
+    with pytest.raises(KnowledgeError, match=r"no level 7; this scene has 1, 2, 3"):
+        plan_by_engine(confab.load(SCENE).problem, "stand-in", 7)
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "reason"),
+    [
+        ("UNSOLVABLE_PROVEN", Status.UNSOLVABLE, "e: no plan exists on level 3"),
+        ("TIMEOUT", Status.GAVE_UP, "e: timeout"),
+        ("SOLVED_SATISFICING", Status.GAVE_UP, "e: its plan is none here: the goal"),
+    ],
+)
+def test_what_is_no_plan_is_said_to_be_none(
+    monkeypatch: pytest.MonkeyPatch, said: str, status: Status, reason: str
+) -> None:
+    monkeypatch.setattr(engines, "answer", lambda *_: ("e", said, []))
+    outcome = plan_by_engine(confab.load(SCENE).problem, "e")
+    assert outcome.status is status and outcome.plan is None and outcome.reason is not None
+    assert outcome.reason.text.startswith(reason)
+
+
+def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    gave_up = Outcome(Status.GAVE_UP, reason=Reason("the limit came first"))
+    monkeypatch.setattr("planner.experience.portfolio.plan", lambda *_, **__: gave_up)
+    scene = confab.load(SCENE)
+    result = scene.plan()
+    assert result.solved and result.json()["engine"] == "any"
+    assert scene.plan(engine="none").outcome is gave_up
+    monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
+    assert scene.plan().outcome is gave_up
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--level", "2"], "a level is chosen for an engine"),
+        (["--engine", "e", "--optimal"], "an engine plans by itself"),
+    ],
+)
+def test_options_that_exclude_each_other_are_misuse(options: list[str], message: str) -> None:
+    done = CliRunner().invoke(app, ["plan", SCENE, *options])
+    assert isinstance(done.exception, KnowledgeError) and message in str(done.exception)
+
+
+def test_an_engine_that_is_not_installed_is_named_with_those_that_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("unified_planning")
+    monkeypatch.undo()
+    with pytest.raises(KnowledgeError, match=r"no engine 'nonesuch' is installed \(installed: .*\)"):
+        plan_by_engine(confab.load(SCENE).problem, "nonesuch")
+
+
+@pytest.mark.parametrize("scene", ["beverage-serving", "one-arm-serving"])
+def test_fast_downward_plans_the_lowest_level(monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
+    pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
+    monkeypatch.undo()
+    problem = confab.load(scene).problem
+    outcome = plan_by_engine(problem, "fast-downward")
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
