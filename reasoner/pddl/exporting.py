@@ -387,7 +387,9 @@ class _Export:
                     self.effect(effect, conditions, action)
                 for effect in conditional:
                     self.conditional(effect, action)
-            if "(or)" not in action.needs and (action.ends or action.begins or action.effects):  # one that does something
+            if "(or)" not in action.needs and (
+                action.ends or action.begins or action.effects
+            ):  # one that does something
                 yield action
 
     def same_or_not(
