@@ -135,3 +135,17 @@ def test_what_is_wrong_with_an_outcome_is_said() -> None:
     refused = replace(outcome, status=Status.UNSOLVABLE, plan=None)
     assert "a false unsolvable" in complaints(problem, refused, outcome, True)
     assert "a plan where there is none" in complaints(problem, outcome, outcome, False)
+
+
+def test_steps_of_the_level_below_that_the_level_above_could_have_done_break_nothing() -> None:
+    compared = 0
+    for seed in range(80):
+        problem = hierarchy(seed)
+        found = paper(problem).plan
+        if found is None or any(step.level > 1 for step in found.steps):
+            continue
+        below = Plan(tuple(step for above in found.steps for step in above.steps))
+        assert validate(problem, below) == [], seed
+        assert [left.broken for left in levels_left(problem, below)] == [()] * bool(below.steps), seed
+        compared += 1
+    assert compared > 20
