@@ -23,8 +23,6 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
-NONE = "none"
-"""In place of an engine's name: no engine at all."""
 LONGEST = 60  # steps that may stand under one of the level above
 
 Answer = tuple[str, str, list[str]]

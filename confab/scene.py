@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 MODES = ("guarded", "leading", "strict", "paper")
 DEFAULT_MODE = MODES[0]
+NO_ENGINE = "none"
+"""In place of an engine's name: no engine at all."""
 OPTIMAL_SECONDS = 10.0
 """Where the search for the best plan stops if no time limit is given."""
 
@@ -248,11 +250,9 @@ class Scene:
         KnowledgeError
             A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
         """
-        from confab.engines import NONE, plan_by_engine
-
-        if level is not None and engine in (None, NONE):
+        if level is not None and engine in (None, NO_ENGINE):
             raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
-        if engine not in (None, NONE) and (mode == "paper" or optimal):
+        if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
             raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
         if optimal and (mode == "paper" or memory is not None):
             raise KnowledgeError("the optimal search uses neither memory nor the paper's mode; leave one out")
@@ -278,7 +278,9 @@ class Scene:
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
 
             def search(problem: Problem) -> Outcome:
-                if engine not in (None, NONE):
+                if engine not in (None, NO_ENGINE):
+                    from confab.engines import plan_by_engine
+
                     return plan_by_engine(problem, engine, level, time_limit)
                 using = compiled(problem)
                 if optimal:
@@ -286,11 +288,13 @@ class Scene:
 
                     return optimal_plan(problem, limits=limits, using=using)
                 outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
-                if outcome.status is not Status.GAVE_UP or engine == NONE:
+                if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE:
                     return outcome
                 left = None if time_limit is None else time_limit - (perf_counter() - begin)
                 if left is not None and left <= 0:
                     return outcome
+                from confab.engines import plan_by_engine
+
                 with suppress(KnowledgeError):  # none is installed, or none takes such a problem
                     other = plan_by_engine(problem, None, None, left)
                     return other if other.status is Status.SOLVED else outcome
