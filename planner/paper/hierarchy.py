@@ -50,6 +50,7 @@ def plan(
     constants: PaperConstants = PAPER,
     limits: Limits = Limits(),  # noqa: B008 - frozen
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None,
+    leave_levels: bool = True,
 ) -> Outcome:
     """Plan in the paper's mode: A* with eq. (5) on each level, refined level by level.
 
@@ -63,6 +64,8 @@ def plan(
         Expansions for each search, seconds for the whole call.
     grounds : mapping of level to quantified behaviours, optional
         As `reasoner.reading.quantification` returns them; quantified here from the problem's classes if left out.
+    leave_levels : bool
+        Whether the level below is given the goal where a level has no plan that can be refined.
 
     Returns
     -------
@@ -76,6 +79,9 @@ def plan(
         steps = task(call, level)
         if steps is not None or call.gave_up:
             break
+        if not leave_levels and level != levels[-1]:
+            reason = Reason(f"no plan of level {level} was found that can be refined, and levels aren't to be left")
+            return Outcome(Status.GAVE_UP, None, reason, call.counts, 0, perf_counter() - begin)
         call.fallbacks += level != levels[-1]
     return _outcome(call, steps, perf_counter() - begin)
 

@@ -67,6 +67,14 @@ def test_where_a_level_is_left_what_only_that_level_asks_is_named() -> None:
     )
 
 
+def test_a_level_that_may_not_be_left_is_not() -> None:
+    outcome = paper(served("beverage1", "location7"), leave_levels=False)
+    assert outcome.status is Status.GAVE_UP
+    assert outcome.reason is not None
+    assert outcome.reason.text == "no plan of level 1 was found that can be refined, and levels aren't to be left"
+    assert paper(served("no_beverage", "location7"), leave_levels=False).status is Status.SOLVED
+
+
 def test_where_a_level_is_left_what_it_asks_and_is_kept_is_not_named() -> None:
     problem = served("no_beverage", "location7")
     outcome = plan_level(problem, 2)
