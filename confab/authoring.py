@@ -148,7 +148,6 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
 
     Not the individuals of other scenes, which the paper's links speak of.
     """
-    known = {quad.subject.value for quad in graph.store if isinstance(quad.subject, ox.NamedNode)}
     spoken: set[str] = set()
     with suppress(SyntaxError):  # of which reading the memory tells
         quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY))
@@ -159,8 +158,13 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
             if isinstance(q.object, ox.NamedNode)
             and (q.predicate.value in TERMS or (q.subject in counters and q.predicate.value in ROLES))
         }
-    names = [local_name(iri) for iri in known]
-    return [f"{local_name(iri)}{nearest(local_name(iri), names)}" for iri in sorted(spoken - known)]
+    asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken))
+    rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if spoken else []
+    unknown = sorted(spoken - {x.value for (x,) in rows if isinstance(x, ox.NamedNode)})
+    names = (
+        {local_name(q.subject.value) for q in graph.store if isinstance(q.subject, ox.NamedNode)} if unknown else set()
+    )
+    return [f"{local_name(iri)}{nearest(local_name(iri), names)}" for iri in unknown]
 
 
 def migrate(memory: Path, renames: Sequence[str]) -> int:

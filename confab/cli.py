@@ -577,13 +577,15 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     from confab.memory import Memory
 
     try:
+        lines = None
         if path.is_file():
             from confab.authoring import unknown_terms
             from reasoner.memory.links_file import memory_lines
 
-            if unknown := unknown_terms(memory_lines(path), scene.knowledge):
+            lines = memory_lines(path)
+            if unknown := unknown_terms(lines, scene.knowledge):
                 _say(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
-        return Memory.load(path, scene)
+        return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
         if not path.is_file():
             raise

@@ -21,7 +21,7 @@ from planner.plan import Plan, Step
 from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.counts import Decision, Experience, Tallies
-from reasoner.memory.counts_file import FORMAT, new_replica, parse, probability, pull, push, turtle
+from reasoner.memory.counts_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from reasoner.memory.links import Links
 from reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
 from reasoner.names import Names
@@ -67,7 +67,9 @@ class Memory:
         return cls(Links(), scene.names, scene.iri)
 
     @classmethod
-    def load(cls, source: str | Path, scene: Scene | None = None, trust: bool = False) -> Memory:
+    def load(
+        cls, source: str | Path, scene: Scene | None = None, trust: bool = False, lines: Lines | None = None
+    ) -> Memory:
         """Read a memory file, or the memories at a SPARQL endpoint.
 
         Parameters
@@ -78,6 +80,8 @@ class Memory:
             Its short names are used for the memory's terms.
         trust : bool
             Whether the experience of every replica may lead, not only of the one that learns into this file.
+        lines : Lines, optional
+            The file's, if it was read already (`reasoner.memory.links_file.memory_lines`).
 
         Raises
         ------
@@ -90,7 +94,7 @@ class Memory:
             found = cls(Links(), names, iri, pull(url, names))
         else:
             path = Path(source)
-            lines = memory_lines(path)
+            lines = memory_lines(path) if lines is None else lines
             iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path, lines)
             found = cls(load_links(path, names, lines), names, iri)
             if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
