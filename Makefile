@@ -3,6 +3,7 @@
 #   make test     every test
 #   make check    what a change must pass: lint, format, types, tests
 #   make bench    the measurements that the documentation quotes
+#   make fuzz     100,000 broken inputs at every door, going on where the last run ended
 #   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
 #   make clean    remove .venv, caches and results
 # PYTHON=/path/to/python chooses the interpreter of a new .venv.
@@ -16,7 +17,7 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test check bench lock clean
+.PHONY: help demo test check bench fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -32,6 +33,9 @@ check: $(VENV)/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto
+
+fuzz: $(VENV)/installed
+	@$(BIN)/python -m benchmarks.fuzz
 
 bench: $(VENV)/installed-bench
 	@$(BIN)/python -m benchmarks

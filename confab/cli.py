@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.scene import Scene
     from planner.plan import Plan
+    from reasoner.limits import Deadline
 
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
 LONGEST = 2_000
@@ -77,7 +78,9 @@ NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory
 Mode = Annotated[str, typer.Option("--mode", metavar="MODE", help="guarded, leading, strict, or paper (A*, eq. 5).")]
 TimeLimit = Annotated[
     float | None,
-    typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which planning gives up (exit 3)."),
+    typer.Option(
+        "--time-limit", metavar="S", min=0.0, help="Seconds from the start on after which it gives up (exit 3)."
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is random.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
@@ -118,7 +121,10 @@ def plan(
     as_json: AsJson = False,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
-    loaded = _load(scene, iri)
+    from reasoner.limits import Deadline
+
+    deadline = Deadline.after(time_limit)
+    loaded = _load(scene, iri, deadline)
     if diff is not None:
         from confab.authoring import difference
 
@@ -126,7 +132,8 @@ def plan(
         _print(changed.json() if as_json else str(changed))
         raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
-    result = loaded.plan(goal or (), remembered, mode, time_limit, optimal, observed, engine, level)
+    limit = None if time_limit is None else deadline
+    result = loaded.plan(goal or (), remembered, mode, limit, optimal, observed, engine, level)
     _print(result.json() if as_json else result)
     raise typer.Exit(EXIT[result.outcome.status.value])
 
@@ -560,12 +567,12 @@ def export(
         print(path)
 
 
-def _load(source: str, iri: str | None = None) -> Scene:
+def _load(source: str, iri: str | None = None, deadline: Deadline | None = None) -> Scene:
     """Load a scene, with what its hands reach if it has a body."""
     from confab.reaching import with_current_reach
     from confab.scene import load
 
-    return with_current_reach(load(source, iri), _say)
+    return with_current_reach(load(source, iri, deadline), _say)
 
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:

@@ -18,6 +18,7 @@ from planner.plan import Limits, Outcome, Plan, Status
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import NO_ROWS, KnowledgeError, KnowledgeGraph
 from reasoner.graph.knowledge import load as load_graph
+from reasoner.limits import Deadline
 from reasoner.memory.links import Links
 from reasoner.names import Names, nearest
 from reasoner.reading.problem import Reading, read, with_goals
@@ -215,7 +216,7 @@ class Scene:
         goals: Iterable[str] = (),
         memory: Memory | Links | None = None,
         mode: str = DEFAULT_MODE,
-        time_limit: float | None = None,
+        time_limit: float | Deadline | None = None,
         optimal: bool = False,
         observed: str | Path | None = None,
         engine: str | None = None,
@@ -233,8 +234,8 @@ class Scene:
             ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
             ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
             it; behaviours are then numbered among the individuals that were recognised.
-        time_limit : float, optional
-            Seconds after which the call gives up; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
+        time_limit : float or Deadline, optional
+            Seconds after which the call gives up, or when; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
         optimal : bool
             Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
         observed : str or Path, optional
@@ -249,6 +250,8 @@ class Scene:
         ------
         KnowledgeError
             A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
+        LimitError
+            The time was over before the search began; if it is over later, the outcome says so.
         """
         if level is not None and engine in (None, NO_ENGINE):
             raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
@@ -259,8 +262,24 @@ class Scene:
         self._pull()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
-        limits = Limits(seconds=OPTIMAL_SECONDS if optimal and time_limit is None else time_limit)
-        begin, asked, goals = perf_counter(), self.knowledge.round_trips, list(goals)
+        if optimal and time_limit is None:
+            time_limit = OPTIMAL_SECONDS
+        deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
+        with self.knowledge.until(deadline):
+            return self._plan(list(goals), memory, mode, deadline, optimal, observed, engine, level)
+
+    def _plan(
+        self,
+        goals: list[str],
+        memory: Memory | Links | None,
+        mode: str,
+        deadline: Deadline,
+        optimal: bool,
+        observed: str | Path | None,
+        engine: str | None,
+        level: int | None,
+    ) -> Result:
+        begin, asked = perf_counter(), self.knowledge.round_trips
         if mode == "paper":
             from planner.paper.hierarchy import plan as paper_plan
             from reasoner.reading.quantification import quantify
@@ -270,7 +289,7 @@ class Scene:
             quantified = perf_counter() - begin
             self._check_goal(problem)
             links = memory if isinstance(memory, Links) or memory is None else memory.links
-            outcome = paper_plan(problem, links, limits=limits, grounds=grounds)
+            outcome = paper_plan(problem, links, limits=Limits(seconds=deadline.left), grounds=grounds)
         else:
             from planner.experience.portfolio import plan as guided_plan
             from planner.hierarchical.planner import compiled
@@ -278,11 +297,13 @@ class Scene:
             advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
 
             def search(problem: Problem) -> Outcome:
+                deadline.check("reading the problem")
                 if engine not in (None, NO_ENGINE):
                     from confab.engines import plan_by_engine
 
-                    return plan_by_engine(problem, engine, level, time_limit)
+                    return plan_by_engine(problem, engine, level, deadline.left)
                 using = compiled(problem)
+                limits = Limits(seconds=deadline.left)
                 if optimal:
                     from planner.hierarchical.bounds import plan as optimal_plan
 
@@ -290,8 +311,8 @@ class Scene:
                 outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
                 if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE:
                     return outcome
-                left = None if time_limit is None else time_limit - (perf_counter() - begin)
-                if left is not None and left <= 0:
+                left = deadline.left
+                if left == 0:
                     return outcome
                 from confab.engines import plan_by_engine
 
@@ -456,7 +477,7 @@ def _sentence(facts: Iterable[Fact]) -> str:
     return "; ".join(map(str, facts))
 
 
-def load(source: str | Path, scene: str | None = None) -> Scene:
+def load(source: str | Path, scene: str | None = None, deadline: Deadline | None = None) -> Scene:
     """Load a scene: a shipped name, a file in Turtle, N-Triples or RDF/XML, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
@@ -464,11 +485,15 @@ def load(source: str | Path, scene: str | None = None) -> Scene:
     source : str or Path
     scene : str, optional
         IRI of the scene in an endpoint that holds several.
+    deadline : Deadline, optional
+        When loading ends, done or not.
 
     Raises
     ------
     KnowledgeError
         No such scene; broken syntax; an import that can't be found; an endpoint that is down, or slow, or none.
+    LimitError
+        The deadline came first.
 
     Examples
     --------
@@ -480,6 +505,7 @@ def load(source: str | Path, scene: str | None = None) -> Scene:
         from reasoner.graph.stores import connect
 
         return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
-    graph = load_graph(source)
-    infer(graph)
+    graph = load_graph(source, deadline=deadline)
+    with graph.until(deadline or Deadline()):
+        infer(graph)
     return Scene(graph, {"load": perf_counter() - begin})

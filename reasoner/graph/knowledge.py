@@ -85,6 +85,15 @@ class KnowledgeGraph:
     round_trips: int = 0
     deadline: Deadline = field(default_factory=Deadline)
 
+    @contextmanager
+    def until(self, deadline: Deadline) -> Iterator[None]:
+        """Let reading and asking end with a `LimitError` if the deadline comes first, as long as this lasts."""
+        before, self.deadline = self.deadline, deadline
+        try:
+            yield
+        finally:
+            self.deadline = before
+
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
         """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
 
@@ -161,7 +170,7 @@ def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline |
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
     deadline : Deadline, optional
-        When loading, and whatever is asked of the graph later, ends.
+        When loading ends, done or not.
 
     Raises
     ------
@@ -169,7 +178,13 @@ def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline |
         No such scene or file; syntax error with line and column; an import that no catalog knows.
     """
     path = scene_file(source)
-    graph = KnowledgeGraph("", store=ox.Store() if store is None else store, deadline=deadline or Deadline())
+    graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
+    with graph.until(deadline or Deadline()):
+        _load(graph, path)
+    return graph
+
+
+def _load(graph: KnowledgeGraph, path: Path) -> None:
     read_into(graph, path, "asserted")
     graph.scene = _only_ontology(graph, path)
     waiting = [(graph.scene, path)]
@@ -187,7 +202,6 @@ def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline |
     reach = path.with_name(f"{path.stem}.reach.ttl")
     if reach.is_file():
         read_into(graph, reach, "reach")
-    return graph
 
 
 def scene_file(source: str | Path) -> Path:

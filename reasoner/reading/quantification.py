@@ -33,8 +33,10 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     found: list[GroundBehavior] = []
     number = domain.first_ids.get(level, 0)
     for behavior in domain.at_level(level):
-        for row in graph.select(query_for(reading, behavior), SCENE):
-            arguments = tuple(reading.names.short(text(term)) for term in row[: len(behavior.parameters)])
+        for row in graph.solutions(query_for(reading, behavior), SCENE):
+            if not len(found) % 4096:
+                graph.deadline.check(f"quantifying {behavior.name} ({len(found):,} so far)")
+            arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(behavior.parameters)])
             found.append(GroundBehavior(number + len(found), behavior.name, arguments))
     return tuple(found)
 

@@ -13,6 +13,7 @@ logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothi
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -209,10 +210,15 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     sh = Namespace(SHACL)
     shapes = _shapes()
     data = Graph()
+    spoken = logging.getLogger(
+        "rdflib.term"
+    )  # warns, with a traceback, of numbers that are none: what the shapes look for
+    spoken.disabled = True
     for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
         if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
             data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
     conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
+    spoken.disabled = False
     if conforms or not isinstance(report, Graph):
         return
     for result in report.objects(None, sh.result):

@@ -17,7 +17,9 @@ from confab.authoring import migrate, new_domain
 from confab.cli import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, main
 from confab.memory import Memory
 from reasoner.files import alone, write_whole
+from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import Deadline, LimitError
 from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
 
 Answer = tuple[int, str, str]
@@ -519,3 +521,24 @@ def test_json_stays_json(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
     code, out, _ = ask("plan", tearoom, "--optimal", "--json")
     assert code == YES
     json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+
+
+# ------------------------------------------------------------------------------------------------- one deadline
+
+
+@pytest.mark.parametrize(("mode", "objects"), [("guarded", 400), ("paper", 120)])
+def test_the_time_limit_holds_from_the_first_step_on(tmp_path: Path, ask: Ask, mode: str, objects: int) -> None:
+    write_scene(tmp_path / "s.ttl", "served", objects, 2, 0, 0)
+    code, out, err = ask("plan", tmp_path / "s.ttl", "--time-limit", "0.05", "--mode", mode)
+    assert (code, out, err.count("\n")) == (GAVE_UP, "", 1)
+    assert re.search("gave up after 0.05 s while .*--time-limit", err)
+
+
+def test_a_deadline_ends_with_the_call_that_it_was_given_to(tearoom: Path) -> None:
+    scene = confab.load(tearoom)
+    with pytest.raises(LimitError, match="gave up after 0 s"):
+        scene.plan(time_limit=0.0)
+    assert scene.plan().solved
+    assert scene.plan(time_limit=60.0).solved
+    with pytest.raises(LimitError):
+        confab.load(tearoom, deadline=Deadline.after(0.0))

@@ -1,0 +1,110 @@
+"""Writers of a memory, killed at any moment: what was acknowledged is still there, and the file is whole.
+
+python -m benchmarks.kills          100 SIGKILLs for each command, as docs/promises.md quotes them
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from confab.cli import main as confab
+from confab.memory import Memory
+from reasoner.files import alone
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+
+
+def killed(write: Callable[[], object], after: float | None) -> bool:
+    """Run something in a process of its own and kill it after some seconds, if any; return whether it had ended by itself."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere):
+                write()
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+        finally:
+            os._exit(code)
+    if after is not None:
+        time.sleep(after)
+        os.kill(child, signal.SIGKILL)
+    _, state = os.waitpid(child, 0)
+    return os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
+
+
+def learn(file: Path, number: int) -> None:
+    """Learn one more episode into a memory, as `confab learn` does."""
+    with alone(file):
+        memory = Memory.load(file)
+        lesson = Candidate(Conclusion("B1_MOVE", ("Cup", "Location")), (("turn", str(number)),))
+        memory.experience.learn([Decision(lesson)])
+        memory.save(file)
+
+
+def rename(file: Path) -> str:
+    """Return a rename that the memory can do: there, or back again."""
+    classes = {kind for _, conclusion, _, _ in Memory.load(file).experience for kind in conclusion.classes}
+    return "Mug=Cup" if "Mug" in classes else "Cup=Mug"
+
+
+def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
+    """Kill a command so many times; return how often it had acknowledged before, and how many acknowledged episodes were lost."""
+    draw, lost, done = random.Random(seed), 0, 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        file, other = folder / "m.ttl", folder / "other.ttl"
+        import confab as front
+
+        scene = front.load("living-room")
+        memory = Memory.of(scene)
+        memory.experience = Experience("me", {"me": 1})
+        memory.save(file)
+        memory.experience = Experience("you", {"you": 7})
+        memory.save(other)
+        writes: dict[str, Callable[[int], object]] = {
+            "learn": lambda number: learn(file, number),
+            "merge": lambda _: confab(["memory", "merge", str(file), str(other), "-o", str(file)]),
+            "trust": lambda _: confab(["memory", "trust", str(file), "all"]),
+            "migrate": lambda _: confab(["memory", "migrate", str(file), rename(file)]),
+        }
+        learn(file, -1)
+        begin = time.monotonic()
+        killed(lambda: writes[command](-2), None)
+        long = 1.2 * (time.monotonic() - begin)  # at the latest it is killed a little after it has ended
+        acknowledged = Memory.load(file).experience.episodes["me"]
+        for number in range(kills):
+            if killed(lambda number=number: writes[command](number), draw.uniform(0.0, long)):  # type: ignore[misc]
+                done += 1
+                acknowledged += command == "learn"
+            found = Memory.load(file).experience.episodes["me"]
+            lost += max(0, acknowledged - found)
+            acknowledged = found
+    return done, lost
+
+
+def main() -> int:
+    """Print the table; return 1 if anything was lost."""
+    worst = 0
+    for command in ("learn", "merge", "trust", "migrate"):
+        done, lost = trial(100, command)
+        worst = max(worst, lost)
+        print(
+            f"{command:<8} 100 kills, {done} after it had answered, {lost} acknowledged episodes lost, every file whole"
+        )
+    return int(bool(worst))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

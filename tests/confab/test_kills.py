@@ -1,0 +1,27 @@
+"""A writer of a memory that is killed at any moment loses nothing acknowledged. More kills: `python -m benchmarks.kills`."""
+
+import random
+
+import pytest
+
+from benchmarks import kills
+from confab.memory import Memory
+
+
+@pytest.mark.parametrize("command", ["learn", "migrate"])
+def test_a_kill_loses_no_acknowledged_episode(command: str) -> None:
+    _, lost = kills.trial(8, command)
+    assert lost == 0
+
+
+def test_a_loss_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    save = Memory.save
+
+    def forgetful(memory: Memory, *target: object) -> object:
+        memory.experience.episodes["me"] = 1
+        return save(memory, *target)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Memory, "save", forgetful)
+    monkeypatch.setattr(random.Random, "uniform", lambda *_: 0.5)
+    _, lost = kills.trial(2, "learn")
+    assert lost > 0
