@@ -152,7 +152,7 @@ def _grouped(problem: Problem, steps: Sequence[Step], level: int) -> list[Step] 
         here = best[i]
         if here is None:
             continue
-        ways = {task.applied(state, operator): operator for operator in tree.of(state)}
+        ways = {task.applied(state, operator): operator for operator in tree.of(state)[0]}
         touched: set[object] = set()
         for j in range(i + 1, min(i + LONGEST, len(steps)) + 1):
             touched |= {s for s, value in values[j].items() if values[j - 1].get(s, FALSE) != value}

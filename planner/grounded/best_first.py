@@ -22,7 +22,7 @@ from time import perf_counter
 from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
 from planner.grounded.hff import Evaluate
 from planner.grounded.hff_numba import automatic
-from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty
+from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, successors
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
 from planner.grounded.unreachable import blocked
@@ -113,10 +113,11 @@ def search(
     evaluate = evaluate or automatic(task)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
+    tree = successors(task)
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (5, by_novelty(task, evaluate, counts, deep=False)),
+        (4, by_novelty(task, tree, evaluate, counts, deep=False)),
         (4, _best_first(task, evaluate, counts, lookahead=True, goals_first=False)),
-        (3, by_novelty(task, evaluate, counts, deep=True)),
+        (2, by_novelty(task, tree, evaluate, counts, deep=True)),
         (1, _best_first(task, evaluate, counts, lookahead=False, goals_first=False)),
         (1, _best_first(task, evaluate, counts, lookahead=True, goals_first=True)),
     ]

@@ -37,7 +37,7 @@ class OutOfMemoryError(Exception):
 
 
 def by_novelty(
-    task: Task, evaluate: Evaluate, counts: Counts, deep: bool
+    task: Task, tree: Tree, evaluate: Evaluate, counts: Counts, deep: bool
 ) -> Generator[int, None, tuple[Seen, int] | None]:
     """Search by novelty; yield the work done, in operators, every so many states; return what was seen and the last state.
 
@@ -49,12 +49,12 @@ def by_novelty(
         There are more states than it may keep.
     """
     goal, applied = task.goal, task.applied
-    tree = successors(task)
-    plain = [_plain(task, operator) for operator in range(len(task))]
+    plain: dict[int, tuple[int, int] | None] = {}
     seen: Seen = {task.initial: (task.initial, ())}
     most = MOST_BYTES // (STATE_BYTES + task.size // 4)
     known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
     marks = landmarks(task) & ~(task.initial | goal) if deep else 0
+    child = CHILD + task.size // 128
     number, step = 0, -1 if deep else 1
     # (no new fact, distance, number, state, facts of the relaxed plan (-1: not made yet), those met, landmarks left)
     first = (goal & ~task.initial).bit_count() + marks.bit_count()
@@ -79,10 +79,12 @@ def by_novelty(
                 for _, _, set_ in task.known(operator)[1]:
                     wanted |= set_
             wanted &= ~state
-        operators = tree.of(state)
-        work += CHILD * len(operators)
+        operators, visited = tree.of(state)
+        work += child * len(operators) + visited
         counts.generated += len(operators)
         for operator in operators:
+            if operator not in plain:
+                plain[operator] = _plain(task, operator)
             change = plain[operator]
             after = state & change[0] | change[1] if change else applied(state, operator)
             if after is None or after in seen:
@@ -152,20 +154,24 @@ class Tree:
     otherwise: Tree | None = None
     operators: list[int] = field(default_factory=list)
 
-    def of(self, state: int) -> list[int]:
-        """Return the operators that are applicable in a state."""
+    def of(self, state: int) -> tuple[list[int], int]:
+        """Return the operators that are applicable in a state, and how many nodes were visited."""
         found: list[int] = []
+        visited = 0
         waiting = [self]
-        while waiting:
-            node = waiting.pop()
-            found += node.operators
-            if node.mask:
+        for root in waiting:  # which grows
+            node: Tree | None = root
+            while node is not None:
+                visited += 1
+                if node.operators:
+                    found += node.operators
+                if not node.mask:
+                    break
                 fitting = node.by_value.get(state & node.mask)
                 if fitting is not None:
                     waiting.append(fitting)
-                if node.otherwise is not None:
-                    waiting.append(node.otherwise)
-        return found
+                node = node.otherwise
+        return found, visited
 
 
 def successors(task: Task) -> Tree:

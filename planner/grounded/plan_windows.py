@@ -29,6 +29,7 @@ from planner.grounded.task import Change, Grouped, Task
 SIZES = (8, 16)  # steps of a window
 OPERATORS = 150  # of a window's search
 EVALUATIONS = 100  # of a window's search
+TRIALS = 2_000_000  # of a step that might be left out, in all
 LOOK = 50  # operators ranked for what one evaluated costs
 
 
@@ -58,11 +59,15 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
 
 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
-    """Return a plan without steps that the goal doesn't need, nor steps that only those need."""
+    """Return a plan without steps that the goal doesn't need, nor steps that only those need.
+
+    Of a very long plan only the first steps are tried.
+    """
     plan = list(plan)
-    state, i = task.initial, 0
+    state, i, work = task.initial, 0, TRIALS
     while i < len(plan):
-        if deadline is not None and perf_counter() > deadline:
+        work -= len(plan) - i
+        if work < 0 or (deadline is not None and perf_counter() > deadline):
             break
         trial, kept = state, []
         for operator in plan[i + 1 :]:
