@@ -163,8 +163,13 @@ def carrier(parcels: int) -> Problem:
 def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
     task = ground(carrier(6))
     assert isinstance(task, Task)
-    first: list[int] = []
-    search(task, found=first.extend)
+    number = {task.describe(operator)[:2]: operator for operator in range(len(task))}
+    go, back = number["MOVE", ("here", "there")], number["MOVE", ("there", "here")]
+    first = [  # one at a time
+        step
+        for i in range(6)
+        for step in (number["PICK", (f"x{i}", "here", "left")], go, number["DROP", (f"x{i}", "there", "left")], back)
+    ]
     plan = shorter(task, first, work=10**7)
     assert plan == shorter(task, first, work=10**7)
     assert len(plan) == 17 < len(shortened(task, first))  # three times two parcels, and twice back
