@@ -6,9 +6,9 @@
     CONFAB_ALL=1 …                                   every problem, not only four per folder
     CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``)
 
-Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and ``…/pNN.pddl``, the problems
-beside the domain or one folder below it. What a run gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem
-and what the planner's code is; a benchmark that was interrupted goes on from there. Delete the folder to measure anew.
+Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and problems, beside the domain or in
+a folder ``testing…`` below it. Where the peers can't be had, ours run alone. What a run
+gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem and what the planner's code is; a benchmark that was interrupted goes on from there. Delete the folder to measure anew.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import tempfile
 import venv
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from math import exp, log
@@ -35,13 +36,7 @@ SECONDS, BYTES = 30, 4 * 2**30
 ROOT = Path(__file__).resolve().parents[1]
 PER_FOLDER = 4
 RUNS = ROOT / "confab-out" / "pddl-runs"
-OURS = (
-    *(
-        "planner/" + name
-        for name in ("flat", "grounding", "schemas", "joins", "task", "relaxed", "kernel", "reasons", "windows")
-    ),
-    *("reasoner/" + name for name in ("pddl_import", "pddl_syntax", "symbols")),
-)
+OURS = ("planner/grounded/*.py", "reasoner/pddl/*.py", "reasoner/symbols.py")
 """The files that say what our plans are."""
 
 
@@ -62,13 +57,17 @@ def main() -> None:
     if not found:
         print(f"no problems in {folder}; name a folder with CONFAB_PDDL")
         return
-    python = peers()
+    python: str | None = None
+    try:
+        python = peers()
+    except (OSError, subprocess.CalledProcessError):
+        print("pyperplan and Fast Downward can't be installed here: Confab alone")
     commands = {name: command for name, command in planners(python).items() if name in wanted()}
     if commands:
         coverage(found, commands)
-    if "grounding" in wanted():
+    if "grounding" in wanted() and python is not None:
         grounding(found, python)
-    if "read-back" in wanted():
+    if "read-back" in wanted() and python is not None:
         read_back(python)
 
 
@@ -82,7 +81,7 @@ def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
     """Yield (domain's name, domain, problem): four per folder, evenly spread, the first and the last included."""
     for domain in sorted(folder.rglob("domain.pddl")):
         for place in [domain.parent, *sorted(p for p in domain.parent.iterdir() if p.is_dir() and _measured(p.name))]:
-            here = sorted(place.glob("p*.pddl"))
+            here = sorted(file for file in place.glob("*.pddl") if file.name != "domain.pddl")
             chosen = {i * (len(here) - 1) // (PER_FOLDER - 1) for i in range(PER_FOLDER)} if here else set()
             if "CONFAB_ALL" in os.environ:
                 chosen = set(range(len(here)))
@@ -107,15 +106,17 @@ def peers() -> str:
     return str(python)
 
 
-def planners(python: str) -> dict[str, list[str]]:
+def planners(python: str | None) -> dict[str, list[str]]:
     """Return each planner's command; ``{domain}``, ``{problem}`` and ``{plan}`` are put in."""
+    ours = [sys.executable, "-m", "benchmarks.pddl", "{domain}", "{problem}", "{plan}"]
+    confab = {"confab": ours, "confab-fast": [*ours, "fast"]}
+    if python is None:
+        return confab
     inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
     place = subprocess.run([python, "-c", inside], capture_output=True, text=True, check=True).stdout.strip()
     downward = [python, f"{place}/downward/fast-downward.py"]
-    ours = [sys.executable, "-m", "benchmarks.pddl", "{domain}", "{problem}", "{plan}"]
     return {
-        "confab": ours,
-        "confab-fast": [*ours, "fast"],
+        **confab,
         "pyperplan": [python, "-m", "pyperplan", "-s", "gbf", "-H", "hff", "{domain}", "{problem}"],
         "lama-first": [*downward, "--alias", "lama-first", "--plan-file", "{plan}", "{domain}", "{problem}"],
         "translate": [*downward, "--translate", "--sas-file", "{plan}", "{domain}", "{problem}"],
@@ -125,7 +126,7 @@ def planners(python: str) -> dict[str, list[str]]:
 def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
     """Return what a planner does on a problem, from an earlier benchmark if neither has changed; a plan of ours is judged."""
     ours = name.startswith("confab")
-    code = [(ROOT / f"{file}.py").read_bytes() for file in OURS if (ROOT / f"{file}.py").exists()] if ours else []
+    code = [file.read_bytes() for pattern in OURS for file in sorted(ROOT.glob(pattern))] if ours else []
     texts = [*code, domain.read_bytes(), problem.read_bytes(), f"{name} {SECONDS} {BYTES}".encode()]
     place = RUNS / f"{name}-{hashlib.sha256(b'|'.join(texts)).hexdigest()[:24]}.json"
     if place.exists():
@@ -135,7 +136,10 @@ def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
     done = run(command, domain, problem)
     if done.seconds > SECONDS + 1:  # a planner of several processes has no more than one of one process
         done = Run(None, done.seconds, done.output)
-    verdict = accepted(domain, problem, done.plan) if ours and done.plan is not None else None
+    verdict = None
+    if ours and done.plan is not None:
+        with suppress(Exception):  # what its reader can't read, it can't judge
+            verdict = accepted(domain, problem, done.plan)
     done = Run(done.plan, done.seconds, done.output[-2000:], verdict)
     RUNS.mkdir(parents=True, exist_ok=True)
     part = place.with_suffix(".part")
