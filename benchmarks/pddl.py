@@ -8,7 +8,8 @@
 
 Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and problems, beside the domain or in
 a folder ``testing…`` below it. Where the peers can't be had, ours run alone. What a run
-gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem and what the planner's code is; a benchmark that was interrupted goes on from there. Delete the folder to measure anew.
+gave is kept under ``confab-out/pddl-runs``, named by the planner, the problem and what the planner's code is; a benchmark
+that was interrupted goes on from there. Delete the folder to measure anew.
 """
 
 from __future__ import annotations
