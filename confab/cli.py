@@ -99,6 +99,14 @@ def plan(
     optimal: Annotated[
         bool, typer.Option("--optimal", help="Improve until proved optimal or the limit (10 s); tell the bound.")
     ] = False,
+    levels: Annotated[
+        str,
+        typer.Option(
+            "--levels",
+            metavar="free|strict",
+            help="Strict: no steps of a lower level where a level has no plan that can be refined.",
+        ),
+    ] = "free",
     observed: Annotated[
         Path | None,
         typer.Option("--from-observed", metavar="FILE", help="Start from what was seen, not from the scene."),
@@ -132,8 +140,12 @@ def plan(
         _print(changed.json() if as_json else str(changed))
         raise typer.Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
+    if levels not in ("free", "strict"):
+        raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     limit = None if time_limit is None else deadline
-    result = loaded.plan(goal or (), remembered, mode, limit, optimal, observed, engine, level)
+    result = loaded.plan(
+        goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
+    )
     _print(result.json() if as_json else result)
     raise typer.Exit(EXIT[result.outcome.status.value])
 

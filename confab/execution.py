@@ -290,7 +290,7 @@ def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
     KnowledgeError
         No such mode.
     """
-    from confab.scene import MODES
+    from planner.solve import MODES
 
     if mode not in MODES:
         raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")

@@ -49,6 +49,16 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         for level, c in outcome.search.items()
     }
     data["fallbacks"] = outcome.fallbacks
+    data["given_up"] = list(outcome.given_up)
+    data["left"] = [
+        {
+            "level": left.level,
+            "from": list(left.first),
+            "to": list(left.last),
+            "breaks": [{"step": list(broken.step), "text": broken.text} for broken in left.broken],
+        }
+        for left in outcome.left
+    ]
     data["cache"] = {"hits": outcome.hits, "misses": outcome.misses}
     data["seconds"] = {**{k: round(v, 6) for k, v in seconds.items()}, "search": round(outcome.seconds, 6)}
     return data

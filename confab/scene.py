@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from confab.interchange import outcome_json
 from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
+from planner.solve import MODES, Request, solve
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import NO_ROWS, KnowledgeError, KnowledgeGraph
 from reasoner.graph.knowledge import load as load_graph
@@ -39,8 +40,7 @@ if TYPE_CHECKING:
     from reasoner.graph.apart import QueryLimits
     from reasoner.graph.mirror import Mirror
 
-MODES = ("guarded", "leading", "strict", "paper")
-DEFAULT_MODE = MODES[0]
+DEFAULT_MODE = "guarded"
 NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
 OPTIMAL_SECONDS = 10.0
@@ -221,6 +221,7 @@ class Scene:
         observed: str | Path | None = None,
         engine: str | None = None,
         level: int | None = None,
+        leave_levels: bool = True,
     ) -> Result:
         """Plan in this scene.
 
@@ -245,6 +246,9 @@ class Scene:
             where ours gives up at a limit other than that of time; with ``none`` none is.
         level : int, optional
             The level that the engine plans; the lowest if left out.
+        leave_levels : bool
+            Whether steps of a lower level may stand where a level has no plan that can be refined; the outcome says where, and
+            what they break that only the level above asks.
 
         Raises
         ------
@@ -266,7 +270,8 @@ class Scene:
             time_limit = OPTIMAL_SECONDS
         deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
         with self.knowledge.until(deadline):
-            return self._plan(list(goals), memory, mode, deadline, optimal, observed, engine, level)
+            how = "optimal" if optimal else mode
+            return self._plan(list(goals), memory, how, deadline, observed, engine, level, leave_levels)
 
     def _plan(
         self,
@@ -274,70 +279,57 @@ class Scene:
         memory: Memory | Links | None,
         mode: str,
         deadline: Deadline,
-        optimal: bool,
         observed: str | Path | None,
         engine: str | None,
         level: int | None,
+        leave_levels: bool,
     ) -> Result:
         begin, asked = perf_counter(), self.knowledge.round_trips
+        links = memory if isinstance(memory, Links) or memory is None else memory.links
+        advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
+        grounds = None
         if mode == "paper":
-            from planner.paper.hierarchy import plan as paper_plan
             from reasoner.reading.quantification import quantify
 
-            problem = with_goals(self._seen(self.reading, observed), goals)
-            grounds = {level: quantify(self.knowledge, self.reading, level) for level in problem.domain.levels}
-            quantified = perf_counter() - begin
-            self._check_goal(problem)
-            links = memory if isinstance(memory, Links) or memory is None else memory.links
-            outcome = paper_plan(problem, links, limits=Limits(seconds=deadline.left), grounds=grounds)
+            seen = self._seen(self.reading, observed)
+            grounds = {level: quantify(self.knowledge, seen, level) for level in seen.problem.domain.levels}
         else:
-            from planner.experience.portfolio import plan as guided_plan
-            from planner.hierarchical.planner import compiled
+            seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
+        problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
+        quantified = perf_counter() - begin
+        self._check_goal(problem)
 
-            advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
-
-            def search(problem: Problem) -> Outcome:
-                deadline.check("reading the problem")
-                if engine not in (None, NO_ENGINE):
-                    from confab.engines import plan_by_engine
-
-                    return plan_by_engine(problem, engine, level, deadline.left)
-                using = compiled(problem)
-                limits = Limits(seconds=deadline.left)
-                if optimal:
-                    from planner.hierarchical.bounds import plan as optimal_plan
-
-                    return optimal_plan(problem, limits=limits, using=using)
-                outcome = guided_plan(problem, advisor, mode, limits=limits, using=using)
-                if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE:
-                    return outcome
-                left = deadline.left
-                if left == 0:
-                    return outcome
+        def search(problem: Problem) -> Outcome:
+            deadline.check("reading the problem")
+            if engine not in (None, NO_ENGINE):
                 from confab.engines import plan_by_engine
 
-                with suppress(KnowledgeError):  # none is installed, or none takes such a problem
-                    other = plan_by_engine(problem, None, None, left)
-                    return other if other.status is Status.SOLVED else outcome
+                return plan_by_engine(problem, engine, level, deadline.left)
+            limits = Limits(seconds=deadline.left)
+            outcome = solve(Request(problem, mode, limits, advisor, links, grounds, leave_levels))
+            if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE or deadline.left == 0 or not leave_levels:
                 return outcome
+            return self._by_any_engine(problem, deadline) or outcome
 
-            if observed:
-                problem = with_goals(self._seen(self.reading, observed), goals)
-            else:
-                seen = recognise(self.knowledge, goals)
-                problem = seen.problem
-            quantified = perf_counter() - begin
-            self._check_goal(problem)
-            outcome = search(problem)
-            if outcome.status is Status.UNSOLVABLE and not observed:
-                # A "no" is worth a look at the whole world, whatever task recognition left out of it.
-                if "reading" not in self.__dict__:
-                    self.reading = read(self.knowledge, seen.schema)
-                whole = replace(self.problem, goal=problem.goal)
-                if whole != problem:
-                    problem, outcome = whole, search(whole)
+        outcome = search(problem)
+        if outcome.status is Status.UNSOLVABLE and mode != "paper" and not observed:
+            # A "no" is worth a look at the whole world, whatever task recognition left out of it.
+            if "reading" not in self.__dict__:
+                self.reading = read(self.knowledge, seen.schema)
+            whole = replace(self.problem, goal=problem.goal)
+            if whole != problem:
+                problem, outcome = whole, search(whole)
         queries = self.knowledge.round_trips - asked
         return Result(self, problem, outcome, {**self.seconds, "quantify": quantified}, queries)
+
+    def _by_any_engine(self, problem: Problem, deadline: Deadline) -> Outcome | None:
+        """Return the plan of whichever engine is installed, or None: none is, or none takes such a problem, or none solves it."""
+        from confab.engines import plan_by_engine
+
+        with suppress(KnowledgeError):
+            outcome = plan_by_engine(problem, None, None, deadline.left)
+            return outcome if outcome.status is Status.SOLVED else None
+        return None
 
     def _check_goal(self, problem: Problem) -> None:
         """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type."""

@@ -64,7 +64,7 @@ def _label(step: Step, notes: Notes) -> Text:
 
 
 def summary(outcome: Outcome) -> str:
-    """Return one line that says how a planning call ended."""
+    """Return how a planning call ended: one line, and one more for each level given up and each rule broken by that."""
     expanded = sum(counts.expanded for counts in outcome.search.values())
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"
@@ -73,11 +73,13 @@ def summary(outcome: Outcome) -> str:
     lengths = " / ".join(map(str, outcome.plan.length.values())) or "no"
     effort = f"{expanded} expansions in all"
     if outcome.hits or outcome.misses:
-        effort += (
-            f", refinements {outcome.hits} from the cache and {outcome.misses} searched, {outcome.fallbacks} fallbacks"
-        )
+        effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
+    breaks = [broken.text for left in outcome.left for broken in left.broken]
     by = f" by {outcome.engine}" if outcome.engine else ""
-    return f"solved{by}: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
+    lines = [f"solved{by}: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"]
+    lines += outcome.given_up
+    lines += [f"the plan breaks what only a level above asks: {text}" for text in breaks]
+    return "\n".join(lines)
 
 
 def plan_html(plan: Plan, notes: Notes | None = None) -> str:

@@ -11,11 +11,10 @@ level should have been applicable that makes this change, maybe together with th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
-from planner.plan import Plan, Step
-from planner.validation import Arguments, Bindings, Cell, Facts, Rules, stretches
+from planner.plan import Broken, Left, Plan, Step
+from planner.validation import Bindings, Cell, Facts, Rules, stretches
 from reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -31,36 +30,6 @@ from reasoner.symbols import (
     Witness,
     substituted,
 )
-
-
-@dataclass(frozen=True)
-class Broken:
-    """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.
-
-    `step` is the path of the primitive that makes the change. No behaviour: the level has none that could make this change.
-    """
-
-    step: tuple[int, ...]
-    change: Fact
-    behavior: str | None
-    arguments: Arguments
-    conditions: tuple[Condition, ...]
-
-    def __str__(self) -> str:
-        """Return it as a sentence, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 asks that …``."""
-        if self.behavior is None:
-            return f"{self.change}: no behaviour of that level brings it about"
-        return f"{self.change}: {' '.join((self.behavior, *self.arguments))} asks that {_all(self.conditions)}"
-
-
-@dataclass(frozen=True)
-class Left:
-    """A stretch of a plan below a level, from the path of its first step to that of its last, and what it breaks."""
-
-    level: int
-    first: tuple[int, ...]
-    last: tuple[int, ...]
-    broken: tuple[Broken, ...]
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
@@ -138,8 +107,9 @@ class _Watch:
                 found, asked = self.nearest(level, behavior, effect, terms, change.symbol)
                 arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
                 if best is None or len(asked) < len(best.conditions):
-                    best = Broken(step.path, change, behavior.name, arguments, asked)
-        yield best or Broken(step.path, change, None, (), ())
+                    text = f"{change}: {' '.join((behavior.name, *arguments))} asks that {_all(asked)}"
+                    best = Broken(step.path, change, behavior.name, arguments, asked, text)
+        yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
 
     def unified(self, behavior: Behavior, effect: ValueEffect, change: Fact) -> Bindings | None:
         """Return what the terms of an effect stand for if it is this change."""

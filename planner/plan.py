@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from reasoner.symbols import Fact, State
+from reasoner.symbols import Condition, Fact, State
 
 
 class Status(Enum):
@@ -96,6 +96,36 @@ class Reason:
 
 
 @dataclass(frozen=True)
+class Broken:
+    """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.
+
+    `step` is the path of the primitive that makes the change. No behaviour: the level has none that could make this change.
+    `text` says it, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 asks that …``.
+    """
+
+    step: tuple[int, ...]
+    change: Fact
+    behavior: str | None
+    arguments: tuple[str, ...]
+    conditions: tuple[Condition, ...]
+    text: str
+
+    def __str__(self) -> str:
+        """Return it as a sentence."""
+        return self.text
+
+
+@dataclass(frozen=True)
+class Left:
+    """A stretch of a plan below a level, from the path of its first step to that of its last, and what it breaks."""
+
+    level: int
+    first: tuple[int, ...]
+    last: tuple[int, ...]
+    broken: tuple[Broken, ...]
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How a planning call ended, and with what.
 
@@ -103,6 +133,8 @@ class Outcome:
     calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it; `hits` and `misses`
     count the refinements that the cache had and those that had to be searched.
     `bound` is what any plan costs at least on the lowest level, where that was proved; `engine` the other planner whose plan it is.
+    `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
+    break that only the level above asks.
     """
 
     status: Status
@@ -115,6 +147,8 @@ class Outcome:
     hits: int = 0
     misses: int = 0
     engine: str | None = None
+    given_up: tuple[str, ...] = ()
+    left: tuple[Left, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 
+from planner.levels import levels_left
 from planner.plan import Outcome, Status
 from planner.validation import Facts, Rules, validate
 from reasoner.symbols import FALSE, Problem, Symbol
@@ -70,9 +71,17 @@ def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool |
         found.append("gave up")
     if outcome.status is Status.UNSOLVABLE and (truth or other.status is Status.SOLVED):
         found.append("a false unsolvable")
-    if on_top(problem, other) and not on_top(problem, outcome):
+    if on_top(problem, other) and not on_top(problem, outcome) and not shorter(problem, outcome, other):
         found.append("the first level left")
     return found
+
+
+def shorter(problem: Problem, outcome: Outcome, other: Outcome) -> bool:
+    """Whether steps of lower levels stand in a plan because it is shorter so, and break nothing that a level above asks."""
+    if outcome.plan is None or other.plan is None or outcome.given_up:
+        return False
+    whole = any(left.broken for left in levels_left(problem, outcome.plan))
+    return not whole and len(outcome.plan.primitives) < len(other.plan.primitives)
 
 
 def on_top(problem: Problem, outcome: Outcome) -> bool:

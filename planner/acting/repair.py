@@ -18,7 +18,7 @@ from difflib import SequenceMatcher
 from time import perf_counter
 
 from planner.hierarchical.planner import plan as fast_plan
-from planner.hierarchical.refinement_cache import Done
+from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled
 from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Effort, LimitError
@@ -204,14 +204,12 @@ def settle(call: Call) -> bool:
             for key, value in cells.items()
             if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
         }
-        found = (call.segments.find(level, {**targets, **hidden}, {}, RESTING) if hidden else None) or (
-            call.segments.find(level, targets, {}, RESTING)
-        )
-        for name, arguments in found or ():
-            done = call.refiner.do(level, name, arguments)
-            if done is None:
-                return False
-            call.steps.append(done)
+        keep = call.segments.keeping({})
+        for wanted in ({**targets, **hidden}, targets):
+            steps = call.refiner.achieve(level, wanted, keep, (), RESTING)
+            if steps is not None:
+                call.steps.extend(steps)
+                break
     return _at_rest(call)
 
 
@@ -302,7 +300,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
     return whole and not pending
 
 
-def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
+def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     """Do a step by the very primitives that it has, or return None with the table as it was.
 
     Of a step that was `begun` before, only what is below it counts; any other must be applicable, and do what it promises.
@@ -314,7 +312,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
     if not step.steps:
         assert applicable is not None
         call.refiner.apply(applicable[1])
-        return step.level, step.behavior, step.arguments, applicable[0], ()
+        return RefinedStep(step.level, step.behavior, step.arguments, applicable[0], ())
     below = []
     for position, child in enumerate(step.steps):
         done = _redo(call, child, begun and position == 0)
@@ -328,7 +326,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> Done | None:
         return None
     names = call.program.variables[step.behavior]
     bindings = applicable[0] if applicable and not begun else tuple(step.bindings.get(name, "") for name in names)
-    return step.level, step.behavior, step.arguments, bindings, tuple(below)
+    return RefinedStep(step.level, step.behavior, step.arguments, bindings, tuple(below))
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
@@ -370,7 +368,7 @@ def _at_rest(call: Call) -> bool:
     )
 
 
-def _cost(call: Call, done: Done) -> float:
+def _cost(call: Call, done: RefinedStep) -> float:
     """Return what the primitives of a step cost."""
     below = done[4]
     return sum([_cost(call, child) for child in below]) if below else call.problem.domain.behaviors[done[1]].cost

@@ -165,6 +165,7 @@ def plan(
     using: fast.Compiled | None = None,
     patience: int | None = None,
     improve: int = fast.IMPROVEMENTS,
+    leave_levels: bool = True,
 ) -> Outcome:
     """Plan with experience.
 
@@ -179,7 +180,7 @@ def plan(
         As for `planner.hierarchical.planner.plan`.
     patience : int
         Expansions that the base gets before experience leads; if left out, as `mode` says.
-    improve : int
+    improve, leave_levels
         As for `planner.hierarchical.planner.plan`.
 
     Returns
@@ -191,7 +192,7 @@ def plan(
     using = using or fast.compiled(problem)
     first = problem.domain.levels[0]
     if memory is None or not memory.knows(b.name for b in problem.domain.at_level(first)):
-        return fast.plan(problem, limits=limits, improve=improve, using=using)
+        return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
     deadline = None if limits.seconds is None else began + limits.seconds
 
     def begin() -> Stream:
@@ -208,7 +209,9 @@ def plan(
         lost = dict(race.spent)
         if race.begun is None or race.begun.solution is None:
             with suppress(ArrivedError):
-                outcome = fast.plan(problem, limits=limits, improve=improve, using=using, watch=race.watch)
+                outcome = fast.plan(
+                    problem, limits=limits, improve=improve, using=using, watch=race.watch, leave_levels=leave_levels
+                )
         if race.begun is not None and race.begun.solution is not None:
             outcome = refined(problem, using, race.begun, deadline, limits.expansions, improve)
     if outcome.status is Status.GAVE_UP and not race.strict:
@@ -249,5 +252,4 @@ def refined(
     with suppress(LimitError):  # then the first plan is what there is
         if improve:
             call.steps = Improver(call.refiner, using.shapes, (improve + 1) // 2).improve(call.steps)
-    cache, counts = call.refiner, call.segments.counts
-    return Outcome(Status.SOLVED, call.tree(), None, counts, call.fallbacks, hits=cache.hits, misses=cache.misses)
+    return call.outcome(Status.SOLVED, call.tree(), None, 0.0)

@@ -73,6 +73,8 @@ class Task:
         To its precondition and its changes, in the order in which they are made.
     describe : function of an operator
         To its behaviour, arguments and bindings.
+    barred : set of (state, operator)
+        What isn't to be done where: steps that turned out not to be refinable there.
     """
 
     problem: Problem
@@ -90,6 +92,7 @@ class Task:
     derived: tuple[tuple[int, tuple[int, ...]], ...]
     change: Callable[[int], tuple[int, tuple[Change, ...]]]
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
+    barred: set[tuple[int, int]] = field(default_factory=set, repr=False)
     _changes: dict[int, tuple[int, tuple[Change, ...]]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -99,7 +102,7 @@ class Task:
     def applied(self, state: int, operator: int) -> int | None:
         """Return the state after an operator, or None where it isn't applicable."""
         precondition, changes = self._changes.get(operator) or self.known(operator)
-        if state & precondition != precondition:
+        if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
             return None
         after = state
         for when, cleared, set_ in changes:

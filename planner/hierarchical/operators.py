@@ -17,6 +17,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import prod
 from types import CodeType
 from typing import TypeAlias
 
@@ -105,6 +106,25 @@ class Program:
         if found or len(candidates) <= FEW or self.thorough:
             return found or candidates
         return representatives(self.alike.groups(candidates), who, {})
+
+    def size(self, level: int) -> int:
+        """Return how many behaviours a level has at most, quantified over all individuals."""
+        classes = self.problem.classes
+        return sum(
+            prod(len(classes.get(parameter.kind, ())) for parameter in behavior.parameters)
+            for behavior in self.domain.at_level(level)
+        )
+
+    @cached_property
+    def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
+        """For each static relation the tuples that an individual occurs in."""
+        found: dict[str, dict[str, list[tuple[str, ...]]]] = {}
+        for relation, rows in self.problem.relations.items():
+            index = found.setdefault(relation, {})
+            for row in sorted(rows):
+                for individual in dict.fromkeys(row):
+                    index.setdefault(individual, []).append(row)
+        return found
 
     @cached_property
     def ids(self) -> Mapping[str, tuple[int, tuple[tuple[Mapping[str, int], int], ...]]]:

@@ -25,10 +25,11 @@ from time import perf_counter
 from planner.grounded.best_first import plan_level
 from planner.grounded.state_space import TooLargeError
 from planner.hierarchical.postoptimization import Improver, length
-from planner.hierarchical.refinement_cache import Done
-from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled, exhaust
+from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled, exhaust
 from planner.hierarchical.subplans import Advice, LimitError, Watch, nobody
 from planner.hierarchical.unsolvability import contested, unattainable
+from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status
 from reasoner.symbols import FALSE, Problem
 
@@ -54,6 +55,7 @@ def plan(
     improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
     watch: Watch = nobody,
+    leave_levels: bool = True,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
 
@@ -70,13 +72,15 @@ def plan(
     watch : Watch, optional
         Told the level of each expansion, and `None` before what costs most: detours for several goals, and lower levels where
         relaxed reachability disproves nothing.
+    leave_levels : bool
+        Whether steps of a lower level may stand where a level has no plan that can be refined.
 
     Returns
     -------
     Outcome
     """
     with paused_collection():
-        return _plan(problem, advice, limits, improve, using, watch)
+        return _plan(problem, advice, limits, improve, using, watch, leave_levels)
 
 
 @contextmanager
@@ -98,41 +102,58 @@ def _plan(
     improve: int,
     using: Compiled | None,
     watch: Watch,
+    leave_levels: bool,
 ) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
     call.segments.watch = watch
+    if not leave_levels:
+        call.ladder = [(level, attempt) for level, attempt in call.ladder if level == call.program.levels[0]]
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
-        seconds, cache = perf_counter() - begin, call.refiner
-        counts = call.segments.counts
-        return Outcome(status, plan, reason, counts, call.fallbacks, seconds, hits=cache.hits, misses=cache.misses)
+        return call.outcome(status, plan, reason, perf_counter() - begin)
 
     impossible = unattainable(call.segments) or contested(call.segments)
     if impossible:
         return outcome(Status.UNSOLVABLE, reason=impossible)
     try:
-        if call.serialise():
+        if call.serialise() or call.anew():
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
-                    first, call.steps = call.steps, turned(call)
-                    left = improve if call.steps is first else (improve + 1) // 2
-                    call.steps = Improver(call.refiner, call.using.shapes, left).improve(call.steps)
+                    shorten(call, improve, leave_levels)
             return outcome(Status.SOLVED, call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
         return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
-    call.fallbacks += 1
+    upper = [level for level in call.program.levels if level != call.program.levels[-1]]
+    if not leave_levels and upper:
+        text = f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
+        return outcome(Status.GAVE_UP, reason=Reason(text))
+    if upper:
+        call.given_up.append(
+            f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
+        )
     if call.too_large is not None:
         text = f"goals in series found no plan, and {call.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
-    return outcome(*last_resort(problem, limits, deadline))
+    return outcome(*last_resort(call.at_rest_in_the_end(), limits, deadline))
 
 
-def turned(call: Call) -> list[Done]:
-    """Return the shorter of a call's steps and those that come out with the goals in reverse order.
+def shorten(call: Call, improve: int, leave_levels: bool) -> None:
+    """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
+    first, call.steps = call.steps, reordered(call)
+    if not leave_levels:
+        return
+    before, left = call.steps, improve if call.steps is first else (improve + 1) // 2
+    call.steps = Improver(call.refiner, call.using.shapes, left).improve(before)
+    if call.steps is not before and any(left.broken for left in levels_left(call.problem, call.tree())):
+        call.steps = before
+
+
+def reordered(call: Call) -> list[RefinedStep]:
+    """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is tried
     uses the most abstract level alone and expands no more nodes than the call did.
@@ -140,14 +161,18 @@ def turned(call: Call) -> list[Done]:
     unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
     if len(call.steps) <= DETOURS * unmet or len(call.program.levels) < 2:
         return call.steps
-    problem = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
-    other = Call(problem, call.using, call.segments.deadline, None, call.segments.expanded)
-    other.proved = True  # there is a plan
-    other.efforts = tuple((level, effort) for level, effort in other.efforts if level == call.program.levels[0])
-    with suppress(LimitError):
-        if other.serialise() and length(other.steps) < length(call.steps):
-            return other.steps
-    return call.steps
+    best = call.steps
+    first = call.program.levels[0]
+    reversed_goal = dict(reversed(list(call.problem.goal.items())))
+    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
+        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, None, call.segments.expanded)
+        other.proved = True  # there is a plan
+        other.ladder = [(level, attempt) for level, attempt in other.ladder if level == first]
+        with suppress(LimitError):
+            done = other.together(first, SOME) if at_once else other.serialise()
+            if done and length(other.steps) < length(best):
+                best = other.steps
+    return best
 
 
 def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:

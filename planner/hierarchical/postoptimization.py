@@ -17,11 +17,11 @@ from itertools import groupby
 
 from planner.grounded.state_space import Space, TooLargeError
 from planner.hierarchical.inherited_preconditions import binding
-from planner.hierarchical.refinement_cache import Done, Refiner, Template
+from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
 from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Ground, LimitError
-from planner.hierarchical.subproblem import world
-from reasoner.symbols import Domain, Problem, Symbol
+from planner.hierarchical.subproblem import FEW, problem_of
+from reasoner.symbols import Domain, Problem, Symbol, ValueCondition
 
 REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
@@ -36,9 +36,32 @@ WHOLE_BITS, WHOLE_STATES = 48, 20_000
 """The largest world, in bits of a state if every symbol could take every value, and the most states for a whole plan anew."""
 
 
-def length(steps: Sequence[Done], level: int | None = None) -> int:
+def length(steps: Sequence[RefinedStep], level: int | None = None) -> int:
     """Return the number of primitives, or of steps at a level."""
     return sum(length(step[4], level) if step[4] and step[0] != level else 1 for step in steps)
+
+
+@dataclass(frozen=True)
+class Concern:
+    """A step with the individuals that it moved, and the symbols of its own level that it changed and that it asked for."""
+
+    step: RefinedStep
+    moved: frozenset[str]
+    touched: frozenset[Cell]
+    asked: frozenset[Cell]
+
+
+def put_aside(steps: Sequence[Concern]) -> bool:
+    """Whether a step gives a symbol a value that nobody asks for before a later step overwrites it.
+
+    Only then can a level below save something that a level must do: elsewhere every step serves another one or the goal.
+    """
+    idle: set[Cell] = set()
+    for step in steps:
+        if not idle.isdisjoint(step.touched):
+            return True
+        idle = (idle - step.asked) | step.touched
+    return False
 
 
 @dataclass
@@ -66,12 +89,16 @@ class Improver:
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
 
-    def improve(self, steps: Sequence[Done]) -> list[Done]:
+    def improve(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
         """Return steps to the same end, no longer than these; the table is left in the initial state."""
         best = list(steps)
         if len(self.segments.program.levels) < 2:
             return best
         self.table.undo(0)
+        concerns = self._concerns(best)
+        self.table.undo(0)
+        if concerns is None or not put_aside(concerns):
+            return best
         anew = self.whole(best)
         self.table.undo(0)
         if anew is not None:
@@ -86,7 +113,7 @@ class Improver:
 
     # ------------------------------------------------------------------------------------------------------------ whole
 
-    def whole(self, steps: Sequence[Done]) -> list[Done] | None:
+    def whole(self, steps: Sequence[RefinedStep]) -> list[RefinedStep] | None:
         """Return all planned anew, the same steps if that is no shorter, None if the world isn't small or refining fails.
 
         What these steps leave as it was is left so, too.
@@ -98,7 +125,7 @@ class Improver:
         bits = sum(
             len(problem.classes.get(kind, ())).bit_length() * len(self.table.now[s]) for s, kind in kinds.items()
         )
-        if bits > WHOLE_BITS or any(self.again(step) is None for step in steps):
+        if bits > WHOLE_BITS or any(self.refiner.again(step) is None for step in steps):
             return None
         targets = self.table.since(0)
         self.table.undo(0)
@@ -120,7 +147,7 @@ class Improver:
             found.append(step)
         return found
 
-    def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[Done]) -> list[Ground] | None:
+    def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
         space = None
         try:
@@ -144,41 +171,41 @@ class Improver:
 
     # ---------------------------------------------------------------------------------------------------------- detours
 
-    def detours(self, steps: Sequence[Done]) -> list[Done]:
+    def detours(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
         """Drop pairs of steps that undo each other."""
-        parts: list[tuple[Done, int]] = []  # steps above the lowest level, each with the number of its parent
+        parts: list[tuple[RefinedStep, int]] = []  # steps above the lowest level, each with the number of its parent
         for number, step in enumerate(steps):
             parts.extend((part, number) for part in self._parts(step))
         undone = self._undone([part for part, _ in parts])
         self.table.undo(0)
         if not undone:
             return list(steps)
-        kept: list[tuple[Done, int]] = []
+        kept: list[tuple[RefinedStep, int]] = []
         k = 0
         while k < len(parts):
             self.segments.check_time()
             j = undone.get(k)
             mark = len(self.table.trail)
-            if j is not None and all(self.again(part) is not None for part, _ in parts[k + 1 : j]):
+            if j is not None and all(self.refiner.again(part) is not None for part, _ in parts[k + 1 : j]):
                 kept.extend(parts[k + 1 : j])
                 k = j + 1
                 continue
             self.table.undo(mark)
-            if self.again(parts[k][0]) is None:
+            if self.refiner.again(parts[k][0]) is None:
                 return list(steps)
             kept.append(parts[k])
             k += 1
         self.table.undo(0)
         return self._assembled(steps, kept)
 
-    def _undone(self, parts: Sequence[Done]) -> dict[int, int]:
+    def _undone(self, parts: Sequence[RefinedStep]) -> dict[int, int]:
         """Return for steps that a later one undoes exactly, before anything else touches the same symbols, that one."""
         latest: dict[Cell, int] = {}
         changes: list[tuple[dict[Cell, str], dict[Cell, str]]] = []
         found: dict[int, int] = {}
         for j, part in enumerate(parts):
             mark = len(self.table.trail)
-            if self.again(part) is None:
+            if self.refiner.again(part) is None:
                 return {}
             after = self.table.since(mark)
             before: dict[Cell, str] = {}
@@ -193,107 +220,107 @@ class Improver:
             latest.update(dict.fromkeys(before, j))
         return found
 
-    def _assembled(self, steps: Sequence[Done], parts: Sequence[tuple[Done, int]]) -> list[Done]:
-        """Return parts under their parents again, where all parts of a parent are there and it still does what it says."""
-        result: list[Done] = []
+    def _assembled(self, steps: Sequence[RefinedStep], parts: Sequence[tuple[RefinedStep, int]]) -> list[RefinedStep]:
+        """Return parts under their parents again, where all parts of a parent are there and it still does what it says.
+
+        Not inside a stretch of the lower level, which ends where everything is at rest again.
+        """
+        result: list[RefinedStep] = []
+        restless: set[Cell] = set()
+        rest, table = self.segments.rest, self.table
         for parent, group in groupby(parts, key=lambda entry: entry[1]):
-            mine = [part for part, _ in group]
-            whole = self.again(steps[parent]) if len(mine) == max(len(self._parts(steps[parent])), 1) else None
-            again = [whole] if whole is not None else [self.again(part) for part in mine]
+            mine, mark = [part for part, _ in group], len(table.trail)
+            whole = None
+            if not restless and len(mine) == max(len(self._parts(steps[parent])), 1):
+                whole = self.refiner.again(steps[parent])
+            again = [whole] if whole is not None else [self.refiner.again(part) for part in mine]
             result.extend(step for step in again if step is not None)
+            for situation, key, _ in table.trail[mark:]:
+                if situation in rest:
+                    (restless.add if table.now[situation][key] != rest[situation] else restless.discard)(
+                        (situation, key)
+                    )
         return result
 
-    def _parts(self, step: Done) -> tuple[Done, ...]:
+    def _parts(self, step: RefinedStep) -> tuple[RefinedStep, ...]:
         return step[4] if step[4] and step[4][0][0] < self.lowest else (step,)
-
-    def again(self, step: Done) -> Done | None:
-        """Do a step once more by the same sub-steps, and return it with its present bindings; None if it can't be done."""
-        level, name, arguments, _, below = step
-        done = self.segments.forward[name](*arguments)
-        if done is None:
-            return None
-        if not below:
-            self.refiner.apply(done[1])
-            return level, name, arguments, done[0], ()
-        mark = len(self.table.trail)
-        wanted = {(s, k): v for s, k, v in done[1] if self.table.now[s].get(k) != v}
-        inner = []
-        for child in below:
-            again = self.again(child)
-            if again is None:
-                self.table.undo(mark)
-                return None
-            inner.append(again)
-        if self.table.since(mark) != wanted:
-            self.table.undo(mark)
-            return None
-        return level, name, arguments, done[0], tuple(inner)
 
     # --------------------------------------------------------------------------------------------------------- clusters
 
-    def clusters(self, steps: Sequence[Done]) -> list[Done]:
+    def clusters(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
         """Plan each cluster anew, one level further down, and keep what is shorter."""
-        rest = []
-        for step in steps:
-            self.segments.check_time()
-            mark = len(self.table.trail)
-            if self.again(step) is None:
-                return list(steps)
-            rest.append((step, *self._concern(step, mark)))
+        rest = self._concerns(steps)
         self.table.undo(0)
+        if rest is None:
+            return list(steps)
         if all(len(self._cluster(rest, position)) == 1 for position in range(len(rest))):
             return list(steps)
-        found: list[Done] = []
+        found: list[RefinedStep] = []
         position = 0
         while position < len(rest):
             self.segments.check_time()
             members = self._cluster(rest, position)
-            replaced = self._replace([step for step, _, _ in rest[position : members[-1] + 1]], members, position)
+            replaced = self._replace([c.step for c in rest[position : members[-1] + 1]], members, position)
             if replaced is not None:
                 found.extend(replaced)
                 between = [rest[p] for p in range(position, members[-1] + 1) if p not in members]
                 position = members[-1] + 1 - len(between)
                 rest[position : members[-1] + 1] = between
                 continue
-            again = self.again(rest[position][0])
+            again = self.refiner.again(rest[position].step)
             if again is None:
                 return list(steps)
             found.append(again)
             position += 1
         return found
 
-    def _concern(self, step: Done, mark: int) -> tuple[frozenset[str], frozenset[Cell]]:
-        """Return what a step has moved since a mark, and what it has touched.
+    def _concerns(self, steps: Sequence[RefinedStep]) -> list[Concern] | None:
+        """Do all steps, and return what each concerns; None if one can't be done."""
+        found = []
+        for step in steps:
+            self.segments.check_time()
+            mark = len(self.table.trail)
+            again = self.refiner.again(step)
+            if again is None:
+                return None
+            found.append(self._concern(again, mark))
+        return found
 
-        Moved are the individuals whose values changed, and these values; touched the symbols that its own level knows.
-        """
-        level, _, arguments, bindings, _ = step
-        found: set[str] = set()
+    def _concern(self, step: RefinedStep, mark: int) -> Concern:
+        """Return what a step has moved since a mark, what it has touched, and what it asked."""
+        level, name, arguments, bindings, _ = step
+        moved: set[str] = set()
         touched: set[Cell] = set()
         for situation, key, old in self.table.trail[mark:]:
             if self.segments.program.domain.situations[situation].level <= level:
-                found.update((old, self.table.now[situation][key]), (key,) if isinstance(key, str) else key)
+                moved.update((old, self.table.now[situation][key]), arguments_of(key))
                 touched.add((situation, key))
-        return frozenset(found & {*arguments, *bindings}), frozenset(touched)
+        behavior = self.segments.program.domain.behaviors[name]
+        terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
+        names = self.segments.program.variables[name]
+        terms |= dict(zip((f"?{variable}" for variable in names), bindings, strict=True))
+        asked = frozenset(
+            (c.situation, key_of(tuple(terms.get(a, a) for a in c.arguments)))
+            for c in behavior.preconditions
+            if isinstance(c, ValueCondition) and not c.negated
+        )
+        return Concern(step, frozenset(moved & {*arguments, *bindings}), frozenset(touched), asked)
 
-    def _cluster(self, steps: Sequence[tuple[Done, frozenset[str], frozenset[Cell]]], first: int) -> list[int]:
+    def _cluster(self, steps: Sequence[Concern], first: int) -> list[int]:
         """Return the positions of a step and of those soon after it that concern the same individuals.
 
-        Only the step itself, if no two of them touch the same symbol: each then does something that must be done.
+        Only the step itself, if none of them puts anything aside: each then does something that must be done.
         """
-        _, concerned, touched = steps[first]
-        members, twice = [first], False
+        members, concerned = [first], steps[first].moved
         for position in range(first + 1, min(first + REACH, len(steps))):
-            _, moved, cells = steps[position]
-            if not concerned.isdisjoint(moved):
+            if not concerned.isdisjoint(steps[position].moved):
                 members.append(position)
-                twice |= not touched.isdisjoint(cells)
-                concerned, touched = concerned | moved, touched | cells
+                concerned = concerned | steps[position].moved
                 if len(members) == LARGEST:
                     break
-        return members if twice else [first]
+        return members if put_aside([steps[position] for position in members]) else [first]
 
-    def _replace(self, span: Sequence[Done], members: Sequence[int], first: int) -> list[Done] | None:
+    def _replace(self, span: Sequence[RefinedStep], members: Sequence[int], first: int) -> list[RefinedStep] | None:
         """Do shorter steps for a cluster, if there are any after which those between its members can be done; return them."""
         old = [span[position - first] for position in members]
         if len(old) < 2 or old[0][0] == self.lowest:
@@ -302,7 +329,7 @@ class Improver:
         if self.known.get(key) is None and (key in self.known or self.clusters_left <= 0 or self.work <= 0):
             return None
         mark = len(self.table.trail)
-        if any(self.again(step) is None for step in old):
+        if any(self.refiner.again(step) is None for step in old):
             self.table.undo(mark)
             return None
         targets = self.table.since(mark)
@@ -312,13 +339,13 @@ class Improver:
         if new is not None and length(new) < length(old):
             middle = len(self.table.trail)
             between = (step for position, step in enumerate(span, first) if position not in members)
-            if all(self.again(step) is not None for step in between):
+            if all(self.refiner.again(step) is not None for step in between):
                 self.table.undo(middle)
                 return new
         self.table.undo(mark)
         return None
 
-    def _shape(self, steps: Sequence[Done]) -> tuple[object, tuple[str, ...]]:
+    def _shape(self, steps: Sequence[RefinedStep]) -> tuple[object, tuple[str, ...]]:
         """Return what steps have in common with others of their shape, and their individuals in the order of its roles."""
         individuals: dict[str, int] = {}
         shape = []
@@ -328,8 +355,8 @@ class Improver:
         return (tuple(shape), tuple([sorts.get(individual, -1) for individual in individuals])), tuple(individuals)
 
     def _anew(
-        self, level: int, key: object, roles: tuple[str, ...], old: Sequence[Done], targets: dict[Cell, str]
-    ) -> list[Done] | None:
+        self, level: int, key: object, roles: tuple[str, ...], old: Sequence[RefinedStep], targets: dict[Cell, str]
+    ) -> list[RefinedStep] | None:
         """Do what brings about the same changes, from what is known of this shape of cluster or by planning."""
         if key not in self.known:
             self.known[key] = self._plan(level, roles, targets, old)
@@ -337,17 +364,19 @@ class Improver:
         if template is None:
             return None
         for chosen in self.refiner.roles(template, roles):
-            found = self.refiner.replay(level, template, chosen, targets)
+            found = self.refiner.replay(level, template, chosen, targets, lambda _, first: first)
             if found is not None:
                 return list(found)
         return None
 
     def _plan(
-        self, level: int, roles: tuple[str, ...], targets: dict[Cell, str], old: Sequence[Done]
+        self, level: int, roles: tuple[str, ...], targets: dict[Cell, str], old: Sequence[RefinedStep]
     ) -> Template | None:
         """Return a shortest way to make these changes in a world of these individuals and the few that are always there."""
         self.clusters_left -= 1
-        small = world(self.segments.program, self.table, level, set(roles))
+        program = self.segments.program
+        few = {m for members in program.problem.classes.values() if len(members) <= FEW for m in members}
+        small = problem_of(self.segments, level, {*roles, *few, *program.named})
         goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in small.initial.items()}
         steps = self._shortest(replace(small, goal=goal), level, self.states, old)
         return self.refiner.template(steps, roles) if steps else None

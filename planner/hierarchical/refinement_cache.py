@@ -1,40 +1,63 @@
-"""Refinement by what was learned from refining before: a PICK refined once is refined for all hands and objects.
+"""Behaviours done on the table by way of their primitives, and what refining taught: a PICK refined once is refined for all hands.
 
 A refinement that search found is kept as a template: its steps, with the individuals that the parent names replaced by their
-places in the parent (roles), all others left open. Replaying a template checks every step forward, and in the end that the
-changes are exactly the parent's; so a template can be useless somewhere, but never wrong.
+places in the parent (roles). A role that the parent doesn't name is read off the table where a condition determines it (the place
+where the van is), else one individual of each symmetry class is tried. Replaying a template checks every step forward, and in the
+end that the refinement leaves what it must (docs/levels.md); so a template can be useless somewhere, but never wrong.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import TypeAlias
+from itertools import islice, product
+from typing import NamedTuple
 
-from planner.hierarchical.state import Cell, Change
-from planner.hierarchical.subplans import Effort, Forbidden, Ground, Segments
-from reasoner.symbols import FALSE
+from planner.hierarchical.state import Cell, Change, key_of
+from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
+from planner.hierarchical.subproblem import Width, World, focus, problem_of
+from reasoner.symbols import FALSE, Behavior, ValueCondition
 
-Done: TypeAlias = "tuple[int, str, tuple[str, ...], tuple[str, ...], tuple[Done, ...]]"
-"""A step that was done: level, behaviour, arguments, individuals of its variables, and the steps that refine it."""
+SHORT = Effort(depth=4, expansions=60)
+"""For a refinement that a few relevant steps make; a longer one is searched in a small world."""
+NEAR, WIDER, WIDE = Width(40), Width(100, 2, 500_000), Width(300, 8, 1_500_000)
+WHOLE = Width(None, 1, 1_500_000)
+"""The worlds that are looked at one after the other; each costs about as much as all before."""
+MOST_OPERATORS = 3_000
+"""A level with at most so many quantified behaviours is looked at as a whole at once."""
+TEMPLATES, CHOICES, ATTEMPTS = 6, 24, 40
+"""Templates kept of a behaviour, ways to fill the open roles of one, and searches for steps that can all be refined."""
 
-FIRST = Effort(depth=10, expansions=600)
-AGAIN = Effort(depth=10, expansions=40)
-"""For a behaviour of which no refinement is known yet, and for one of which those that are known fail here."""
-TEMPLATES = 8
-"""So many templates are kept per behaviour, the last successful first."""
+
+class RefinedStep(NamedTuple):
+    """A step that was done: the individuals of its variables are `bindings`, `steps` refine it."""
+
+    level: int
+    behavior: str
+    arguments: tuple[str, ...]
+    bindings: tuple[str, ...]
+    steps: tuple[RefinedStep, ...]
+
+
+@dataclass(frozen=True)
+class OpenRole:
+    """A role of a template that its parent doesn't name.
+
+    `kind` is the class of the parameter that it filled; `source` the symbol whose value it is where it is needed first: situation
+    type and places of the arguments; `becomes` the situation type of which it becomes a value, so that a free one is wanted.
+    """
+
+    kind: str
+    source: tuple[str, tuple[int, ...]] | None
+    becomes: str | None
 
 
 @dataclass(frozen=True)
 class Template:
-    """Steps of a refinement over roles: positions below the number of the parent's individuals, then open ones.
-
-    `open` gives for each open role the individual that it was and the class of the parameter that it filled.
-    """
+    """Steps of a refinement over roles: positions below the number of the parent's individuals, then open ones."""
 
     steps: tuple[tuple[str, tuple[int, ...]], ...]
-    open: tuple[tuple[str, str], ...]
+    open: tuple[OpenRole, ...]
 
 
 class Refiner:
@@ -55,10 +78,10 @@ class Refiner:
         self.templates = templates
         self.hits = 0
         self.misses = 0
-        self.failures = 0
         self.use_templates = True
+        self.failed: dict[Ground, list[list[tuple[Cell, str]]]] = {}
 
-    def do(self, level: int, name: str, arguments: tuple[str, ...]) -> Done | None:
+    def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Do a behaviour, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
         done = self.segments.forward[name](*arguments)
         if done is None:
@@ -66,9 +89,9 @@ class Refiner:
         bindings, changes = done
         if level == self.levels[-1]:
             self.apply(changes)
-            return level, name, arguments, bindings, ()
-        children = self._refine(level, name, arguments + bindings, changes)
-        return None if children is None else (level, name, arguments, bindings, children)
+            return RefinedStep(level, name, arguments, bindings, ())
+        children = self._refine(level, name, arguments, bindings, changes)
+        return None if children is None else RefinedStep(level, name, arguments, bindings, children)
 
     def apply(self, changes: Sequence[Change]) -> None:
         """Make changes, as far as the symbols exist."""
@@ -78,72 +101,128 @@ class Refiner:
             if old != value and (old is not None or self.segments.exists(situation, key)):
                 put(situation, key, value)
 
-    def _refine(
-        self, level: int, name: str, individuals: tuple[str, ...], changes: Sequence[Change]
-    ) -> tuple[Done, ...] | None:
+    def targets(self, changes: Sequence[Change]) -> dict[Cell, str]:
+        """Return what changes make different from what is now."""
         now = self.table.now
-        targets: dict[Cell, str] = {}
+        found: dict[Cell, str] = {}
         for situation, key, value in changes:
-            old = now[situation].get(key, FALSE if self.segments.exists(situation, key) else None)
-            if old is not None:
-                targets[situation, key] = value
-        targets = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
+            if now[situation].get(key) is not None or self.segments.exists(situation, key):
+                found[situation, key] = value
+        return {cell: value for cell, value in found.items() if now[cell[0]].get(cell[1], FALSE) != value}
+
+    def left_as_it_must(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
+        """Return a symbol touched since a mark, or a target, that isn't what it must be; None if all are."""
+        before: dict[Cell, str] = {}
+        for situation, key, old in self.table.trail[mark:]:
+            before.setdefault((situation, key), old)
+        now = self.table.now
+        for cell, first in before.items():
+            wanted = targets.get(cell) or keep(cell, first)
+            if wanted is not None and now[cell[0]][cell[1]] != wanted:
+                return cell
+        return next((cell for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value), None)
+
+    def again(self, step: RefinedStep) -> RefinedStep | None:
+        """Do a step once more by the same sub-steps, and return it with its present bindings; None if it can't be done."""
+        level, name, arguments, _, below = step
+        done = self.segments.forward[name](*arguments)
+        if done is None:
+            return None
+        if not below:
+            self.apply(done[1])
+            return RefinedStep(level, name, arguments, done[0], ())
+        mark = len(self.table.trail)
+        targets = self.targets(done[1])
+        inner = []
+        for child in below:
+            again = self.again(child)
+            if again is None:
+                self.table.undo(mark)
+                return None
+            inner.append(again)
+        if self.left_as_it_must(mark, targets, self.segments.refining(level)) is not None:
+            self.table.undo(mark)
+            return None
+        return RefinedStep(level, name, arguments, done[0], tuple(inner))
+
+    # -------------------------------------------------------------------------------------------------------- refining
+
+    def _refine(
+        self, level: int, name: str, arguments: tuple[str, ...], bindings: tuple[str, ...], changes: Sequence[Change]
+    ) -> tuple[RefinedStep, ...] | None:
+        targets, keep = self.targets(changes), self.segments.refining(level)
         below = self.levels[self.levels.index(level) + 1]
+        individuals = arguments + bindings
         known = self.templates.setdefault(name, [])
         for position, template in enumerate(known if self.use_templates else ()):
             for roles in self.roles(template, individuals):
-                steps = self.replay(below, template, roles, targets)
+                steps = self.replay(below, template, roles, targets, keep)
                 if steps is not None:
                     self.hits += 1
-                    if position:
+                    if position and len(known[0].steps) >= len(template.steps):
                         known.insert(0, known.pop(position))
                     return steps
-        self.misses += 1
-        found = self._search(below, individuals, targets, AGAIN if known else FIRST)
-        if found is None:
-            self.failures += 1
-            return None
-        known.insert(0, self.template([step[1:3] for step in found], individuals))
-        del known[TEMPLATES:]
-        return found
-
-    def replay(
-        self, level: int, template: Template, roles: Sequence[str], targets: dict[Cell, str]
-    ) -> tuple[Done, ...] | None:
-        """Do a template's steps; None, and the table as it was, if one can't be done or the changes aren't the targets."""
-        mark = len(self.table.trail)
-        steps = []
-        for name, places in template.steps:
-            step = self.do(level, name, tuple([roles[place] for place in places]))
-            if step is None:
-                self.table.undo(mark)
+        now = self.table.now
+        for facts in self.failed.get((name, arguments), ()):
+            if all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
-            steps.append(step)
-        if self.table.since(mark) != targets:
-            self.table.undo(mark)
+        self.misses += 1
+        found = self.achieve(below, targets, keep, individuals, SHORT)
+        for width in self.widths(below):
+            found = found or self.achieve(below, targets, keep, individuals, width)
+        if found is None:
+            around = problem_of(
+                self.segments, below, None if width is WHOLE else focus(self.segments, below, targets, NEAR)
+            )
+            facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
+            self.failed.setdefault((name, arguments), []).append(facts)
             return None
-        return tuple(steps)
+        known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
+        known.sort(key=lambda template: len(template.steps))
+        del known[TEMPLATES:]
+        return tuple(found)
 
-    def _search(
-        self, level: int, individuals: tuple[str, ...], targets: dict[Cell, str], effort: Effort
-    ) -> tuple[Done, ...] | None:
-        """Search a refinement; a step of it that can't itself be refined is forbidden there, and the search repeated."""
+    def widths(self, level: int) -> tuple[Width, ...]:
+        """Return the worlds to look at one after the other."""
+        return (
+            (NEAR, WIDER, WIDE, WHOLE) if self.segments.program.size(level) <= MOST_OPERATORS else (NEAR, WIDER, WIDE)
+        )
+
+    def achieve(
+        self,
+        level: int,
+        targets: Mapping[Cell, str],
+        keep: Keep,
+        individuals: Sequence[str],
+        effort: Effort | Width,
+    ) -> list[RefinedStep] | None:
+        """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any.
+
+        A step that can't be refined is forbidden where it stands, and the steps are searched again.
+        """
+        if isinstance(effort, Effort):
+            return self._by_relevance(level, targets, keep, individuals, effort)
+        return self._in_a_world(level, dict(targets), keep, effort)
+
+    def _by_relevance(
+        self, level: int, targets: Mapping[Cell, str], keep: Keep, individuals: Sequence[str], effort: Effort
+    ) -> list[RefinedStep] | None:
         segments, table = self.segments, self.table
         forbidden: set[Forbidden] = set()
         outer = dict(segments.focus)
         mark = len(table.trail)
-        while True:
+        for _ in range(ATTEMPTS):
             segments.focus.clear()
             segments.focus.update(dict.fromkeys(individuals))
-            found = segments.find(level, targets, None, effort, forbidden)
-            if found is None and not forbidden:
+            found = segments.find(level, targets, keep, effort, forbidden)
+            if found is None and individuals and not forbidden:
                 segments.focus.clear()
-                found = segments.find(level, targets, None, effort, forbidden)
+                found = segments.find(level, targets, keep, effort, forbidden)
             segments.focus.clear()
             segments.focus.update(outer)
             if found is None:
                 return None
-            steps: list[Done] = []
+            steps: list[RefinedStep] = []
             for name, arguments in found:
                 step = self.do(level, name, arguments)
                 if step is None:
@@ -151,8 +230,72 @@ class Refiner:
                     break
                 steps.append(step)
             if len(steps) == len(found):
-                return tuple(steps)
+                if self.left_as_it_must(mark, targets, keep) is None:
+                    return steps
+                table.undo(mark)
+                return None
             table.undo(mark)
+        return None
+
+    def _in_a_world(self, level: int, targets: dict[Cell, str], keep: Keep, width: Width) -> list[RefinedStep] | None:
+        table = self.table
+        mark = len(table.trail)
+        world = World(self.segments, level, targets, keep, width)
+        for _ in range(ATTEMPTS):
+            found = world.search()
+            if found is None:
+                return None
+            steps: list[RefinedStep] = []
+            for position, (name, arguments) in enumerate(found):
+                step = self.do(level, name, arguments)
+                if step is None:
+                    world.forbid(position)
+                    break
+                steps.append(step)
+            if len(steps) == len(found):
+                astray = self.left_as_it_must(mark, targets, keep)
+                if astray is None:
+                    return steps
+                first = next((old for s, key, old in table.trail[mark:] if (s, key) == astray), None)
+                wanted = targets.get(astray) or (keep(astray, first) if first is not None else None)
+                if astray in targets or wanted is None:
+                    table.undo(mark)
+                    return None
+                targets[astray] = wanted
+                table.undo(mark)
+                world = World(self.segments, level, targets, keep, width)
+                continue
+            table.undo(mark)
+        return None
+
+    # ------------------------------------------------------------------------------------------------------- templates
+
+    def replay(
+        self, level: int, template: Template, roles: Sequence[str | None], targets: Mapping[Cell, str], keep: Keep
+    ) -> tuple[RefinedStep, ...] | None:
+        """Do a template's steps; None, and the table as it was, if one can't be done or it leaves what it mustn't."""
+        mark = len(self.table.trail)
+        filled = list(roles)
+        first = len(roles) - len(template.open)
+        steps = []
+        for name, places in template.steps:
+            for place in places:
+                if filled[place] is None:
+                    situation, arguments = template.open[place - first].source  # type: ignore[misc]
+                    key = key_of(tuple(filled[i] or "" for i in arguments))
+                    filled[place] = self.table.now[situation].get(key)
+            if None in [filled[place] for place in places]:
+                self.table.undo(mark)
+                return None
+            step = self.do(level, name, tuple([filled[place] or "" for place in places]))
+            if step is None:
+                self.table.undo(mark)
+                return None
+            steps.append(step)
+        if self.left_as_it_must(mark, targets, keep) is not None:
+            self.table.undo(mark)
+            return None
+        return tuple(steps)
 
     def template(self, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Template:
         """Return steps with individuals replaced by their places among those given, and by open roles."""
@@ -160,21 +303,45 @@ class Refiner:
         places: dict[str, int] = {}
         for place, individual in enumerate(individuals):
             places.setdefault(individual, place)
-        opened: dict[str, str] = {}
+        opened: list[OpenRole] = []
         lifted = []
         for name, arguments in steps:
-            for argument, parameter in zip(arguments, behaviors[name].parameters, strict=True):
-                if argument not in places:
-                    places[argument] = len(individuals) + len(opened)
-                    opened[argument] = parameter.kind
+            behavior = behaviors[name]
+            terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
+            new = [p for p in behavior.parameters if terms[p.name] not in places]
+            for parameter in new:
+                if terms[parameter.name] not in places:
+                    opened.append(open_role(behavior, parameter.name, parameter.kind, terms, places))
+                    places[terms[parameter.name]] = len(individuals) + len(opened) - 1
             lifted.append((name, tuple(places[argument] for argument in arguments)))
-        return Template(tuple(lifted), tuple(opened.items()))
+        return Template(tuple(lifted), tuple(opened))
 
-    def roles(self, template: Template, individuals: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-        """Yield ways to fill the roles of a template: the parent's individuals, and one of each sort for open roles."""
+    def roles(self, template: Template, individuals: tuple[str, ...]) -> Iterator[tuple[str | None, ...]]:
+        """Yield ways to fill the roles of a template: the parent's individuals, None for what the table will tell, others."""
         if not template.open:
             yield individuals
             return
-        choices = [self.segments.wants._some(kind) for _, kind in template.open]
-        for chosen in product(*choices):
+        wants = self.segments.wants
+        choices: list[Sequence[str | None]] = []
+        for role in template.open:
+            if role.source is not None:
+                choices.append((None,))
+            elif role.becomes is not None:
+                choices.append(wants.candidates(role.becomes, "", role.kind))
+            else:
+                choices.append(wants.one_of_each(role.kind))
+        for chosen in islice(product(*choices), CHOICES):
             yield individuals + chosen
+
+
+def open_role(
+    behavior: Behavior, parameter: str, kind: str, terms: Mapping[str, str], places: Mapping[str, int]
+) -> OpenRole:
+    """Return how a parameter that no earlier role fills is found: by the condition that determines it, if there is one."""
+    for condition in behavior.preconditions:
+        if isinstance(condition, ValueCondition) and not condition.negated and condition.value == parameter:
+            known = [places.get(terms.get(a, a)) for a in condition.arguments]
+            if None not in known:
+                return OpenRole(kind, (condition.situation, tuple(place for place in known if place is not None)), None)
+    becomes = next((effect.situation for effect in behavior.effects if effect.value == parameter), None)
+    return OpenRole(kind, None, becomes)

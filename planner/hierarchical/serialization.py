@@ -15,38 +15,34 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import product
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
-from planner.grounded.best_first import search as flat_search
 from planner.grounded.grounding import OutOfTimeError, Reached, ground
 from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
 from planner.grounded.state_space import Space, TooLargeError
 from planner.grounded.unreachable import unreachable
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.refinement_cache import Done, Refiner, Template
+from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
 from planner.hierarchical.state import Cell, Table, arguments_of, key_of
-from planner.hierarchical.subplans import Advice, Effort, Forbidden, Ground, LimitError, Segments
-from planner.hierarchical.subproblem import detour
-from planner.plan import Limits, Plan, Reason, Status, Step
-from reasoner.symbols import FALSE, Condition, Fact, Problem, State
+from planner.hierarchical.subplans import Advice, Effort, LimitError, Segments
+from planner.hierarchical.subproblem import Width
+from planner.plan import Outcome, Plan, Reason, Status, Step
+from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
 
-EASY = Effort(depth=1, expansions=10)
-SHORT = Effort(depth=3, expansions=150)
-LONG = Effort(depth=16, expansions=200, questions=150)
-WIDE = Effort(depth=16, expansions=1000, slack=1, breadth=3, questions=500)
-NEARBY, WIDER = Effort(depth=0, expansions=0), Effort(depth=0, expansions=0, breadth=2)
-"""All states of what a goal concerns and one or two values of each sort, see `planner.hierarchical.subproblem`."""
-TOGETHER = Effort(depth=0, expansions=2_000)
-"""All goals that are left at once, by flat search on the level, where it is small enough."""
-
+EASY, LONGER = Effort(depth=1, expansions=10), Effort(depth=3, expansions=150)
+"""For a goal that one step achieves, and for one that a few relevant steps do."""
 FEW_OPERATORS, FEW_STATES = 300, 30_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
+MOST_TOGETHER = 20_000
+"""The largest level, in quantified behaviours, on which all goals are searched at once."""
+ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 500_000)
+"""All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
+Attempt: TypeAlias = "Effort | Width"
 COSTLY = 4
-"""So many goals that need detours are a task of which a watcher is told."""
-MOST_ROWS, MOST_CHANGES, MOST_TOGETHER = 2_000_000, 10_000_000, 3_000_000
-"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded: the lowest (600 MB),
-and another for all goals at once."""
+"""From so many goals that need more than a few steps on, the observer is told."""
+MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
+"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
 
 class UnsolvableError(Exception):
@@ -124,21 +120,23 @@ class Call:
         self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
         self.refiner = Refiner(self.segments, using.templates)
         self.refiner.use_templates = using.replay
-        self.kept: dict[Cell, str] = {}
-        self.steps: list[Done] = []
-        self.fallbacks = 0
-        self.failed: dict[Cell, list[tuple[int, Effort]]] = {}
+        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
+        self.rest = {
+            (symbol.situation, key_of(symbol.arguments)): value
+            for symbol, value in problem.initial.items()
+            if self.segments.rest.get(symbol.situation) == value
+        }
+        self.steps: list[RefinedStep] = []
+        self.given_up: list[str] = []
+        self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
         self.proved = False
+        self.tried: dict[int, int] = {}
         self.too_large: Reason | None = None
-        self.together_at: dict[int, int] = {}
-        *upper, lowest = self.program.levels
-        self.efforts = (
-            *product(upper[:1], (SHORT, NEARBY, WIDER, LONG)),
-            *product(upper[1:], (SHORT, NEARBY, WIDER, TOGETHER, LONG)),
-            *product(upper, (WIDE,)),
-            *product((lowest,), (SHORT, LONG, WIDE) if upper else (SHORT, LONG)),
-        )
+        self.ladder: list[tuple[int, Attempt]] = []
+        for level in self.program.levels:
+            attempts: list[Attempt] = [LONGER, NEAR, WIDER, WIDE, ALL]
+            self.ladder += [(level, attempt) for attempt in attempts]
 
     def serialise(self) -> bool:
         """Achieve the goals one after the other; whether all are."""
@@ -146,9 +144,6 @@ class Call:
         active: deque[Cell] = deque()
         asleep: dict[Cell, None] = {}
         waiting: dict[Cell, list[Cell]] = {}
-        for cell, value in self.goal.items():
-            if self.met(cell):
-                self.kept[cell] = value
         before = self.order()
         active.extend(cell for cell in self.goal if cell not in self.kept)
 
@@ -207,28 +202,42 @@ class Call:
             if none:  # where goals wait for each other, none waits
                 yield from asleep
 
-        for level, effort in self.efforts:
-            if effort is NEARBY and len(self.goal) - len(self.kept) >= COSTLY:
+        for level, attempt in self.ladder:
+            if attempt is not LONGER and len(self.goal) - len(self.kept) >= COSTLY:
                 self.segments.watch(None)
-            if level != self.program.levels[0] or effort is LONG:
+            if attempt is not LONGER:
                 self.prove()
-            if effort is TOGETHER:
+            if attempt is ALL:
                 if self.together(level):
-                    self.fallbacks += 1
                     return True
                 continue
             for cell in candidates():
-                if (level, effort) in self.failed.get(cell, ()):
+                if (level, attempt) in self.failed.get(cell, ()):
                     continue
-                if self.achieve(level, cell, effort):
-                    self.fallbacks += level != self.program.levels[0]
+                if self.achieve(level, cell, attempt):
                     return True
-                self.failed.setdefault(cell, []).append((level, effort))
+                self.failed.setdefault(cell, set()).add((level, attempt))
         if self.moved:  # something was done since some of these attempts failed
             self.failed.clear()
             self.moved = False
             return self.harder(asleep, before)
         return False
+
+    def anew(self) -> bool:
+        """Achieve all goals at once from the beginning, where taking them in series has led astray; whether that succeeded."""
+        if not self.steps:
+            return False  # nothing has led anywhere
+        self.table.undo(0)
+        self.steps.clear()
+        self.given_up.clear()
+        self.tried.clear()
+        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
+        return any(self.together(level) for level in dict(self.ladder))
+
+    def at_rest_in_the_end(self) -> Problem:
+        """Return the problem with the rest values of what rests in the beginning as goals, for planners that know no levels."""
+        rest = {Symbol(s, arguments_of(key)): value for (s, key), value in self.rest.items()}
+        return replace(self.problem, goal={**rest, **self.problem.goal})
 
     def prove(self) -> None:
         """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
@@ -261,67 +270,33 @@ class Call:
                     if isinstance(found, Reason):
                         raise UnsolvableError(found)
 
-    def achieve(self, level: int, cell: Cell, effort: Effort) -> bool:
+    def achieve(self, level: int, cell: Cell, attempt: Attempt) -> bool:
         """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
-        forbidden: set[Forbidden] = set()
-        mark = len(self.table.trail)
-        while True:
-            found = self.segment(level, cell, effort, forbidden)
-            if found is None:
-                return False
-            done: list[Done] = []
-            for name, arguments in found:
-                step = self.refiner.do(level, name, arguments)
-                if step is None:
-                    forbidden.add(((name, arguments), frozenset(self.table.since(mark).items())))
-                    break
-                done.append(step)
-            if len(done) == len(found):
-                self.steps.extend(done)
-                self.moved = True
-                self.kept[cell] = self.goal[cell]
-                return True
-            self.table.undo(mark)
+        return self.reach(level, {cell: self.goal[cell]}, attempt)
 
-    def segment(self, level: int, cell: Cell, effort: Effort, forbidden: set[Forbidden]) -> list[Ground] | None:
-        """Return steps to one goal after which those kept hold again, looked for with some effort."""
-        if effort in (NEARBY, WIDER):
-            goal, deadline = (cell, self.goal[cell]), self.segments.deadline
-            return (
-                detour(self.program, self.table, level, goal, self.kept, effort.breadth, deadline)
-                if not forbidden
-                else None
+    def together(self, level: int, width: Width = ALL) -> bool:
+        """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
+        if self.program.size(level) > MOST_TOGETHER or self.tried.get(level) == len(self.steps):
+            return False
+        self.tried[level] = len(self.steps)
+        return self.reach(level, {c: v for c, v in self.goal.items() if not self.met(c)}, width)
+
+    def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
+        """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
+        keep = self.segments.keeping(self.kept)
+        steps = self.refiner.achieve(level, targets, keep, (), attempt)
+        if steps is None:
+            return False
+        self.steps.extend(steps)
+        self.moved = True
+        self.kept.update(targets)
+        if level != self.program.levels[0]:
+            goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())
+            self.given_up.append(
+                f"level {self.program.levels[0]} was given up for {goals}: no steps of it were found that can be refined; "
+                f"steps of level {level} stand there"
             )
-        search = self.segments.find if effort in (EASY, SHORT) else self.segments.seek
-        return search(level, {cell: self.goal[cell]}, self.kept, effort, forbidden)
-
-    def together(self, level: int) -> bool:
-        """Achieve all goals at once by flat search on a level; whether that succeeded, and not tried twice from one state."""
-        if len(self.steps) == self.together_at.get(level):
-            return False
-        self.together_at[level] = len(self.steps)
-        deadline, state = self.segments.deadline, self.table.state()
-        try:
-            if refusal(closed(self.problem, level, deadline, state), MOST_TOGETHER) is not None:
-                return False
-            task = ground(self.problem, level, state, deadline=deadline)
-        except (GroundingTooLargeError, OutOfTimeError):
-            return False
-        if isinstance(task, Reason):
-            return False
-        found = flat_search(task, Limits(TOGETHER.expansions), deadline)
-        self.segments.counts[level].add(found.counts)
-        mark, before = len(self.table.trail), len(self.steps)
-        for operator in found.plan if found.status is Status.SOLVED else ():
-            name, arguments, _ = task.describe(operator)
-            step = self.refiner.do(level, name, arguments)
-            if step is None:
-                self.table.undo(mark)
-                del self.steps[before:]
-                return False
-            self.steps.append(step)
-        self.moved |= len(self.steps) > before
-        return len(self.steps) > before
+        return True
 
     def met(self, cell: Cell) -> bool:
         """Whether a goal holds now."""
@@ -374,11 +349,26 @@ class Call:
                         return True
         return False
 
+    def outcome(self, status: Status, plan: Plan | None, reason: Reason | None, seconds: float) -> Outcome:
+        """Return how the call ended, with what it counted."""
+        cache, given_up = self.refiner, tuple(self.given_up)
+        return Outcome(
+            status,
+            plan,
+            reason,
+            self.segments.counts,
+            len(given_up),
+            seconds,
+            hits=cache.hits,
+            misses=cache.misses,
+            given_up=given_up,
+        )
+
     def tree(self) -> Plan:
         """Return the steps done as a plan."""
         id_of, variables = self.program.id_of, self.program.variables
 
-        def step(done: Done, path: tuple[int, ...]) -> Step:
+        def step(done: RefinedStep, path: tuple[int, ...]) -> Step:
             level, name, arguments, bindings, below = done
             bound = dict(zip(variables[name], bindings, strict=True)) if bindings else {}
             inner = tuple([step(child, (*path, i)) for i, child in enumerate(below)])

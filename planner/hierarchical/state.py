@@ -122,6 +122,9 @@ class Alike:
             marks.setdefault(individual, []).append(individual)
         numbers: dict[tuple[object, ...], int] = {}
         self.sort = {who: numbers.setdefault(tuple(what), len(numbers)) for who, what in marks.items()}
+        self.members: dict[int, list[str]] = {}
+        for individual, number in self.sort.items():
+            self.members.setdefault(number, []).append(individual)
         self._groups: dict[tuple[str, ...], list[list[str]]] = {}
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:

@@ -108,7 +108,7 @@ class Wants:
                             if isinstance(c, ValueCondition):
                                 yield from self.of(achiever, self._negation(c), inner, level)
                 else:
-                    for individual in self._some(kind):
+                    for individual in self.one_of_each(kind):
                         inner = {**env, variable: individual}
                         if all(self.holds(c, inner) for c in conditions if not _fluent(c)):
                             for c in conditions:
@@ -197,7 +197,8 @@ class Wants:
         values = self.candidates(situation, key, self.program.domain.situations[situation].range)
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
-    def _some(self, kind: str) -> list[str]:
+    def one_of_each(self, kind: str) -> list[str]:
+        """Return the individuals of a class, or one of each symmetry class if they are many."""
         members = self.program.problem.classes.get(kind, ())
         return list(members) if len(members) <= FEW else [group[0] for group in self.program.alike.groups(members)]
 

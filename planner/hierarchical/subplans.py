@@ -1,20 +1,19 @@
 """A few steps towards a few wants: search over relevant behaviours, on a state that is changed in place.
 
 targets   the symbols that shall get a value, with it
-kept      what must hold again in the end; `None` means that everything else must (a refinement changes nothing else)
+keep      what any other symbol that was touched must be in the end (docs/levels.md), None if it may be anything
 off       symbols that haven't the value that they must have in the end: the goal of this search, empty when it is reached
 depth     how many steps are left
 changed   the symbols that differ from the start of the segment, with their values: this names a state
 
 Only relevant behaviours are tried: those that give a symbol that is off its value, or that give an unmet precondition of such
 a behaviour its value, and so on. A chain of k of them takes at least k steps, so that longer chains than `depth` aren't looked
-at. `find` deepens iteratively and returns a shortest segment of those that relevance admits; `seek` goes further, best first,
-for segments too long for that. What relevance doesn't admit is left to flat search.
+at. `find` deepens iteratively and returns a shortest segment of those that relevance admits. What relevance doesn't admit, and
+what is too long for that, is left to a search over a small world (`planner.hierarchical.subproblem`).
 """
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -37,8 +36,8 @@ Watch: TypeAlias = "Callable[[int | None], object]"
 """Told the level of each expansion, and `None` before what costs most begins."""
 
 
-FIRST = 3
-"""Weight of the way to a target against the way back of what has to be restored, which grows while that is gone."""
+Keep: TypeAlias = "Callable[[Cell, str], str | None]"
+"""Says what a touched symbol must be in the end, given what it was in the beginning; None: whatever it came to be."""
 
 
 class LimitError(Exception):
@@ -53,16 +52,11 @@ def nobody(level: int | None) -> None:
 class Effort:
     """How hard to try.
 
-    `depth` is the most steps of a segment or a chain, `expansions` the most of one search; `slack` is by how much a chain may
-    be longer than the shortest, `breadth` how many taken values of a sort are proposed where none is free; `questions` is the
-    most values that chains towards one symbol may lead through.
+    `depth` is the most steps of a segment or a chain, `expansions` the most of one search.
     """
 
     depth: int
     expansions: int
-    slack: int = 0
-    breadth: int = 1
-    questions: int = 200
 
 
 @dataclass
@@ -99,6 +93,7 @@ class Segments:
         self.forward, self.achieve = bound.forward, bound.achieve
         self.wants = Wants(self.program, self.table, self.goal)
         self.counts = {level: Counts() for level in self.program.levels}
+        self.rest = {s.name: s.rest for s in self.program.domain.situations.values() if s.rest is not None}
         self.widest = {
             level: max(len(b.effects) for b in self.program.domain.at_level(level)) for level in self.program.levels
         }
@@ -107,16 +102,16 @@ class Segments:
         self,
         level: int,
         targets: Mapping[Cell, str],
-        kept: Mapping[Cell, str] | None,
+        keep: Keep,
         effort: Effort,
         forbidden: AbstractSet[Forbidden] = frozenset(),
     ) -> list[Ground] | None:
-        """Return the shortest relevant steps that bring all targets about and everything kept back, or None.
+        """Return the shortest relevant steps that bring all targets about and keep the rest as `keep` says, or None.
 
         The table is left as it was found.
         """
         table, now = self.table, self.table.now
-        self.wants.breadth = effort.breadth
+        self.wants.breadth = 1
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []
@@ -140,7 +135,7 @@ class Segments:
                 if forbidden and (ground, here) in forbidden:
                     continue
                 counts.generated += 1
-                done = self.step(ground, off, changed, origin, targets, kept)
+                done = self.step(ground, off, changed, origin, targets, keep)
                 if done is not None:
                     steps.append(ground)
                     if deepen(depth - 1, *done):
@@ -160,61 +155,6 @@ class Segments:
                 return None
         return None
 
-    def seek(
-        self,
-        level: int,
-        targets: Mapping[Cell, str],
-        kept: Mapping[Cell, str] | None,
-        effort: Effort,
-        forbidden: AbstractSet[Forbidden] = frozenset(),
-    ) -> list[Ground] | None:
-        """Return relevant steps to the same end as `find`, found best first, or None.
-
-        h is the sum, over the symbols that are off (targets weighing more), of the length of the shortest chain that something
-        applicable starts. A node's successors are queued by its own h (deferred evaluation), so that each state's relevance is
-        worked out once. The table is left as it was found.
-        """
-        table, now = self.table, self.table.now
-        self.wants.breadth = effort.breadth
-        counts = self.counts[level]
-        origin: dict[Cell, str] = {}
-        start = len(table.trail)
-        off = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
-        queue: list[tuple[int, int, dict[Cell, str], dict[Cell, str], tuple[Ground, ...]]] = [(0, 0, off, {}, ())]
-        seen: set[frozenset[tuple[Cell, str]]] = set()
-        left, number = effort.expansions, 0
-        while queue and left > 0:
-            _, _, off, changed, steps = heapq.heappop(queue)
-            here = frozenset(changed.items())
-            if here in seen:
-                continue
-            seen.add(here)
-            left -= 1
-            self.expand(level)
-            table.undo(start)
-            for (situation, key), value in changed.items():
-                table.put(situation, key, value)
-            found: dict[Ground, None] = {}
-            h = 0
-            for cell, value in off.items():
-                h += self.nearest(level, cell, value, effort, found) * (FIRST if cell in targets else 1)
-            mark = len(table.trail)
-            for ground in found if self.advice is None else self.advice(level, table, list(found)):
-                if forbidden and (ground, here) in forbidden:
-                    continue
-                counts.generated += 1
-                done = self.step(ground, off, changed, origin, targets, kept)
-                if done is not None:
-                    if not done[0]:
-                        table.undo(start)
-                        return [*steps, ground]
-                    number += 1
-                    rank = 2 * (h + len(done[0]) - len(off)) + len(steps)
-                    heapq.heappush(queue, (rank, number, *done, (*steps, ground)))
-                    table.undo(mark)
-        table.undo(start)
-        return None
-
     def step(
         self,
         ground: Ground,
@@ -222,7 +162,7 @@ class Segments:
         changed: Mapping[Cell, str],
         origin: dict[Cell, str],
         targets: Mapping[Cell, str],
-        kept: Mapping[Cell, str] | None,
+        keep: Keep,
     ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
         """Do a behaviour on the table and return what is off and changed after it, or None if it isn't applicable."""
         now = self.table.now
@@ -245,7 +185,7 @@ class Segments:
                 changes.pop(cell, None)
             else:
                 changes[cell] = value
-            wanted = targets.get(cell) or (first if kept is None else kept.get(cell))
+            wanted = targets.get(cell) or keep(cell, first)
             if wanted is None or wanted == value:
                 still.pop(cell, None)
             else:
@@ -261,6 +201,29 @@ class Segments:
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
         self.check_time()
+
+    def spend(self, level: int, counts: Counts) -> None:
+        """Count what a search elsewhere did."""
+        self.counts[level].add(counts)
+        self.expanded += counts.expanded
+        if self.expanded > self.most:
+            raise LimitError(f"{self.most} expansions")
+        self.check_time()
+
+    def visible(self, level: int, cell: Cell) -> bool:
+        """Whether a level knows a symbol: its situation type and its individuals exist there."""
+        levels = self.program.problem.value_levels
+        return self.program.domain.situations[cell[0]].level <= level and (
+            not levels or all(levels.get(argument, 1) <= level for argument in arguments_of(cell[1]))
+        )
+
+    def refining(self, level: int) -> Keep:
+        """Return what refining a behaviour of `level` keeps: all that this level knows as it was, the rest at rest."""
+        return lambda cell, first: first if self.visible(level, cell) else self.rest.get(cell[0])
+
+    def keeping(self, kept: Mapping[Cell, str]) -> Keep:
+        """Return what steps towards a goal keep: the goals reached before, the rest at rest."""
+        return lambda cell, first: kept.get(cell) or self.rest.get(cell[0])
 
     def exists(self, situation: str, key: object) -> bool:
         """Whether a boolean symbol exists that the table doesn't list."""
@@ -286,21 +249,13 @@ class Segments:
                     given.add(ground)
                     yield ground
 
-    def nearest(self, level: int, cell: Cell, value: str, effort: Effort, found: dict[Ground, None]) -> int:
-        """Add the behaviours that start the shortest chains to a value, or hardly longer ones; return the shortest length."""
-        shortest = effort.depth + 1
-        for length, ground in self.chains(level, cell, value, effort.questions):
-            if length > min(shortest + effort.slack, effort.depth):
-                break
-            if ground is not None:
-                found[ground] = None
-                shortest = min(shortest, length)
-        return shortest
-
-    def chains(self, level: int, cell: Cell, value: str, questions: int = 1000) -> Iterator[tuple[int, Ground | None]]:
+    def chains(
+        self, level: int, cell: Cell, value: str, questions: int = 1000, met: dict[str, None] | None = None
+    ) -> Iterator[tuple[int, Ground | None]]:
         """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
 
-        Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer.
+        Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer. All
+        individuals that came up on the way are added to `met`.
         """
         asked: set[tuple[str, Key, str]] = set()
         wants: Iterable[Want] = [(*cell, (value,))]
@@ -326,6 +281,9 @@ class Segments:
                     for achiever in self.program.achievers.get((level, situation), ()):
                         achieve = self.achieve[achiever.behavior, achiever.effect]
                         for arguments, unmet, env in achieve(*arguments_of(key), wanted):
+                            if met is not None:
+                                met.update(dict.fromkeys((*arguments_of(key), wanted, *arguments)))
+                                met.update((found, None) for found in env.values() if found) if env else None
                             if unmet:
                                 blocked.append((achiever, unmet, env))
                             else:

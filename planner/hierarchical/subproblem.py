@@ -1,117 +1,211 @@
-"""A small world cut out of a large one: a few individuals with what holds between them, all else left as it is.
+"""A small world cut out of a large one, grounded and searched: for what no short chain of relevant steps achieves.
 
-Where few things stand in each other's way (a full table, two hands), the way out is short in states, not in steps: it is found by
-going through all states of the things concerned and one of each sort of place beside them.
+focus      the individuals that may act and be acted on: those of the targets, and those that chains towards the targets meet
+frozen     others that have a value of theirs: they stand where they stand, so that an absence is judged as in the whole world
+targets    the symbols that shall get a value; what is kept besides is said by a function, as for `planner.hierarchical.subplans`
+
+What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
+proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 from itertools import product
 
-from planner.grounded.state_space import Space, TooLargeError
-from planner.hierarchical.operators import Program
-from planner.hierarchical.state import Cell, Table, arguments_of, key_of
-from planner.hierarchical.subplans import Ground, LimitError
-from reasoner.symbols import Problem, Symbol
+from planner.grounded import best_first
+from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.task import Task
+from planner.hierarchical.state import Cell, arguments_of, key_of
+from planner.hierarchical.subplans import Ground, Keep, Segments
+from planner.plan import Limits, Reason, Status
+from reasoner.symbols import (
+    FALSE,
+    AnyOf,
+    Condition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
 
-ALWAYS = 4
-"""Classes of so few individuals (the hands) are part of every world."""
-OPERATORS, STATES = 500, 40_000
-"""The largest world that is searched."""
+FEW = 4
+"""Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
 
-
-def world(program: Program, table: Table, level: int, inside: set[str]) -> Problem:
-    """Return the problem of the individuals `inside` and the few that are always there, as they are now, without a goal."""
-    problem = program.problem
-    inside = {*inside, *program.named}
-    classes = {
-        kind: members if len(members) <= ALWAYS else tuple(m for m in members if m in inside)
-        for kind, members in problem.classes.items()
-    }
-    inside.update(*classes.values())
-    initial = {
-        symbol: value
-        for symbol, value in _around(program, table, inside)
-        if problem.domain.situations[symbol.situation].level <= level
-    }
-    return replace(problem, classes=classes, initial=initial, goal={})
+SMALLEST = 50
+"""A task counts as having at least so many operators, since a state costs something whatever can be done there; and a world of
+which not even so many states could be looked at isn't grounded."""
 
 
-def _around(program: Program, table: Table, inside: set[str]) -> Iterator[tuple[Symbol, str]]:
-    """Yield the facts that hold now between individuals of a small world."""
-    for situation, cells in table.now.items():
-        kinds = program.domain.situations[situation].arguments
-        for arguments in product(*(sorted(inside & program.members.get(kind, frozenset())) for kind in kinds)):
-            key = key_of(arguments)
-            if key in cells:
-                yield Symbol(situation, arguments), cells[key]
+@dataclass(frozen=True)
+class Width:
+    """How much of the world is looked at, and how long.
 
-
-def detour(
-    program: Program,
-    table: Table,
-    level: int,
-    goal: tuple[Cell, str],
-    kept: Mapping[Cell, str],
-    breadth: int,
-    deadline: float | None,
-) -> list[Ground] | None:
-    """Return the fewest steps of a level to one goal in a world of what it concerns; what is kept holds again after them.
-
-    Parameters
-    ----------
-    program : Program
-    table : Table
-        The present state; isn't changed.
-    level : int
-    goal : cell and value
-    kept : mapping of cell to value
-    breadth : int
-        So many values of each sort that the goal's symbol could take are part of the world, with those that have them.
-    deadline : float, optional
+    `questions` is the most values that chains towards one target may lead through, `breadth` how many of those that no static fact
+    tells apart are there at least; None takes the whole world. `work` bounds one search, in states times operators.
     """
-    cell, value = goal
-    inside = {*arguments_of(cell[1]), value}
-    now = table.now[cell[0]].get(cell[1])
-    inside.update(() if now is None else (now,))
-    members = program.problem.classes.get(program.domain.situations[cell[0]].range, ())
-    for group in program.alike.groups(members):
-        ranked = sorted(group, key=lambda member: (_burden(table, cell[0], member, kept), member in inside))
-        inside.update(ranked[:breadth])
-    while True:  # whoever has one of these, or is had by one, belongs to them
-        more = set(_neighbours(program, table, cell[0], inside)) - inside
-        if not more:
-            break
-        inside |= more
-    small = world(program, table, level, inside)
-    wanted = {s: kept[c] for s in small.initial if (c := (s.situation, key_of(s.arguments))) in kept}
-    wanted[Symbol(cell[0], arguments_of(cell[1]))] = value
-    try:
-        found = Space(replace(small, goal=wanted), level, OPERATORS).search(STATES, deadline)
-    except TooLargeError:
-        return None
-    except TimeoutError as error:
-        raise LimitError("the time limit") from error
-    return None if found.steps is None else [(step.behavior, step.arguments) for step in found.steps]
+
+    questions: int | None
+    breadth: int = 1
+    work: int = 200_000
 
 
-def _burden(table: Table, situation: str, value: str, kept: Mapping[Cell, str]) -> int:
-    """Return how little a value is to be had: less what nobody has, more what must be given back."""
-    keys = table.who[situation].get(value, ())
-    return 1 + any((situation, key) in kept for key in keys) if keys else 0
+class World:
+    """A small world on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
+
+    def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
+        self.segments, self.level, self.width = segments, level, width
+        self.task: Task | None = None
+        self.plan: tuple[int, ...] = ()
+        small = problem_of(segments, level, None if width.questions is None else focus(segments, level, targets, width))
+        goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
+        for symbol, value in small.initial.items():
+            wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
+            if wanted == value:  # what isn't at rest may stay so; who touches it is found out by the caller
+                goal.setdefault(symbol, value)
+        try:
+            task = ground(small, level, goal=goal, most=width.work // SMALLEST, deadline=segments.deadline)
+        except (TooLargeError, OutOfTimeError) as error:
+            segments.check_time()
+            task = Reason(str(error))
+        if isinstance(task, Task):
+            self.task = task
+
+    def search(self) -> list[Ground] | None:
+        """Return steps, or None if none were found; `forbid` takes one of them back."""
+        if self.task is None:
+            return None
+        most = self.width.work // max(len(self.task), SMALLEST)
+        found = best_first.search(self.task, Limits(most), self.segments.deadline)
+        self.segments.spend(self.level, found.counts)
+        self.plan = found.plan
+        if found.status is not Status.SOLVED:
+            return None
+        return [self.task.describe(operator)[:2] for operator in found.plan]
+
+    def forbid(self, position: int) -> None:
+        """Take back the plan that was found last because of one of its steps, which can't be refined where it stands."""
+        assert self.task is not None
+        state = self.task.initial
+        for operator in self.plan[:position]:
+            state = self.task.applied(state, operator) or state
+        name = self.task.describe(self.plan[position])[:2]
+        self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 
 
-def _neighbours(program: Program, table: Table, situation: str, inside: set[str]) -> Iterator[str]:
-    """Yield who alone has one of these individuals as a value, their own values, and what the few always there have."""
-    few = {m for members in program.problem.classes.values() if len(members) <= ALWAYS for m in members}
-    for values in table.who.values():
-        for individual in inside.difference(program.named):
-            keys = values.get(individual, {})
-            if len(keys) == 1:
-                yield from arguments_of(next(iter(keys)))
-    for name, cells in table.now.items():
-        for individual in inside | few if name == situation else few:
+def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str]:
+    """Return the individuals that acting towards the targets may concern."""
+    program, table = segments.program, segments.table
+    met: dict[str, None] = dict.fromkeys(program.named)
+    for cell, value in targets.items():
+        met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
+    segments.wants.breadth = width.breadth
+    for cell, value in targets.items():
+        for _ in segments.chains(level, cell, value, width.questions or 0, met):
+            pass
+    for members in program.problem.classes.values():
+        if len(members) <= FEW:
+            met.update(dict.fromkeys(members))
+    if width.breadth > 1:
+        alike = program.alike
+        for sort in dict.fromkeys(alike.sort.get(individual, -1) for individual in met):
+            met.update(dict.fromkeys(alike.members.get(sort, ())[: width.breadth]))
+    for individual in tuple(met):  # what these have, and who has what these are, as far as these are few
+        for situation, cells in table.now.items():
+            if program.domain.situations[situation].level > level:
+                continue
             if individual in cells:
-                yield cells[individual]
+                met[cells[individual]] = None
+            holders = table.who[situation].get(individual, ())
+            if len(holders) <= FEW:
+                for key in holders:
+                    met.update(dict.fromkeys(arguments_of(key)))
+    return set(met) - {FALSE}
+
+
+def problem_of(segments: Segments, level: int, inside: AbstractSet[str] | None) -> Problem:
+    """Return one level of the problem as it is now, without a goal, of the individuals inside alone, or of all."""
+    program, table = segments.program, segments.table
+    problem = program.problem
+    situations = problem.domain.situations
+    if inside is None:
+        initial = {s: v for s, v in table.state().items() if situations[s.situation].level <= level}
+        return replace(problem, initial=initial, goal={})
+    there = with_frozen(segments, level, inside)
+    classes = {kind: tuple(m for m in members if m in there) for kind, members in problem.classes.items()}
+    behaviors = {}
+    for behavior in problem.domain.at_level(level):
+        parameters = []
+        for parameter in behavior.parameters:
+            kind = f"{parameter.kind} in focus"
+            classes[kind] = tuple(m for m in classes.get(parameter.kind, ()) if m in inside)
+            parameters.append(Parameter(parameter.name, kind))
+        behaviors[behavior.name] = replace(behavior, parameters=tuple(parameters))
+    relations = {
+        relation: frozenset(row for one in there for row in rows.get(one, ()) if there >= set(row))
+        for relation, rows in program.rows_of.items()
+    }
+    initial = {
+        Symbol(situation, arguments): table.now[situation][key]
+        for situation in table.now
+        if situations[situation].level <= level
+        for arguments in product(*(classes.get(k, ()) for k in situations[situation].arguments))
+        if (key := key_of(arguments)) in table.now[situation]
+    }
+    domain = replace(problem.domain, behaviors=behaviors)
+    return replace(problem, domain=domain, classes=classes, relations=relations, initial=initial, goal={})
+
+
+def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set[str]:
+    """Return individuals with those on whom it depends what they can do, though these don't take part.
+
+    These are the values that they have, the values of these and so on; and where a behaviour asks that there is no individual such
+    that …, those who have one of them as a value, and those in a static relation to them.
+    """
+    program, table = segments.program, segments.table
+    behaviors = program.domain.at_level(level)
+    witnesses = [w for b in behaviors for c in (b.preconditions, *(e.when for e in b.effects)) for w in absences(c)]
+    there, fresh = set(inside), set(inside)
+    for _ in range(1 + max([depth(witness) for witness in witnesses], default=0)):
+        met: set[str] = set()
+        for condition, kind in ((c, witness.kind) for witness in witnesses for c in witness.conditions):
+            if isinstance(condition, ValueCondition):
+                holders = table.who[condition.situation]
+                keys = [key for one in fresh for key in tuple(holders.get(one, ()))[: FEW + 1]]
+                met.update(argument for key in keys for argument in arguments_of(key))
+            elif isinstance(condition, RelationCondition):
+                rows, members = program.rows_of.get(condition.relation, {}), program.members.get(kind, ())
+                met.update(x for one in fresh for row in rows.get(one, ()) for x in row if x in members)
+        waiting = [*fresh, *met]
+        while waiting:
+            individual = waiting.pop()
+            for situation, cells in table.now.items():
+                value = cells.get(individual)
+                if value is not None and value not in met and program.domain.situations[situation].level <= level:
+                    met.add(value)
+                    waiting.append(value)
+        fresh = met - there
+        there |= fresh
+    return there
+
+
+def depth(witness: Witness) -> int:
+    """Return how many witnesses are asked for one inside the other."""
+    return 1 + max([depth(inner) for inner in witness.conditions if isinstance(inner, Witness)], default=0)
+
+
+def absences(conditions: Iterable[Condition], inside: bool = False) -> Iterator[Witness]:
+    """Yield the witnesses of which conditions ask that there is none, and those inside of these."""
+    for condition in conditions:
+        match condition:
+            case Witness(_, _, inner, negated):
+                if negated or inside:
+                    yield condition
+                yield from absences(inner, negated or inside)
+            case AnyOf(alternatives, negated):
+                for group in alternatives:
+                    yield from absences(group, negated or inside)

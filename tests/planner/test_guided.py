@@ -134,7 +134,6 @@ def test_one_free_place_and_zones_that_hands_share_are_learned() -> None:
     assert expanded(outcome) <= 1.05 * len(outcome.plan.steps)
 
 
-@pytest.mark.xfail(reason="the default mode leaves a level without coming to rest", strict=False)
 def test_a_plan_that_memory_led_to_is_made_shorter_like_any_other() -> None:
     within = problem("random", 20, 20015)
     first, plan = (guided.plan(within, taught(TRAINING), "leading", improve=shapes).plan for shapes in (0, 2))
@@ -160,7 +159,8 @@ def test_a_lesson_is_a_plan_without_needless_steps_and_nothing_where_there_is_no
     for family, objects, level in (("full", 6, 1), ("blocked", 6, 2)):
         within = single_level(problem(family, objects, 101), level)
         program = Program(within)
-        steps, found = lesson(problem(family, objects, 101), level), fast.plan(problem(family, objects, 101)).plan
+        steps = lesson(problem(family, objects, 101), level)
+        found = fast.plan(problem(family, objects, 101), improve=0).plan
         assert found is not None
         assert Field(program, within, level).works(steps)
         assert shortened(program, within, level, steps) == steps

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from planner.grounded.best_first import plan_level
+from planner.hierarchical.planner import plan as default
 from planner.levels import levels_left
 from planner.paper.hierarchy import plan as paper
 from planner.plan import Outcome, Plan, Status
@@ -17,7 +18,7 @@ from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable
 from worlds.hierarchies import hierarchy, states
 
-MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper}
+MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper, "default": default}
 """The planners that every case is given to."""
 
 

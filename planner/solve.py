@@ -1,0 +1,118 @@
+"""A planning call, top to bottom: a mode proves and searches, the checker validates, and what a plan gives up is said.
+
+=========  ==========================================================  ================================
+mode       how it plans                                                 module
+=========  ==========================================================  ================================
+guarded    goals in series; experience leads where that gets stuck      `planner.experience.portfolio`
+leading    the same, and experience leads as long as it gets on         `planner.experience.portfolio`
+strict     the same, and experience gets a twentieth of the effort      `planner.experience.portfolio`
+optimal    shortened until a lower bound is met, without memory         `planner.hierarchical.bounds`
+paper      A* with eq. (5) on each level                                `planner.paper.hierarchy`
+=========  ==========================================================  ================================
+
+Every plan that leaves here was accepted by `planner.validation`, which shares no code with any search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
+
+from planner.levels import levels_left
+from planner.plan import Limits, Outcome
+from planner.validation import validate
+from reasoner.symbols import GroundBehavior, Problem
+
+if TYPE_CHECKING:
+    from planner.experience.portfolio import Memory
+    from reasoner.memory.links import Links
+
+
+class RejectedPlanError(Exception):
+    """The checker rejects a plan that search returned: a fault of this program. The message names the step and the mode."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What one planning call is asked.
+
+    Attributes
+    ----------
+    problem : Problem
+    mode : str
+        A key of `MODES`.
+    limits : Limits
+    memory : Memory, optional
+        Experience, for the modes that it may lead.
+    links : Links, optional
+        The paper's memory, for its mode.
+    grounds : mapping of level to quantified behaviours, optional
+        For the paper's mode; quantified from the problem's classes if left out.
+    leave_levels : bool
+        Whether steps of a lower level may stand where a level has no plan that can be refined.
+    """
+
+    problem: Problem
+    mode: str = "guarded"
+    limits: Limits = field(default_factory=Limits)
+    memory: Memory | None = None
+    links: Links | None = None
+    grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None
+    leave_levels: bool = True
+
+
+def solve(request: Request) -> Outcome:
+    """Plan, and return how that ended; a plan is checked before it is returned.
+
+    Parameters
+    ----------
+    request : Request
+
+    Raises
+    ------
+    ValueError
+        There is no such mode.
+    RejectedPlanError
+        The plan that was found is none: a fault of this program, never to be taken for an answer.
+    """
+    if request.mode not in MODES:
+        raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
+    outcome = MODES[request.mode](request)
+    if outcome.plan is None:
+        return outcome
+    faults = validate(request.problem, outcome.plan)
+    if faults:
+        raise RejectedPlanError(
+            f"mode {request.mode} returned steps that are no plan: {faults[0].text} (step {list(faults[0].path)}); "
+            "this is a fault of the planner, not of the scene: please report it with the scene's files"
+        )
+    return replace(outcome, left=tuple(levels_left(request.problem, outcome.plan)))
+
+
+def _with_experience(request: Request) -> Outcome:
+    from planner.experience.portfolio import plan
+
+    return plan(request.problem, request.memory, request.mode, request.limits, leave_levels=request.leave_levels)
+
+
+def _optimal(request: Request) -> Outcome:
+    from planner.hierarchical.bounds import plan
+
+    return plan(request.problem, limits=request.limits)
+
+
+def _paper(request: Request) -> Outcome:
+    from planner.paper.hierarchy import plan
+
+    return plan(request.problem, request.links, limits=request.limits, grounds=request.grounds)
+
+
+Mode: TypeAlias = "Callable[[Request], Outcome]"
+MODES: Mapping[str, Mode] = {
+    "guarded": _with_experience,
+    "leading": _with_experience,
+    "strict": _with_experience,
+    "optimal": _optimal,
+    "paper": _paper,
+}
