@@ -136,6 +136,8 @@ def landmarks(task: Task) -> int:
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
     """Return what an operator leaves of a state, and what it sets; None if that depends on the state."""
     changes = task.known(operator)[1]
+    if task.barred:
+        return None
     if task.derived or len(changes) != 1 or changes[0][0]:
         return (-1, 0) if not changes else None
     _, cleared, set_ = changes[0]
