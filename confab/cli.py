@@ -240,13 +240,13 @@ def execute(
             perturb=perturb,
             both_hands=both_hands,
         )
-    if save is not None:
-        execution.save(save)
     if learn and memory is not None:
         with undisturbed(memory):  # others may have learned meanwhile
             newest = Memory.load(memory, loaded)
             newest.live(loaded.problem, execution.episode)
             newest.save(memory)
+    if save is not None:
+        execution.save(save)
     _print(execution.json() if as_json else execution)
     raise typer.Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 

@@ -6,6 +6,8 @@ from collections import defaultdict
 from pathlib import Path
 from typing import TypeAlias
 
+import pyoxigraph as ox
+
 from planner.grounded.grounding import ground
 from planner.grounded.plan_windows import regrouped, shortened
 from planner.grounded.task import Task
@@ -43,8 +45,14 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         raise KnowledgeError(str(error)) from error
     title = f"{pddl.problem} ({pddl.domain})"
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
-    write_whole(out, text)
+    write_whole(out, text, check=_check_turtle)
     return found.problem
+
+
+def _check_turtle(file: Path) -> None:
+    """Raise `SyntaxError` if what was written isn't Turtle."""
+    for _ in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
+        pass
 
 
 def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:

@@ -378,7 +378,7 @@ class _Reader:
     def scope(self, typed: Sequence[Typed], outer: Mapping[str, str]) -> dict[str, str]:
         own: dict[str, str] = {}
         for one in typed:
-            if not one.name.startswith("?"):
+            if not one.name.startswith("?") or one.name == "?":
                 raise self.fail(one.place, f"wanted a variable such as ?x, got '{one.name}'")
             if one.name in own:
                 raise self.fail(one.place, f"a second variable {one.name}")

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import pyoxigraph as ox
+
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -64,8 +66,7 @@ def turtle(problem: Problem, title: str, description: str, labels: Said | None =
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
-    return f'"{escaped}"'
+    return str(ox.Literal(text.replace("\n", " ")))
 
 
 @dataclass

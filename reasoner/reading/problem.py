@@ -526,7 +526,15 @@ class _Schema:
 
     def term(self, iri: str) -> str:
         """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
-        return "?" + local_name(iri).rsplit(".", 1)[-1] if iri in self.terms else self.names.short(iri)
+        if iri in self.terms:
+            return "?" + local_name(iri).rsplit(".", 1)[-1]
+        name = self.names.short(iri)
+        if self.terms and name not in self.names and name not in (TRUE, FALSE):  # a scene's facts have no terms
+            raise KnowledgeError(
+                f"<{iri}> is named in a behaviour, but isn't declared as a parameter, a variable or an individual; declare it, "
+                "or mend the name"
+            )
+        return name
 
     def parameter(self, iri: str) -> Parameter:
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))

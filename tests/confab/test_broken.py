@@ -295,6 +295,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ),
         ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
         ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY speaks of PLACE with 0 arguments; it has 1"),
+        ("", "c:value :dirty", "c:value :dirt", "tearoom#dirt> is named in a behaviour, but isn't declared"),
         ("", "c:AbsenceCondition ;", 'c:AbsenceCondition ; c:negated "perhaps" ;', ":negated is 'perhaps'"),
         ("", ":B1_CARRY.free ;", ":N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY", "the condition contains itself"),
     ],
