@@ -61,7 +61,8 @@ class World:
         self.segments, self.level, self.width = segments, level, width
         self.task: Task | None = None
         self.plan: tuple[int, ...] = ()
-        small = problem_of(segments, level, None if width.questions is None else focus(segments, level, targets, width))
+        inside = None if width.questions is None else focus(segments, level, targets, width)
+        small = problem_of(segments, level, inside, with_frozen(segments, level, inside) if inside else frozenset())
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
@@ -127,7 +128,9 @@ def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Wi
     return set(met) - {FALSE}
 
 
-def problem_of(segments: Segments, level: int, inside: AbstractSet[str] | None) -> Problem:
+def problem_of(
+    segments: Segments, level: int, inside: AbstractSet[str] | None, frozen: AbstractSet[str] = frozenset()
+) -> Problem:
     """Return one level of the problem as it is now, without a goal, of the individuals inside alone, or of all."""
     program, table = segments.program, segments.table
     problem = program.problem
@@ -135,7 +138,7 @@ def problem_of(segments: Segments, level: int, inside: AbstractSet[str] | None) 
     if inside is None:
         initial = {s: v for s, v in table.state().items() if situations[s.situation].level <= level}
         return replace(problem, initial=initial, goal={})
-    there = with_frozen(segments, level, inside)
+    there = inside | frozen
     classes = {kind: tuple(m for m in members if m in there) for kind, members in problem.classes.items()}
     behaviors = {}
     for behavior in problem.domain.at_level(level):
