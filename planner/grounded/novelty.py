@@ -25,7 +25,10 @@ from planner.plan import Counts
 
 MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
 STATE_BYTES = 400  # that a state takes besides its bits
-CHILD = 8  # operators that h_FF looks at in the time in which one successor is made
+CHILD, VISIT = (
+    20,
+    2,
+)  # bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
 AT_ONCE = 32  # states expanded in one turn
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
@@ -39,7 +42,7 @@ class OutOfMemoryError(Exception):
 def by_novelty(
     task: Task, tree: Tree, evaluate: Evaluate, counts: Counts, deep: bool
 ) -> Generator[int, None, tuple[Seen, int] | None]:
-    """Search by novelty; yield the work done, in operators, every so many states; return what was seen and the last state.
+    """Search by novelty; yield the work done, in bits, every so many states; return what was seen and the last state.
 
     Where it is `deep`, landmarks that weren't met yet count like goals, and of equal states the last comes first.
 
@@ -54,7 +57,7 @@ def by_novelty(
     most = MOST_BYTES // (STATE_BYTES + task.size // 4)
     known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
     marks = landmarks(task) & ~(task.initial | goal) if deep else 0
-    child = CHILD + task.size // 128
+    child = CHILD + task.size // 50
     number, step = 0, -1 if deep else 1
     # (no new fact, distance, number, state, facts of the relaxed plan (-1: not made yet), those met, landmarks left)
     first = (goal & ~task.initial).bit_count() + marks.bit_count()
@@ -71,7 +74,7 @@ def by_novelty(
         if wanted < 0:
             evaluation = evaluate(state)
             counts.evaluated += 1
-            work += len(task.owners)
+            work += task.relaxing
             if evaluation is None:
                 continue
             wanted = 0
@@ -80,7 +83,7 @@ def by_novelty(
                     wanted |= set_
             wanted &= ~state
         operators, visited = tree.of(state)
-        work += child * len(operators) + visited
+        work += child * len(operators) + VISIT * visited
         counts.generated += len(operators)
         for operator in operators:
             if operator not in plain:

@@ -99,6 +99,11 @@ class Task:
         """Return the number of operators."""
         return len(self.costs)
 
+    @property
+    def relaxing(self) -> int:
+        """The work of relaxing a state: the bits that all relaxed operators need and may set."""
+        return len(self.needs.items) + len(self.adds.items)
+
     def applied(self, state: int, operator: int) -> int | None:
         """Return the state after an operator, or None where it isn't applicable."""
         precondition, changes = self._changes.get(operator) or self.known(operator)
