@@ -728,7 +728,7 @@ def _judged(folder: Path, case: Path, call: Call, before: dict[str, bytes]) -> s
         return f"exit 2 with {len(told)} lines and with output: {printed[:100]}"
     after = _contents(case)
     changed = sorted(name for name in {*before, *after} if before.get(name) != after.get(name))
-    if bad := [name for name in changed if name.split("/")[0] not in TARGETS and not name.startswith("out")]:
+    if bad := [name for name in changed if name.split("/")[0] not in {*TARGETS, *call} and not name.startswith("out")]:
         return f"files changed: {', '.join(bad)}"
     if code == 2 and changed and call[0] != "learn":
         return f"exit 2, but {', '.join(changed)} changed"
