@@ -661,7 +661,7 @@ def _print(what: Any) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
-    from planner.paper.transitions import DomainError
+    from planner.language import DomainError
     from reasoner.limits import LimitError
 
     _open_streams()

@@ -10,7 +10,7 @@ level should have been applicable that makes this change, maybe together with th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from planner.plan import Broken, Left, Plan, Step
@@ -113,7 +113,7 @@ class _Watch:
 
     def unified(self, behavior: Behavior, effect: ValueEffect, change: Fact) -> Bindings | None:
         """Return what the terms of an effect stand for if it is this change."""
-        kinds, terms = _kinds(behavior), dict[str, str]()
+        kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None
         for term, given in zip(
@@ -128,7 +128,7 @@ class _Watch:
     def could(self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, change: Fact) -> bool:
         """Whether a behaviour could make a change, alone or together with others of its effects made just before."""
         view = self.views[level]
-        conditions, kinds = (*behavior.preconditions, *effect.when), _kinds(behavior)
+        conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         if self.rules.satisfied(conditions, terms, kinds, view) is not None:
             return True
         if self.rules.satisfied(conditions, terms, kinds, self.mixed(level, change.symbol)) is not None:
@@ -162,7 +162,7 @@ class _Watch:
         self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, symbol: Symbol
     ) -> tuple[Bindings, tuple[Condition, ...]]:
         """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
-        conditions, kinds = (*behavior.preconditions, *effect.when), _kinds(behavior)
+        conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
         mixed = self.mixed(level, symbol)
         for size in range(1, len(conditions) + 1):
             for without in combinations(range(len(conditions)), size):
@@ -176,10 +176,6 @@ class _Watch:
 
 def _seen(problem: Problem, level: int) -> dict[Symbol, str]:
     return {symbol: value for symbol, value in problem.initial.items() if problem.sees(level, symbol, value)}
-
-
-def _kinds(behavior: Behavior) -> Mapping[str, str]:
-    return {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
 
 
 def _all(conditions: Sequence[Condition]) -> str:

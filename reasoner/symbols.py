@@ -186,6 +186,11 @@ class Behavior:
         """Put the effects in order."""
         object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda effect: effect.value != FALSE)))
 
+    @cached_property
+    def kinds(self) -> Mapping[str, str]:
+        """The class of each parameter and variable."""
+        return {term.name: term.kind for term in (*self.parameters, *self.variables)}
+
 
 @dataclass(frozen=True, order=True)
 class GroundBehavior:

@@ -26,8 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.grounded.joins import Ints, Table, TooLargeError, pack
-from planner.grounded.schemas import Atom, Schema, plain_variables, schemas, variables
+from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
 from planner.grounded.task import Change, Grouped, Task
+from planner.language import mentions
 from planner.plan import Reason
 from reasoner.symbols import (
     FALSE,
@@ -293,7 +294,7 @@ class Reached:
 
     def _variables(self, condition: Condition, schema: Schema) -> set[str]:
         bound = {t for atom in schema.atoms for t in atom.terms}
-        return {t for t in variables(condition) if t in bound}
+        return {t for t in mentions(condition) if t in bound}
 
     def _decide(self, condition: Condition, columns: Mapping[str, Ints], count: int, kinds: Mapping[str, str]) -> Flags:
         """Return for each row whether a static condition holds."""
@@ -310,7 +311,7 @@ class Reached:
                 if term in columns:
                     places = self.tables["class", kind].find(columns[term][:, None])
                     return np.asarray((places >= 0) != negated)
-        used = sorted(variables(condition) & columns.keys())
+        used = sorted(mentions(condition) & columns.keys())
         combinations, inverse = self.combinations(columns, used, count)
         holds = [self.formulas.condition(condition, dict(zip(used, c, strict=True)), kinds) == () for c in combinations]
         return np.array(holds, bool)[inverse]
@@ -622,7 +623,7 @@ class _Assembly:
         pairs: list[tuple[Ints, Ints]] = []
         for condition in schema.residue:
             self.reached.check_time()
-            used = sorted(variables(condition) & columns.keys())
+            used = sorted(mentions(condition) & columns.keys())
             combinations, inverse = self.reached.combinations(columns, used, len(rows))
             found = [
                 self.formulas.condition(condition, dict(zip(used, c, strict=True)), schema.kinds) for c in combinations

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from planner.paper.transitions import DomainError
+from planner.language import DomainError, is_variable, mentions, terms, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -22,7 +22,6 @@ from reasoner.symbols import (
     Behavior,
     ClassCondition,
     Condition,
-    EqualityCondition,
     RelationCondition,
     SituationType,
     ValueCondition,
@@ -81,7 +80,7 @@ def schemas(
     DomainError
         Nothing determines a variable that an effect or a negated condition names.
     """
-    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    kinds = dict(behavior.kinds)
     parameters = tuple(parameter.name for parameter in behavior.parameters)
     effects = list(enumerate(behavior.effects))
     compile_ = _Compiler(situations, changed, members, kinds)
@@ -89,7 +88,7 @@ def schemas(
     found = [base]
     for position, effect in effects:
         if effect.when:
-            own = set().union(*map(variables, effect.when)) - set(base.terms)
+            own = set().union(*map(mentions, effect.when)) - set(base.terms)
             names = {name: f"?*{name[1:]}" for name in own}  # not those that a precondition has of the same name
             compile_.kinds |= {names[name]: kinds[name] for name in sorted(own)}
             conditions = (*behavior.preconditions, *(substituted(c, names) for c in effect.when))
@@ -116,29 +115,29 @@ class _Compiler:
     ) -> Schema:
         kinds, fresh = dict(self.kinds), count()
         plain = [c for c in conditions if not isinstance(c, Witness | AnyOf)]
-        shared = {*first, *(p.name for p in behavior.parameters), *(t for c in plain for t in _own_terms(c))}
+        shared = {*first, *(p.name for p in behavior.parameters), *(t for c in plain for t in terms(c))}
         parts = list(dict.fromkeys(self._flat(conditions, shared, kinds, fresh)))
         atoms = [atom for part in parts for atom in self._atom(part)]
         others = [part for part in parts if not list(self._atom(part))]
         parameters = [parameter.name for parameter in behavior.parameters]
-        bound = dict.fromkeys([*first, *parameters, *(t for atom in atoms for t in atom.terms if _is_variable(t))])
+        bound = dict.fromkeys([*first, *parameters, *(t for atom in atoms for t in atom.terms if is_variable(t))])
         atoms += [Atom(("class", kinds[name]), (name,)) for name in bound]
         filters = [part for part in others if not self._fluent(part)]
         residue = [part for part in others if self._fluent(part)]
         for part in others:
-            for name in _required(part):
+            for name in filter(is_variable, terms(part)):
                 if name not in bound:
                     raise DomainError(f"{behavior.name}: nothing determines {name}; add a value condition that does")
         for _, effect in effects:
             for name in (*effect.arguments, effect.value):
-                if _is_variable(name) and name not in bound:
+                if is_variable(name) and name not in bound:
                     raise DomainError(f"{behavior.name}: nothing determines {name}, which an effect names")
         used = {t for atom in atoms if atom.fluent for t in atom.terms}
-        used |= {t for part in residue for t in _terms(part)}
+        used |= {t for part in residue for c in walk(part) for t in terms(c) if is_variable(t)}
         used |= {t for _, effect in effects for t in (*effect.arguments, effect.value)}
         declared = {*self.kinds}
-        terms = [*first, *(name for name in bound if name not in first and (name in used or name in declared))]
-        return Schema(behavior, tuple(terms), tuple(atoms), tuple(filters), tuple(residue), kinds, effects, conditional)
+        named = [*first, *(name for name in bound if name not in first and (name in used or name in declared))]
+        return Schema(behavior, tuple(named), tuple(atoms), tuple(filters), tuple(residue), kinds, effects, conditional)
 
     def _flat(
         self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
@@ -196,8 +195,8 @@ class _Compiler:
     def _atom(self, condition: Condition) -> Iterator[Atom]:
         match condition:
             case ValueCondition(situation, arguments, value, False):
-                terms = arguments if self.situations[situation].boolean else (*arguments, value)
-                yield Atom(("situation", situation), terms, situation in self.changed)
+                row = arguments if self.situations[situation].boolean else (*arguments, value)
+                yield Atom(("situation", situation), row, situation in self.changed)
             case RelationCondition(relation, arguments, False):
                 yield Atom(("relation", relation), arguments)
             case ClassCondition(term, kind, False):
@@ -207,65 +206,6 @@ class _Compiler:
         return any(isinstance(c, ValueCondition) and c.situation in self.changed for c in walk(condition))
 
 
-def variables(condition: Condition) -> set[str]:
-    """Return the variables that a condition has from outside."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            found = {*arguments, value}
-        case RelationCondition(_, arguments):
-            found = {*arguments}
-        case ClassCondition(term):
-            found = {term}
-        case EqualityCondition(left, right):
-            found = {left, right}
-        case Witness(variable, _, conditions):
-            found = {t for c in conditions for t in variables(c)} - {variable}
-        case AnyOf(alternatives):
-            found = {t for group in alternatives for c in group for t in variables(c)}
-    return {t for t in found if t.startswith("?")}
-
-
 def plain_variables(group: Sequence[Condition]) -> set[str]:
     """Return the variables that a group has from outside or determines; what only a nested condition mentions is that one's own."""
-    return {t for c in group if not isinstance(c, Witness | AnyOf) for t in variables(c)}
-
-
-def walk(condition: Condition) -> Iterator[Condition]:
-    """Yield a condition and all conditions inside it."""
-    yield condition
-    for group in _groups(condition):
-        for inner in group:
-            yield from walk(inner)
-
-
-def _groups(condition: Condition) -> tuple[tuple[Condition, ...], ...]:
-    if isinstance(condition, Witness):
-        return (condition.conditions,)
-    return condition.alternatives if isinstance(condition, AnyOf) else ()
-
-
-def _is_variable(term: str) -> bool:
-    return term.startswith("?")
-
-
-def _own_terms(condition: Condition) -> tuple[str, ...]:
-    match condition:
-        case ValueCondition(_, arguments, value):
-            return (*arguments, value)
-        case RelationCondition(_, arguments):
-            return arguments
-        case ClassCondition(term):
-            return (term,)
-        case EqualityCondition(left, right):
-            return (left, right)
-    return ()
-
-
-def _terms(condition: Condition) -> set[str]:
-    """Return every variable in a condition."""
-    return {t for inner in walk(condition) for t in _own_terms(inner) if _is_variable(t)}
-
-
-def _required(condition: Condition) -> set[str]:
-    """Return the variables of a condition that is no group."""
-    return {t for t in _own_terms(condition) if _is_variable(t)}
+    return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

@@ -20,8 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.hierarchical.operators import mentioned
-from planner.paper.transitions import needs
+from planner.language import mentions, needs
 from planner.plan import Step
 from reasoner.symbols import (
     FALSE,
@@ -424,18 +423,18 @@ class Space:
         key = (*map(id, waiting), *env)
         if key not in self.schedules:
             pending = {c.value for c in waiting if isinstance(c, ValueCondition) and _binds(c, env)}
-            ready = [c for c in waiting if not needs(c) - env.keys() and not mentioned(c) & pending]
+            ready = [c for c in waiting if not needs(c) - env.keys() and not mentions(c) & pending]
             ready.sort(key=lambda c: isinstance(c, ValueCondition) + 2 * isinstance(c, Witness | AnyOf))
             rest = [c for c in waiting if not any(c is other for other in ready)]
             binders = (c for c in rest if isinstance(c, ValueCondition) and not needs(c) - env.keys())
             binding = next(binders) if rest and not ready else None
-            pairs = [(c, sorted(mentioned(c) & env.keys())) for c in ready]
+            pairs = [(c, sorted(mentions(c) & env.keys())) for c in ready]
             self.schedules[key] = pairs, rest, binding
         return self.schedules[key]
 
     def _operators(self, behavior: Behavior) -> Iterator[Operator]:
         self.known.clear()  # the classes of variables may differ from those of another behaviour
-        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        kinds = behavior.kinds
         names = [parameter.name for parameter in behavior.parameters]
         choices = [self.problem.classes.get(parameter.kind, ()) for parameter in behavior.parameters]
         size = 1

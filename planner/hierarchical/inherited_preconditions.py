@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from planner.paper.transitions import mentions
+from planner.language import mentions
 from reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -75,7 +75,7 @@ def _guards(
 
 def _between(problem: Problem, behavior: Behavior, effect: ValueEffect, level: int) -> Iterator[tuple[Condition, ...]]:
     """Yield one alternative for each value of the effect that the level doesn't know: nothing is asked of these."""
-    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
     if len(unknown) == len(values):
@@ -88,8 +88,8 @@ def _asked(
     problem: Problem, lower: Behavior, effect: ValueEffect, upper: Behavior, its: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
     """Yield the conditions under which an upper behaviour's effect could be this one; nothing if it never could."""
-    terms = {term.name: term.kind for term in (*upper.parameters, *upper.variables)}
-    here = {term.name: term.kind for term in (*lower.parameters, *lower.variables)}
+    terms = upper.kinds
+    here = lower.kinds
     names: dict[str, str] = {}
     asked: list[Condition] = []
     for mine, other in zip((*effect.arguments, effect.value), (*its.arguments, its.value), strict=True):

@@ -22,7 +22,7 @@ from types import CodeType
 from typing import TypeAlias
 
 from planner.hierarchical.state import Alike, Change, Key, Table, representatives
-from planner.paper.transitions import DomainError, needs
+from planner.language import DomainError, mentions, needs, nothing_determines, terms, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -167,7 +167,7 @@ class Program:
         yield "    return forward, achieve"
 
     def _forward(self, behavior: Behavior) -> Iterator[str]:
-        kinds = _kinds(behavior)
+        kinds = behavior.kinds
         parameters = [p.name for p in behavior.parameters]
         bound = set(parameters)
         tests = [self._member(p.name, p.kind) for p in behavior.parameters]
@@ -193,7 +193,7 @@ class Program:
 
     def _achieve(self, behavior: Behavior, number: int) -> Iterator[str]:
         effect = behavior.effects[number]
-        kinds = _kinds(behavior)
+        kinds = behavior.kinds
         name = f"{_name('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
         hard: set[str] = set()
@@ -215,7 +215,7 @@ class Program:
 
         # Hard: tests on what is bound, and enumeration of what isn't.
         while True:
-            ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentioned(c) - hard]
+            ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentions(c) - hard]
             for condition in ready:
                 waiting.remove(condition)
                 tests.append(self.expression(condition, hard, kinds, behavior.name))
@@ -314,7 +314,7 @@ class Program:
         """Whether an effect on the level of `behavior` can fall on a symbol with these terms."""
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
-            others = _kinds(other)
+            others = other.kinds
             for effect in other.effects:
                 if effect.situation == situation:
                     there = [self._possible(term, others, other) for term in effect.arguments]
@@ -458,27 +458,11 @@ def named(problem: Problem) -> list[str]:
     """Return the individuals that behaviours mention by name, and the values that situation types start or rest with."""
     found: dict[str, None] = {}
 
-    def visit(conditions: Sequence[Condition]) -> None:
-        for condition in conditions:
-            match condition:
-                case ValueCondition(_, arguments, value):
-                    found.update(dict.fromkeys((*arguments, value)))
-                case RelationCondition(_, arguments):
-                    found.update(dict.fromkeys(arguments))
-                case ClassCondition(term):
-                    found[term] = None
-                case EqualityCondition(left, right):
-                    found.update(dict.fromkeys((left, right)))
-                case Witness(_, _, inner):
-                    visit(inner)
-                case AnyOf(alternatives):
-                    for group in alternatives:
-                        visit(group)
-
     for behavior in problem.domain.behaviors.values():
-        visit(behavior.preconditions)
+        whens = [condition for effect in behavior.effects for condition in effect.when]
+        for condition in (*behavior.preconditions, *whens):
+            found.update(dict.fromkeys(term for inner in walk(condition) for term in terms(inner)))
         for effect in behavior.effects:
-            visit(effect.when)
             found.update(dict.fromkeys((*effect.arguments, effect.value)))
     for situation in problem.domain.situations.values():
         found.update(dict.fromkeys(value for value in (situation.rest, situation.default) if value is not None))
@@ -489,28 +473,6 @@ def _cost(entry: tuple[float, object, str]) -> float:
     return entry[0]
 
 
-def _kinds(behavior: Behavior) -> dict[str, str]:
-    return {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
-
-
-def mentioned(condition: Condition) -> set[str]:
-    """Return all outer variables that occur in a condition, also those that it could determine itself."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            found = {*arguments, value}
-        case RelationCondition(_, arguments):
-            found = set(arguments)
-        case ClassCondition(term):
-            found = {term}
-        case EqualityCondition(left, right):
-            found = {left, right}
-        case Witness(variable, _, conditions):
-            found = set().union(*map(mentioned, conditions)) - {variable}
-        case AnyOf(alternatives):
-            found = set().union(*(mentioned(c) for group in alternatives for c in group))
-    return {term for term in found if term.startswith("?")}
-
-
 _COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}
 
 
@@ -518,8 +480,7 @@ def _ready(waiting: Sequence[Condition], bound: set[str], where: str) -> Conditi
     """Return the cheapest condition to test of those whose variables are bound."""
     ready = [condition for condition in waiting if not needs(condition) - bound]
     if not ready:
-        unbound = ", ".join(sorted(set().union(*map(needs, waiting)) - bound))
-        raise DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
+        raise nothing_determines(where, waiting, bound)
     return min(ready, key=lambda condition: _COST[type(condition)])
 
 

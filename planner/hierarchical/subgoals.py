@@ -10,8 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
-from planner.hierarchical.operators import FEW, Achiever, Program, mentioned
+from planner.hierarchical.operators import FEW, Achiever, Program
 from planner.hierarchical.state import Cell, Key, Table, arguments_of, key_of, representatives
+from planner.language import mentions, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -146,7 +147,10 @@ class Wants:
         """
         found = self._conditions.get(id(condition))
         if found is None:
-            found = _static(condition), _compares(condition), tuple(sorted(mentioned(condition))), condition
+            inside = list(walk(condition))
+            static = not any(isinstance(inner, ValueCondition) for inner in inside)
+            compares = any(isinstance(inner, EqualityCondition) for inner in inside)
+            found = static, compares, tuple(sorted(mentions(condition))), condition
             self._conditions[id(condition)] = found
         return found
 
@@ -264,26 +268,3 @@ class Wants:
 
 def _fluent(condition: Condition) -> bool:
     return isinstance(condition, ValueCondition | Witness | AnyOf)
-
-
-def _static(condition: Condition) -> bool:
-    match condition:
-        case ValueCondition():
-            return False
-        case Witness(_, _, conditions):
-            return all(map(_static, conditions))
-        case AnyOf(alternatives):
-            return all(_static(c) for group in alternatives for c in group)
-    return True
-
-
-def _compares(condition: Condition) -> bool:
-    """Whether a condition says that individuals are the same, or aren't."""
-    match condition:
-        case EqualityCondition():
-            return True
-        case Witness(_, _, conditions):
-            return any(map(_compares, conditions))
-        case AnyOf(alternatives):
-            return any(_compares(c) for group in alternatives for c in group)
-    return False

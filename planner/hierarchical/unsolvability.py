@@ -103,7 +103,7 @@ def _missing(
     """Return the static relations of a behaviour that no individual has to what its effect names."""
     change = behavior.effects[effect]
     env = {t: v for t, v in zip((*change.arguments, change.value), given, strict=True) if t.startswith("?")}
-    kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+    kinds = behavior.kinds
     found = []
     for condition in behavior.preconditions:
         if isinstance(condition, RelationCondition) and not condition.negated:
@@ -145,7 +145,7 @@ def _exclusive(segments: Segments, situation: str, value: str) -> bool:
     if len(segments.table.who[situation].get(value, ())) > 1:
         return False
     for behavior in program.domain.at_level(program.levels[-1]):
-        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        kinds = behavior.kinds
         setting = [e for e in behavior.effects if e.situation == situation]
         for effect in setting:
             if not effect.value.startswith("?"):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from planner.language import DomainError, mentions, needs, nothing_determines
 from reasoner.symbols import (
     FALSE,
     AnyOf,
@@ -32,10 +33,6 @@ from reasoner.symbols import (
 Values = tuple[str, ...]
 Bindings = dict[str, str]
 Test = Callable[[Values, Bindings], bool]
-
-
-class DomainError(ValueError):
-    """A behaviour can't be executed as it is written; the message names it and the term at fault."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +90,7 @@ class Model:
     # ------------------------------------------------------------------------------------------------------- compiling
 
     def _compile(self, behavior: Behavior) -> tuple[tuple[str, ...], list[Test], list[Callable[..., None]]]:
-        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        kinds = behavior.kinds
         parameters = tuple(parameter.name for parameter in behavior.parameters)
         bound = set(parameters)
         tests = self._conjunction(behavior.preconditions, bound, kinds, behavior.name)
@@ -112,8 +109,7 @@ class Model:
             )
             ready = ready or next((c for c in waiting if not needs(c) - bound), None)
             if ready is None:
-                unbound = ", ".join(sorted(set().union(*(needs(c) for c in waiting)) - bound))
-                raise DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
+                raise nothing_determines(where, waiting, bound)
             waiting.remove(ready)
             tests.append(self._condition(ready, bound, kinds, where))
         return tests
@@ -186,43 +182,6 @@ class Model:
 
     def _members(self, kind: str) -> frozenset[str]:
         return frozenset(self.problem.classes.get(kind, ()))
-
-
-def needs(condition: Condition) -> set[str]:
-    """Return the variables that must be bound before a condition can be tested."""
-    match condition:
-        case ValueCondition(_, arguments, value, negated):
-            found = set(arguments) | ({value} if negated else set())
-        case RelationCondition(_, arguments):
-            found = set(arguments)
-        case ClassCondition(term):
-            found = {term}
-        case EqualityCondition(left, right):
-            found = {left, right}
-        case Witness(variable, _, conditions):
-            found = _needs_all(conditions) - {variable}
-        case AnyOf(alternatives):
-            found = set().union(*(_needs_all(group) for group in alternatives))
-    return {term for term in found if term.startswith("?")}
-
-
-def mentions(condition: Condition) -> set[str]:
-    """Return all variables of a condition but those that a witness inside it looks for."""
-    match condition:
-        case Witness(variable, _, conditions):
-            return set().union(*map(mentions, conditions)) - {variable}
-        case AnyOf(alternatives):
-            return {term for group in alternatives for c in group for term in mentions(c)}
-        case ValueCondition(_, arguments, value):
-            return {term for term in (*arguments, value) if term.startswith("?")}
-    return needs(condition)
-
-
-def _needs_all(conditions: Sequence[Condition]) -> set[str]:
-    """Return what a conjunction needs from outside: what its own value conditions determine is left out."""
-    wanted = set().union(*(needs(c) for c in conditions)) if conditions else set()
-    determined = {c.value for c in conditions if isinstance(c, ValueCondition) and not c.negated}
-    return wanted - determined
 
 
 def _symbols(problem: Problem) -> tuple[Symbol, ...]:

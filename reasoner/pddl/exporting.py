@@ -315,7 +315,7 @@ class _Export:
         )  # fmt: skip
 
     def members_of(self, behavior: Behavior, term: str) -> frozenset[str]:
-        kinds = {t.name: t.kind for t in (*behavior.parameters, *behavior.variables)}
+        kinds = behavior.kinds
         return self.sets.get(kinds[term], frozenset()) if term in kinds else frozenset({term})
 
     def members(self, action: _Action, term: str) -> frozenset[str]:

@@ -182,7 +182,7 @@ class _Writer:
 
     def query(self, behavior: Behavior, when: Sequence[Condition] = ()) -> str:
         names = self.names(behavior, when)
-        kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+        kinds = behavior.kinds
         conditions = (*behavior.preconditions, *when)
         lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]

@@ -144,7 +144,7 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
             if not any(effect.situation in counting for effect in behavior.effects):
                 continue
             counting |= {effect.situation for effect in behavior.effects}
-            kinds = {term.name: term.kind for term in (*behavior.parameters, *behavior.variables)}
+            kinds = behavior.kinds
             for number, effect in enumerate(behavior.effects):
                 starts = {False: set(effect.arguments)}
                 if effect.situation in looked_up and (

@@ -247,7 +247,7 @@ class _Writer:
     behavior: Behavior
 
     def term(self, name: str, above: tuple[str, ...]) -> str:
-        kinds = {t.name: t.kind for t in (*self.behavior.parameters, *self.behavior.variables)}
+        kinds = self.behavior.kinds
         parts = [f"<{self.reading.names.iri(kinds[name])}>"] if name in kinds else ["owl:Thing"]
         for condition in _flat(self.behavior.preconditions):
             parts += self.condition(condition, name, (*above, name))

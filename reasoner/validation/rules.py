@@ -302,7 +302,7 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
     """Return what a term can stand for; nothing for one that is bound inside a condition."""
     if not term.startswith("?"):
         return (term,)
-    kinds = {t.name: t.kind for t in (*behavior.parameters, *behavior.variables)}
+    kinds = behavior.kinds
     return problem.classes.get(kinds.get(term, ""), ())
 
 

@@ -4,7 +4,8 @@ from itertools import permutations
 
 import pytest
 
-from planner.paper.transitions import DomainError, Model
+from planner.language import DomainError
+from planner.paper.transitions import Model
 from reasoner.symbols import (
     AnyOf,
     Behavior,

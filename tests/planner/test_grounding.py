@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from planner.grounded.best_first import plan_level, search
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
-from planner.paper.transitions import DomainError
+from planner.language import DomainError
 from planner.plan import Limits, Reason, Status
 from reasoner.symbols import (
     FALSE,

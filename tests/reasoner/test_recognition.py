@@ -9,9 +9,10 @@ from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
 from ontology import ROOT
+from planner.language import DomainError
 from planner.paper.astar import mismatches
 from planner.paper.hierarchy import plan
-from planner.paper.transitions import DomainError, Model, ground
+from planner.paper.transitions import Model, ground
 from planner.plan import Limits, Status
 from reasoner.generate import families, generate, write_scene
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load

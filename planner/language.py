@@ -1,0 +1,90 @@
+"""What conditions name, need from outside and hold inside: read here by all that search, so that a new kind is added once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from reasoner.symbols import (
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+
+
+class DomainError(ValueError):
+    """A behaviour can't be executed as it is written; the message names it and the term at fault."""
+
+
+def is_variable(term: str) -> bool:
+    """Return whether a term is a parameter or variable, not an individual."""
+    return term.startswith("?")
+
+
+def groups(condition: Condition) -> tuple[tuple[Condition, ...], ...]:
+    """Return the conjunctions inside a condition."""
+    if isinstance(condition, Witness):
+        return (condition.conditions,)
+    return condition.alternatives if isinstance(condition, AnyOf) else ()
+
+
+def walk(condition: Condition) -> Iterator[Condition]:
+    """Yield a condition and all conditions inside it."""
+    yield condition
+    for group in groups(condition):
+        for inner in group:
+            yield from walk(inner)
+
+
+def terms(condition: Condition) -> tuple[str, ...]:
+    """Return the terms of a condition itself, not of those inside it."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            return (*arguments, value)
+        case RelationCondition(_, arguments):
+            return arguments
+        case ClassCondition(term):
+            return (term,)
+        case EqualityCondition(left, right):
+            return (left, right)
+    return ()
+
+
+def mentions(condition: Condition) -> set[str]:
+    """Return all variables of a condition but those that a witness inside it looks for.
+
+    >>> sorted(mentions(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "?l"),))))
+    ['?l']
+    """
+    found = set(filter(is_variable, terms(condition)))
+    inner = found.union(*(mentions(c) for group in groups(condition) for c in group))
+    return inner - {condition.variable} if isinstance(condition, Witness) else inner
+
+
+def needs(condition: Condition) -> set[str]:
+    """Return the variables that must be bound before a condition can be tested; the rest of what it mentions it determines.
+
+    >>> needs(ValueCondition("LOCATION", ("cup1",), "?l")), needs(ValueCondition("LOCATION", ("cup1",), "?l", True))
+    (set(), {'?l'})
+    """
+    if isinstance(condition, ValueCondition) and not condition.negated:
+        return set(filter(is_variable, condition.arguments))
+    if not isinstance(condition, Witness | AnyOf):
+        return mentions(condition)
+    own = {condition.variable} if isinstance(condition, Witness) else set()
+    return {term for group in groups(condition) for term in _unbound(group)} - own
+
+
+def _unbound(group: Sequence[Condition]) -> set[str]:
+    """Return what a conjunction needs from outside: what its own value conditions determine is left out."""
+    determined = {c.value for c in group if isinstance(c, ValueCondition) and not c.negated}
+    return {term for c in group for term in needs(c)} - determined
+
+
+def nothing_determines(where: str, waiting: Sequence[Condition], bound: set[str]) -> DomainError:
+    """Return the error to raise where none of the conditions of a behaviour can be tested next."""
+    unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
+    return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")
