@@ -2,7 +2,8 @@
 #   make demo     the main job: plan, verify in physics, learn, report
 #   make test     every test
 #   make check    what a change must pass: lint, format, types, tests
-#   make bench    the measurements that the documentation quotes
+#   make bench    measure all figures of the documentation anew, for hours
+#   make figures  the quick ones of them: lengths, counts, ratios
 #   make fuzz     100,000 broken inputs at every door, going on where the last run ended
 #   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
 #   make clean    remove .venv, caches and results
@@ -17,7 +18,7 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test check bench fuzz lock clean
+.PHONY: help demo test check bench figures fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -38,7 +39,10 @@ fuzz: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.fuzz
 
 bench: $(VENV)/installed-bench
-	@$(BIN)/python -m benchmarks
+	@$(BIN)/python -m benchmarks.figures all
+
+figures: $(VENV)/installed
+	@$(BIN)/python -m benchmarks.figures quick
 
 # An interpreter counts only if it makes a virtual environment here: some shims and system Pythons cannot.
 $(VENV)/bin/python:

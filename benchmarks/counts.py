@@ -1,0 +1,69 @@
+"""What the planners do, in counts that are the same on every machine: lengths, expansions, fallbacks; CPU seconds beside.
+
+python -m benchmarks counts
+CONFAB_COUNTS=worlds …       some of: families, worlds
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+import confab
+from ontology import scenes
+from planner.plan import Outcome
+from reasoner.generate import write_scene
+from reasoner.symbols import Problem
+
+FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
+SIZES, SEED, SECONDS, REPEATS = (4, 10, 20, 50), 100, 60.0, 3
+
+
+def main() -> None:
+    """Print the tables."""
+    for name in os.environ.get("CONFAB_COUNTS", "families,worlds").split(","):
+        print(flush=True)
+        {"families": families, "worlds": worlds}[name]()
+
+
+def families() -> None:
+    """Plan tables of all families, each once for the counts and some times for the seconds."""
+    print("| family | n | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
+    print("|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for family in FAMILIES:
+            for n in SIZES:
+                path = Path(folder) / f"{family}-{n}.ttl"
+                write_scene(path, family, n, 2, 0, SEED)
+                print(f"| {family} | {n} | {measured(str(path))} |", flush=True)
+
+
+def worlds() -> None:
+    """Plan the shipped worlds of `docs/worlds.md`."""
+    print("| scene | status | steps per level | expansions per level | fallbacks | CPU s of `scene.plan()` |")
+    print("|---|---|---|---|---|---|")
+    for small in sorted(name for name in scenes() if name.endswith("-small")):
+        for name in (small, small.replace("-small", "-large")):
+            print(f"| {name} | {measured(name)} |", flush=True)
+
+
+def measured(source: str) -> str:
+    """Return the cells of one scene, each run with the scene loaded anew."""
+    seconds = []
+    for _ in range(REPEATS):
+        scene = confab.load(source)
+        begin = process_time()
+        result = scene.plan(time_limit=SECONDS)
+        seconds.append(process_time() - begin)
+    return f"{row(result.problem, result.outcome)} | {median(seconds):.2f}"
+
+
+def row(problem: Problem, outcome: Outcome) -> str:
+    """Return status, steps and expansions of each level, and fallbacks."""
+    steps = outcome.plan.length if outcome.plan else {}
+    lengths = " / ".join(str(steps.get(level, 0)) for level in problem.domain.levels) if outcome.plan else "–"
+    expanded = " / ".join(str(count.expanded) for _, count in sorted(outcome.search.items())) or "–"
+    return f"{outcome.status.value} | {lengths} | {expanded} | {outcome.fallbacks}"
