@@ -155,19 +155,15 @@ class ValueEffect:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter (enumerated by quantification) or variable (determined by the state) with the class of its values.
-
-    `role` is the name under which a skill of `sim/` receives it, if it does.
-    """
+    """A parameter (enumerated by quantification) or variable (determined by the state) with the class of its values."""
 
     name: str
     kind: str
-    role: str | None = None
 
 
 @dataclass(frozen=True)
 class Behavior:
-    """A lifted behaviour. `skill` names what executes it, on the primitive level.
+    """A lifted behaviour.
 
     Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
     binding makes both false and true is true, as in PDDL.
@@ -180,7 +176,6 @@ class Behavior:
     preconditions: tuple[Condition, ...] = ()
     effects: tuple[ValueEffect, ...] = ()
     cost: float = 1.0
-    skill: str | None = None
 
     def __post_init__(self) -> None:
         """Put the effects in order."""

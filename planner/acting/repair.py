@@ -398,4 +398,4 @@ def _last_steps(call: Call) -> set[int]:
 
 def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
     deadline = None if limits.seconds is None else perf_counter() + limits.seconds
-    return Call(problem, using, deadline, None, limits.expansions)
+    return Call(problem, using, deadline, limits.expansions)

@@ -241,7 +241,7 @@ def refined(
 ) -> Outcome | None:
     """Refine the stream's solution down to primitives and shorten it; None if a step can't be, which is then forbidden there."""
     assert stream.solution is not None
-    call = fast.Call(problem, using, deadline, None, most)
+    call = fast.Call(problem, using, deadline, most)
     first = problem.domain.levels[0]
     for position, (name, arguments) in enumerate(stream.solution):
         step = call.refiner.do(first, name, arguments)

@@ -126,33 +126,6 @@ class Program:
                     index.setdefault(individual, []).append(row)
         return found
 
-    @cached_property
-    def ids(self) -> Mapping[str, tuple[int, tuple[tuple[Mapping[str, int], int], ...]]]:
-        """For each behaviour its first ID, and for each parameter the ranks of its individuals and their number."""
-        found = {}
-        ranks: dict[str, tuple[dict[str, int], int]] = {}
-        for level in self.levels:
-            first = self.domain.first_ids.get(level, 0)
-            for behavior in self.domain.at_level(level):
-                size, columns = 1, []
-                for parameter in behavior.parameters:
-                    if parameter.kind not in ranks:
-                        members = self.problem.classes.get(parameter.kind, ())
-                        ranks[parameter.kind] = ({member: i for i, member in enumerate(members)}, len(members))
-                    columns.append(ranks[parameter.kind])
-                    size *= ranks[parameter.kind][1]
-                found[behavior.name] = (first, tuple(columns))
-                first += size
-        return found
-
-    def id_of(self, behavior: str, arguments: Arguments) -> int:
-        """Return the ID of a quantified behaviour; `Problem.id_of` in time independent of the number of individuals."""
-        first, columns = self.ids[behavior]
-        rank = 0
-        for (ranks, size), argument in zip(columns, arguments, strict=True):
-            rank = rank * size + ranks[argument]
-        return first + rank
-
     # ---------------------------------------------------------------------------------------------------------- source
 
     def _module(self) -> Iterator[str]:

@@ -27,7 +27,7 @@ from planner.grounded.state_space import TooLargeError
 from planner.hierarchical.postoptimization import Improver, length
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled, exhaust
-from planner.hierarchical.subplans import Advice, LimitError, Watch, nobody
+from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.hierarchical.unsolvability import contested, unattainable
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status
@@ -50,7 +50,6 @@ STATES_PER_EXPANSION = 20
 def plan(
     problem: Problem,
     *,
-    advice: Advice | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
     improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
@@ -62,8 +61,6 @@ def plan(
     Parameters
     ----------
     problem : Problem
-    advice : Advice, optional
-        Orders what could be done; without it the order is that of goals, behaviours and individuals.
     limits : Limits
     improve : int
         How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
@@ -80,7 +77,7 @@ def plan(
     Outcome
     """
     with paused_collection():
-        return _plan(problem, advice, limits, improve, using, watch, leave_levels)
+        return _plan(problem, limits, improve, using, watch, leave_levels)
 
 
 @contextmanager
@@ -97,7 +94,6 @@ def paused_collection() -> Iterator[None]:
 
 def _plan(
     problem: Problem,
-    advice: Advice | None,
     limits: Limits,
     improve: int,
     using: Compiled | None,
@@ -106,7 +102,7 @@ def _plan(
 ) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
-    call = Call(problem, using or compiled(problem), deadline, advice, limits.expansions)
+    call = Call(problem, using or compiled(problem), deadline, limits.expansions)
     call.segments.watch = watch
     if not leave_levels:
         call.ladder = [(level, attempt) for level, attempt in call.ladder if level == call.program.levels[0]]
@@ -165,7 +161,7 @@ def reordered(call: Call) -> list[RefinedStep]:
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
-        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, None, call.segments.expanded)
+        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.expanded)
         other.proved = True  # there is a plan
         other.ladder = [(level, attempt) for level, attempt in other.ladder if level == first]
         with suppress(LimitError):

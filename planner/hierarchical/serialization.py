@@ -25,7 +25,7 @@ from planner.grounded.unreachable import unreachable
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
 from planner.hierarchical.state import Cell, Table, arguments_of, key_of
-from planner.hierarchical.subplans import Advice, Effort, LimitError, Segments
+from planner.hierarchical.subplans import Effort, LimitError, Segments
 from planner.hierarchical.subproblem import Width
 from planner.plan import Outcome, Plan, Reason, Status, Step
 from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
@@ -109,15 +109,13 @@ def compiled(problem: Problem) -> Compiled:
 class Call:
     """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
 
-    def __init__(
-        self, problem: Problem, using: Compiled, deadline: float | None, advice: Advice | None, most: int
-    ) -> None:
+    def __init__(self, problem: Problem, using: Compiled, deadline: float | None, most: int) -> None:
         self.problem = problem
         self.using = using
         self.program = using.program
         self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
         self.table = Table(problem.domain.situations, problem.initial)
-        self.segments = Segments(self.program, self.table, self.goal, deadline, advice, most)
+        self.segments = Segments(self.program, self.table, self.goal, deadline, most)
         self.refiner = Refiner(self.segments, using.templates)
         self.refiner.use_templates = using.replay
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
@@ -366,7 +364,7 @@ class Call:
 
     def tree(self) -> Plan:
         """Return the steps done as a plan."""
-        id_of, variables = self.program.id_of, self.program.variables
+        id_of, variables = self.program.problem.id_of, self.program.variables
 
         def step(done: RefinedStep, path: tuple[int, ...]) -> Step:
             level, name, arguments, bindings, below = done

@@ -14,7 +14,7 @@ what is too long for that, is left to a search over a small world (`planner.hier
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -30,8 +30,6 @@ Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
 """A quantified behaviour, and the changes since the segment began after which it is forbidden."""
-Advice: TypeAlias = "Callable[[int, Table, Sequence[Ground]], Sequence[Ground]]"
-"""Orders what could be done, given the level and the state; may leave nothing out."""
 Watch: TypeAlias = "Callable[[int | None], object]"
 """Told the level of each expansion, and `None` before what costs most begins."""
 
@@ -71,7 +69,6 @@ class Segments:
         The task's goal, which proposes values.
     deadline : float, optional
         `perf_counter` at which `LimitError` is raised.
-    advice : Advice, optional
     watch : Watch, optional
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
@@ -81,7 +78,6 @@ class Segments:
     table: Table
     goal: Mapping[Cell, str]
     deadline: float | None = None
-    advice: Advice | None = None
     most: int = 200_000
     watch: Watch = nobody
     counts: dict[int, Counts] = field(default_factory=dict)
@@ -131,7 +127,7 @@ class Segments:
             left -= 1
             self.expand(level)
             mark = len(table.trail)
-            for ground in self.ordered(level, off, depth):
+            for ground in self.relevant(level, off, depth):
                 if forbidden and (ground, here) in forbidden:
                     continue
                 counts.generated += 1
@@ -232,11 +228,6 @@ class Segments:
             argument in self.program.members.get(of, ())
             for argument, of in zip(arguments_of(key), kind.arguments, strict=True)  # type: ignore[arg-type]
         )
-
-    def ordered(self, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground] | Sequence[Ground]:
-        """Return the relevant behaviours, in the order that advice gives them if there is any."""
-        found = self.relevant(level, off, depth)
-        return found if self.advice is None else self.advice(level, self.table, list(found))
 
     def relevant(self, level: int, off: Mapping[Cell, str], depth: int) -> Iterator[Ground]:
         """Yield each applicable behaviour that starts a chain of at most `depth` towards a symbol that is off, once."""

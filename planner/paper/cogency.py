@@ -17,12 +17,11 @@ from reasoner.symbols import Problem, State, Symbol
 
 @dataclass(frozen=True)
 class PaperConstants:
-    """The constants of eqs. (2) and (5), and what is ranked: all M behaviours or the applicable ones."""
+    """The constants of eqs. (2) and (5)."""
 
     k: float = 3.0
     anticipated_length: int = 100  # N; the paper gives no value, and one near the plan's length does harm
     learning: float = 0.1  # λ
-    rank_among: str = "all"  # or "applicable"
 
     def bonus(self, c_m: float, n: int) -> float:
         """Return the term c of eq. (5): ``(c_m - 1) k w`` with ``w = max(1 - n/N, 0)``."""

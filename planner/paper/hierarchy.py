@@ -249,13 +249,8 @@ def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], flo
     def of_state(values: Values) -> Callable[[Applied], float]:
         if not learned:
             return lambda applied: 1.0 / len(conclusions)  # all tie for the first rank
-        among = conclusions
-        if call.constants.rank_among == "applicable":
-            among = [
-                (a.ground.behavior, a.ground.arguments) for a in call.model.successors(call.grounds[level], values)
-            ]
         problem = call.model.problem
-        ranks = ranking(cogencies(call.links, among, call.model.state(values), problem, level))
+        ranks = ranking(cogencies(call.links, conclusions, call.model.state(values), problem, level))
         return lambda applied: ranks[applied.ground.behavior, applied.ground.arguments]
 
     return of_state

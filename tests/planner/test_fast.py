@@ -207,15 +207,6 @@ def test_what_was_compiled_and_learned_serves_another_goal() -> None:
     assert outcome.search[3].expanded == 0
 
 
-def test_advice_changes_the_order_and_never_the_answer() -> None:
-    for seed in range(40_000, 40_020):
-        problem = random_table(seed)
-        backwards = plan(problem, advice=lambda level, table, found: list(found)[::-1])
-        assert backwards.status is plan(problem).status, seed
-        if backwards.plan is not None:
-            assert validate(problem, backwards.plan) == [], seed
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_a_domain_with_booleans_disjunction_and_keys_is_planned(seed: int) -> None:
     problem = rooms(6, seed)
