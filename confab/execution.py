@@ -14,9 +14,9 @@ from confab.interchange import step_json
 from planner.acting.episode import Change, End, Episode, Intervention, World
 from planner.acting.executive import Moment, Patience, act
 from planner.acting.failure_memory import Caution
-from planner.acting.repair import Planner, renumbered
+from planner.acting.repair import Planner
 from planner.acting.symbolic_world import SymbolicWorld
-from planner.plan import Plan, Step
+from planner.plan import Plan, Step, renumbered
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.links import Links
 from reasoner.names import nearest

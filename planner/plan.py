@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from reasoner.symbols import Condition, Fact, State
@@ -162,3 +162,11 @@ class Limits:
 def changed(before: State, after: State) -> list[Fact]:
     """Return the facts of `after` that `before` doesn't have, in order."""
     return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)
+
+
+def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
+    """Return steps with their paths counted from `first` on."""
+    return tuple(
+        replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
+        for i, step in enumerate(steps, first)
+    )

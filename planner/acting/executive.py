@@ -32,11 +32,11 @@ from planner.acting.episode import (
     WorldError,
 )
 from planner.acting.failure_memory import Caution, Static, without_relations
-from planner.acting.repair import Planner, difference, mend, renumbered, replan, vanished
+from planner.acting.repair import Planner, difference, mend, replan, vanished
 from planner.acting.symbolic_world import with_individual
 from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
+from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from planner.validation import successor
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 

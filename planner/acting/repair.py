@@ -23,7 +23,7 @@ from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableE
 from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Effort, LimitError
 from planner.hierarchical.unsolvability import unattainable
-from planner.plan import Limits, Outcome, Plan, Reason, Status, Step
+from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)
@@ -227,14 +227,6 @@ def cost(problem: Problem, steps: Iterable[Step]) -> float:
     """Return what the primitives of some steps cost."""
     behaviors = problem.domain.behaviors
     return sum(behaviors[step.behavior].cost for step in Plan(tuple(steps)).primitives)
-
-
-def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
-    """Return steps with their paths counted from `first` on."""
-    return tuple(
-        replace(step, path=(*above, i), steps=renumbered(step.steps, 0, (*above, i)))
-        for i, step in enumerate(steps, first)
-    )
 
 
 # -------------------------------------------------------------------------------------------------------------- replaying

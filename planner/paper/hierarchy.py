@@ -17,7 +17,7 @@ from typing import TypeAlias
 from planner.paper.astar import Found, Goal, a_star, mismatches
 from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step
+from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from reasoner.memory.links import Links
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -256,16 +256,9 @@ def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], flo
     return of_state
 
 
-def _numbered(steps: Iterable[Step], above: tuple[int, ...] = ()) -> Iterable[Step]:
-    """Yield the steps with their paths filled in."""
-    for position, step in enumerate(steps):
-        path = (*above, position)
-        yield replace(step, path=path, steps=tuple(_numbered(step.steps, path)))
-
-
 def _outcome(call: Call, steps: list[Step] | None, seconds: float) -> Outcome:
     if steps is not None:
-        return Outcome(Status.SOLVED, Plan(tuple(_numbered(steps))), None, call.counts, call.fallbacks, seconds)
+        return Outcome(Status.SOLVED, Plan(renumbered(steps)), None, call.counts, call.fallbacks, seconds)
     limits, levels = call.limits, tuple(call.grounds)
     if call.gave_up:
         seconds_too = f" or {limits.seconds} s" if limits.seconds else ""
