@@ -31,14 +31,12 @@ from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.hierarchical.unsolvability import contested, unattainable
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status
-from reasoner.symbols import FALSE, Problem
+from reasoner.symbols import Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
-DETOURS = 1.25
-"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 FIRST_TURN = 2_000
@@ -139,11 +137,15 @@ def _plan(
 
 def shorten(call: Call, improve: int, leave_levels: bool) -> None:
     """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
+    improver = Improver(call.refiner, call.using.shapes, improve)
+    if not improver.promising(call.steps):
+        return
     first, call.steps = call.steps, reordered(call)
     if not leave_levels:
         return
-    before, left = call.steps, improve if call.steps is first else (improve + 1) // 2
-    call.steps = Improver(call.refiner, call.using.shapes, left).improve(before)
+    before = call.steps
+    improver.clusters_left = improve if before is first else (improve + 1) // 2
+    call.steps = improver.improve(before)
     if call.steps is not before and any(left.broken for left in levels_left(call.problem, call.tree())):
         call.steps = before
 
@@ -151,12 +153,9 @@ def shorten(call: Call, improve: int, leave_levels: bool) -> None:
 def reordered(call: Call) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
-    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is tried
-    uses the most abstract level alone and expands no more nodes than the call did.
+    Which goal comes first decides what has to be put aside. What is tried uses the most abstract level alone and expands no more
+    nodes than the call did.
     """
-    unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
-    if len(call.steps) <= DETOURS * unmet or len(call.program.levels) < 2:
-        return call.steps
     best = call.steps
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))

@@ -23,6 +23,8 @@ from planner.hierarchical.subplans import Ground, LimitError
 from planner.hierarchical.subproblem import FEW, problem_of
 from reasoner.symbols import Domain, Problem, Symbol, ValueCondition
 
+PER_PRIMITIVE = 3
+"""So many steps of the most abstract level are given up for a primitive less, at most: they say what the primitives are for."""
 REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
 LARGEST = 7
@@ -39,6 +41,12 @@ WHOLE_BITS, WHOLE_STATES = 48, 20_000
 def length(steps: Sequence[RefinedStep], level: int | None = None) -> int:
     """Return the number of primitives, or of steps at a level."""
     return sum(length(step[4], level) if step[4] and step[0] != level else 1 for step in steps)
+
+
+def worth_it(old: Sequence[RefinedStep], new: Sequence[RefinedStep]) -> bool:
+    """Whether new steps are shorter by enough for the steps of the most abstract level that they give up."""
+    given_up = [sum(step.level == min(s.level for s in old) for step in steps) for steps in (old, new)]
+    return length(old) - length(new) > max(given_up[0] - given_up[1], 0) / PER_PRIMITIVE
 
 
 @dataclass(frozen=True)
@@ -92,24 +100,27 @@ class Improver:
     def improve(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
         """Return steps to the same end, no longer than these; the table is left in the initial state."""
         best = list(steps)
-        if len(self.segments.program.levels) < 2:
-            return best
         self.table.undo(0)
-        concerns = self._concerns(best)
-        self.table.undo(0)
-        if concerns is None or not put_aside(concerns):
-            return best
         anew = self.whole(best)
         self.table.undo(0)
         if anew is not None:
-            return anew if length(anew) < length(best) else best
+            return anew if worth_it(best, anew) else best
         self.work = min(self.work, WORK * self.clusters_left)
         for shorten in (self.clusters, self.detours):
             found = shorten(best)
             self.table.undo(0)
-            if length(found) < length(best):
+            if worth_it(best, found):
                 best = found
         return best
+
+    def promising(self, steps: Sequence[RefinedStep]) -> bool:
+        """Whether steps put something aside, without which they can hardly be shorter; the table is left in the initial state."""
+        if len(self.segments.program.levels) < 2:
+            return False
+        self.table.undo(0)
+        concerns = self._concerns(steps)
+        self.table.undo(0)
+        return concerns is not None and put_aside(concerns)
 
     # ------------------------------------------------------------------------------------------------------------ whole
 

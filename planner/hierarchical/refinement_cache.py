@@ -25,6 +25,8 @@ WHOLE = Width(None, 1, 1_500_000)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""
+LONG = 4
+"""From so many steps on, and wherever something may be left as it comes to be, a template may do here what isn't needed here."""
 TEMPLATES, CHOICES, ATTEMPTS = 6, 24, 40
 """Templates kept of a behaviour, ways to fill the open roles of one, and searches for steps that can all be refined."""
 
@@ -79,6 +81,9 @@ class Refiner:
         self.hits = 0
         self.misses = 0
         self.use_templates = True
+        changed = {effect.situation for b in segments.program.domain.behaviors.values() for effect in b.effects}
+        situations = segments.program.domain.situations.values()
+        self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.failed: dict[Ground, list[list[tuple[Cell, str]]]] = {}
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
@@ -171,9 +176,8 @@ class Refiner:
         for width in self.widths(below):
             found = found or self.achieve(below, targets, keep, individuals, width)
         if found is None:
-            around = problem_of(
-                self.segments, below, None if width is WHOLE else focus(self.segments, below, targets, NEAR)
-            )
+            whole = width.questions is None
+            around = problem_of(self.segments, below, None if whole else focus(self.segments, below, targets, width))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
             self.failed.setdefault((name, arguments), []).append(facts)
             return None
@@ -295,7 +299,42 @@ class Refiner:
         if self.left_as_it_must(mark, targets, keep) is not None:
             self.table.undo(mark)
             return None
+        if template.open and (self.drifting or len(steps) >= LONG):
+            return self.lean(tuple(steps), mark, targets, keep)
         return tuple(steps)
+
+    def lean(
+        self, steps: tuple[RefinedStep, ...], mark: int, targets: Mapping[Cell, str], keep: Keep
+    ) -> tuple[RefinedStep, ...]:
+        """Do steps, done since a mark, without those that nothing here needs: alone, or with the step that undoes them."""
+        for dropped in self._droppable(steps, mark, keep):
+            rest = [step for i, step in enumerate(steps) if i not in dropped]
+            if self._redone(rest, mark) and self.left_as_it_must(mark, targets, keep) is None:
+                return self.lean(tuple(rest), mark, targets, keep)
+        self._redone(steps, mark)
+        return steps
+
+    def _redone(self, steps: Sequence[RefinedStep], mark: int) -> bool:
+        """Do steps in place of what was done since a mark; whether all could be done."""
+        self.table.undo(mark)
+        return all(self.again(step) is not None for step in steps)
+
+    def _droppable(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
+        """Return single steps that change only what may be anything in the end, and pairs of which one undoes the other."""
+        self.table.undo(mark)
+        changes: list[tuple[dict[Cell, str], dict[Cell, str]]] = []
+        for step in steps:
+            before = len(self.table.trail)
+            self.again(step)
+            after = self.table.since(before)
+            old: dict[Cell, str] = {}
+            for situation, key, value in self.table.trail[before:]:
+                old.setdefault((situation, key), value)
+            changes.append(({cell: old[cell] for cell in after}, after))
+        alone = [
+            {i} for i, (old, _) in enumerate(changes) if all(keep(cell, value) is None for cell, value in old.items())
+        ]
+        return alone + [{i, j} for j, (old, new) in enumerate(changes) for i in range(j) if changes[i] == (new, old)]
 
     def template(self, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Template:
         """Return steps with individuals replaced by their places among those given, and by open roles."""

@@ -36,7 +36,7 @@ FEW_OPERATORS, FEW_STATES = 300, 30_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
 MOST_TOGETHER = 20_000
 """The largest level, in quantified behaviours, on which all goals are searched at once."""
-ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 500_000)
+ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 100_000)
 """All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
 Attempt: TypeAlias = "Effort | Width"
 COSTLY = 4
