@@ -42,7 +42,7 @@ from reasoner.memory.counts_file import load, save
 from reasoner.memory.links import Links
 from reasoner.names import Names
 from reasoner.symbols import Problem
-from tests.planner.lessons import problem, recognised, teach
+from worlds.lessons import problem, recognised, teach
 
 TRAINING = ("served", "swap", "rotate", "full", "handover", "blocked", "random")
 FAMILIES = TRAINING[:-1]
@@ -343,7 +343,7 @@ def files(links: int = 100_000, kills: int = 100) -> None:
 OPEN = """
 import sys, time, resource
 from pathlib import Path
-from tests.ontology.owlapi import jars, jvm, places
+from worlds.owlapi import jars, jvm, places
 import jpype, jpype.imports
 jpype.startJVM(jvm(), "-Xss16m", "-Xmx3g", "-Dorg.slf4j.simpleLogger.defaultLogLevel=off", classpath=jars())
 from java.io import File

@@ -35,7 +35,6 @@ from typing import Any
 
 from benchmarks._beside import beside_peers, optimal_costs
 from benchmarks.pddl import peers
-from benchmarks.truth import TooManyError, World
 from planner.experience import portfolio as guided
 from planner.experience.portfolio import Memory
 from planner.grounded.best_first import plan_level
@@ -49,10 +48,11 @@ from reasoner.graph.knowledge import load
 from reasoner.memory.counts import Experience
 from reasoner.reading.problem import read
 from reasoner.symbols import Domain, Problem
-from tests.planner.families import family as packed
-from tests.planner.families import random_table
-from tests.planner.lessons import problem as lesson
-from tests.planner.lessons import teach
+from worlds.families import family as packed
+from worlds.families import random_table
+from worlds.lessons import problem as lesson
+from worlds.lessons import teach
+from worlds.truth import TooManyError, World
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SEED, TABLES = 100, int(os.environ.get("CONFAB_SEEDS", "3_000_000"))
@@ -272,7 +272,7 @@ def at_least(problem: Problem) -> int:
 
 
 def random_tables() -> None:
-    """Plan random tables of 10³ to 10⁶ reachable states, against all of them (`benchmarks.truth`).
+    """Plan random tables of 10³ to 10⁶ reachable states, against all of them (`worlds.truth`).
 
     With `CONFAB_ROWS=FILE` each table's row is written there as it comes, and those that are there already aren't done again.
     """

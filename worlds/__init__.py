@@ -1,1 +1,1 @@
-"""Random worlds as values, for tests and benchmarks alike."""
+"""What tests and benchmarks both need: worlds as values, the truth about them, and programs to hold ours against."""

@@ -10,7 +10,7 @@ from planner.experience.choice_points import Field, Ground
 from planner.experience.scoring import Judge
 from planner.hierarchical.operators import Program
 from reasoner.graph.knowledge import KnowledgeError
-from tests.planner.lessons import taught
+from worlds.lessons import taught
 
 STEPS: list[Ground] = [("B1_MOVE", ("cup1", "location7"))]
 AGAINST: Ground = ("B1_POUR", ("bottle1", "cup1"))

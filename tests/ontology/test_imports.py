@@ -9,7 +9,7 @@ import ontology
 from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.names import local_name
 from tests.ontology.faults import skeleton
-from tests.ontology.owlapi import ontology_iri
+from worlds.owlapi import ontology_iri
 
 TEMPLATES = ("families", "shapes", "skeleton")
 """Folders of files that aren't ontologies to load: patterns of scenes, SHACL, and what `confab new` fills in."""

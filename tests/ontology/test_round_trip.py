@@ -12,9 +12,9 @@ import confab
 import ontology
 from reasoner.generate import write_scene
 from reasoner.reading.observed import save_observed
-from tests.ontology import owlapi
 from tests.ontology.faults import WITH_BODIES, skeleton
 from tests.ontology.test_imports import TEMPLATES
+from worlds import owlapi
 
 pytestmark = [
     pytest.mark.slow,
@@ -34,7 +34,7 @@ def canonical(file: Path) -> ox.Dataset:
 def through_the_owl_api(files: list[Path], target: Path) -> dict[str, list[str]]:
     """Save what the OWL API makes of some files into a folder; return each file's violations of OWL 2 DL."""
     target.mkdir()
-    command = [sys.executable, "-m", "tests.ontology.owlapi", str(target), *map(str, files)]
+    command = [sys.executable, "-m", "worlds.owlapi", str(target), *map(str, files)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert done.returncode == 0, done.stderr
     found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])

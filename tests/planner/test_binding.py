@@ -11,7 +11,7 @@ from planner.hierarchical.planner import plan
 from planner.plan import Plan
 from planner.validation import successor, validate
 from reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition
-from tests.planner.families import family, tabletop
+from worlds.families import family, tabletop
 
 
 def filled_and_moved(problem: Problem, found: Plan) -> list[str]:

@@ -11,7 +11,6 @@ from time import perf_counter
 
 import pytest
 
-from benchmarks.truth import TooManyError, World
 from planner.grounded.state_space import Space, TooLargeError
 from planner.hierarchical import bounds as optimal
 from planner.hierarchical.planner import compiled, plan
@@ -19,8 +18,9 @@ from planner.paper.transitions import Model, ground
 from planner.plan import Limits, Status
 from planner.validation import validate
 from reasoner.symbols import Problem, Symbol
-from tests.planner.families import FAMILIES, family, random_table, table, tabletop
-from tests.planner.rooms import rooms
+from worlds.families import FAMILIES, family, random_table, table, tabletop
+from worlds.rooms import rooms
+from worlds.truth import TooManyError, World
 
 EASY = [name for name in FAMILIES if name != "packed"]
 
@@ -182,7 +182,7 @@ def test_put_down_and_picked_up_again_is_dropped() -> None:
 
 def test_the_same_input_gives_the_same_plan_in_any_process() -> None:
     code = (
-        "from tests.planner.families import family\nfrom planner.hierarchical.planner import plan\n"
+        "from worlds.families import family\nfrom planner.hierarchical.planner import plan\n"
         "for f in ('served', 'full', 'blocked'):\n"
         "    print([(str(s), sorted(s.bindings.items())) for s in plan(family(f, 12)).plan.walk()])"
     )

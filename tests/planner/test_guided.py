@@ -16,7 +16,7 @@ from planner.plan import Outcome, Status
 from planner.validation import validate
 from reasoner.memory.counts import Candidate, Decision, Experience, Tally
 from reasoner.symbols import Problem, Symbol
-from tests.planner.lessons import problem, taught, teach
+from worlds.lessons import problem, taught, teach
 
 TRAINING = "served", "swap", "rotate", "full", "handover", "blocked"
 

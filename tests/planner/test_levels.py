@@ -13,9 +13,9 @@ from planner.plan import Outcome, Plan, Status
 from planner.validation import successor, validate
 from reasoner.symbols import FALSE, Problem, Symbol
 from tests.planner import naive
-from tests.planner.families import tabletop
 from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable
+from worlds.families import tabletop
 from worlds.hierarchies import hierarchy, states
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper, "default": default}

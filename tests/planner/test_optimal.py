@@ -13,7 +13,7 @@ from planner.hierarchical import bounds as optimal
 from planner.hierarchical.bounds import a_star, lm_cut
 from planner.plan import Counts, Limits, Reason, Status
 from planner.validation import validate
-from tests.planner.families import family, random_table
+from worlds.families import family, random_table
 
 
 @pytest.mark.parametrize("part", range(2))

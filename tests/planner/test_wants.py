@@ -8,8 +8,8 @@ from planner.experience.choice_points import Field
 from planner.hierarchical.operators import Program
 from planner.hierarchical.subgoals import Env, Wants
 from reasoner.symbols import Condition, Problem
-from tests.planner.families import family, random_table
-from tests.planner.rooms import rooms
+from worlds.families import family, random_table
+from worlds.rooms import rooms
 
 CASES = [("served", family("served", 6)), ("full", family("full", 6)), ("handover", family("handover", 8))]
 CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_006)] + [("rooms", rooms(6, 1))]

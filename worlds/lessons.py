@@ -20,10 +20,12 @@ from reasoner.symbols import Problem
 
 
 def as_it_is(text: str) -> str:
+    """Change nothing."""
     return text
 
 
 def reading_of(text: str) -> Reading:
+    """Return what a scene written as Turtle says."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.ttl"
         path.write_text(text)
