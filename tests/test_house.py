@@ -4,13 +4,24 @@ import ast
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ["ontology", "reasoner", "planner", "sim", "confab"]  # left to right
+SUBROOMS = {  # of the planner: what each may import beside itself; plan, validation, language and levels all may
+    "paper": set[str](),
+    "grounded": set[str](),
+    "hierarchical": {"grounded"},
+    "experience": {"hierarchical", "paper"},
+    "acting": {"hierarchical"},
+}
+OPEN_CYCLES = [  # what still imports each other: a world and its skills, a scene and what can be done with it
+    {"confab.execution", "confab.memory", "confab.physics", "confab.scene"},
+    {"sim.attempt", "sim.perception", "sim.pouring", "sim.skills", "sim.world"},
+]
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 
 
@@ -77,6 +88,95 @@ def test_imports_to_the_left_and_within_a_room_are_allowed(tmp_path: Path) -> No
     source = "import ontology\nfrom reasoner.symbols import Symbol\nfrom . import sim\nfrom planner.grounded.task import Task\n"
     (tmp_path / "planner" / "fine.py").write_text(source)
     assert violations(tmp_path) == []
+
+
+def imports(root: Path, folders: Sequence[str]) -> dict[str, set[str]]:
+    """Return for each module below some folders those that it imports, inside functions and for type checking included."""
+    paths = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
+    modules = {".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
+    found: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        names: set[str] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                whole = {f"{node.module}.{alias.name}" for alias in node.names}
+                names |= (whole & modules.keys()) or {node.module}
+        found[module] = names & modules.keys() - {module}
+    return found
+
+
+def cycles(graph: Mapping[str, set[str]]) -> list[set[str]]:
+    """Return the sets of modules that import each other, directly or through others."""
+    reached: dict[str, set[str]] = {}
+    for module in graph:
+        waiting, seen = [*graph[module]], set[str]()
+        while waiting:
+            if (other := waiting.pop()) not in seen:
+                seen.add(other)
+                waiting += graph[other]
+        reached[module] = seen
+    found = [{other for other in reached[module] if module in reached[other]} for module in sorted(graph)]
+    return [group for i, group in enumerate(found) if group and group not in found[:i]]
+
+
+def test_no_modules_import_each_other_but_those_that_are_known_to() -> None:
+    assert cycles(imports(ROOT, [*ROOMS, "worlds", "benchmarks"])) == OPEN_CYCLES
+
+
+@pytest.mark.parametrize(
+    "back",
+    ["from planner import one", "def f():\n    import planner.one", "if TYPE_CHECKING:\n    from planner.one import X"],
+)
+def test_a_seeded_cycle_is_found(tmp_path: Path, back: str) -> None:
+    (tmp_path / "planner").mkdir()
+    (tmp_path / "planner" / "one.py").write_text("from planner.two import f\n")
+    (tmp_path / "planner" / "two.py").write_text("import planner.three\n")
+    (tmp_path / "planner" / "three.py").write_text("")
+    assert cycles(imports(tmp_path, ["planner"])) == []
+    (tmp_path / "planner" / "three.py").write_text(back + "\n")
+    assert cycles(imports(tmp_path, ["planner"])) == [{"planner.one", "planner.two", "planner.three"}]
+
+
+def astray(graph: Mapping[str, set[str]]) -> list[str]:
+    """Return the imports from one sub-room of the planner to another that it doesn't build on, or to what is above all."""
+    found = []
+    for module, others in sorted(graph.items()):
+        room = module.split(".")[1] if module.count(".") == 2 else ""
+        for other in sorted(others):
+            to = other.split(".")[1] if "." in other else ""
+            if room in SUBROOMS and to not in {room, "plan", "validation", "language", "levels", *SUBROOMS[room]}:
+                found.append(f"{module} imports {other}")
+    return found
+
+
+def test_sub_rooms_of_the_planner_import_only_what_they_build_on() -> None:
+    assert astray(imports(ROOT, ["planner"])) == []
+    folders = {path.parent.name for path in (ROOT / "planner").glob("*/*.py")}
+    assert folders == SUBROOMS.keys()
+
+
+def test_a_seeded_import_astray_is_found() -> None:
+    graph = imports(ROOT, ["planner"])
+    graph["planner.paper.astar"] = {"planner.hierarchical.state", "planner.plan"}
+    graph["planner.grounded.joins"] = {"planner.hierarchical.state", "planner.solve"}
+    assert astray(graph) == [
+        "planner.grounded.joins imports planner.hierarchical.state",
+        "planner.grounded.joins imports planner.solve",
+        "planner.paper.astar imports planner.hierarchical.state",
+    ]
+
+
+def test_benchmarks_and_shared_worlds_import_no_tests() -> None:
+    paths = [path for folder in ("benchmarks", "worlds") for path in sorted((ROOT / folder).rglob("*.py"))]
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in paths
+        for line, package in imported_packages(ast.parse(path.read_text(encoding="utf-8")))
+        if package == "tests" or (package == "benchmarks" and path.parent.name == "worlds")
+    ]
+    assert wrong == []
 
 
 def run_elsewhere(code: str, directory: Path) -> object:

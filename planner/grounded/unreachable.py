@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.grounded.grounding import Reached
 from planner.grounded.joins import TooLargeError
+from planner.grounded.reachability import Reached
 from planner.grounded.schemas import Atom, Schema
 from planner.grounded.task import Task
 from planner.plan import Reason

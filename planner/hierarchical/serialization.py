@@ -18,8 +18,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from planner.grounded.grounding import OutOfTimeError, Reached, ground
+from planner.grounded.grounding import OutOfTimeError, ground
 from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
+from planner.grounded.reachability import Reached
 from planner.grounded.state_space import Space, TooLargeError
 from planner.grounded.unreachable import unreachable
 from planner.hierarchical.operators import Achiever, Program

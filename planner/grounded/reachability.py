@@ -1,0 +1,456 @@
+"""Relaxed reachability: what becomes true on a level if nothing ever becomes false, by joins in rounds, each from what is new."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from time import perf_counter
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.grounded.joins import Ints, Table, pack
+from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
+from planner.language import mentions
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    SituationType,
+    State,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+
+class OutOfTimeError(Exception):
+    """The deadline came before grounding was done."""
+
+
+class Reached:
+    """The tables of a level, and what becomes reachable in them.
+
+    Attributes
+    ----------
+    tables : mapping of (kind, name) to Table
+        Kind is situation, relation or class; the rows of a situation type are arguments and value (no value if it is
+        boolean, of which only the true ones are listed).
+    rows : list of Ints
+        Per schema, the individuals put in for its terms.
+    """
+
+    def __init__(self, problem: Problem, level: int, initial: State, most: int, deadline: float | None) -> None:
+        self.problem, self.level, self.most, self.deadline = problem, level, most, deadline
+        self.situations = {s.name: s for s in problem.domain.situations.values() if s.level <= level}
+        self.initial = {symbol: value for symbol, value in initial.items() if symbol.situation in self.situations}
+        behaviors = problem.domain.at_level(level)
+        changed = frozenset(effect.situation for behavior in behaviors for effect in behavior.effects)
+        situations, members = problem.domain.situations, problem.members
+        self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
+        self.individuals = tuple(dict.fromkeys(self._individuals()))
+        self.number = {name: i for i, name in enumerate(self.individuals)}
+        self.radix = max(len(self.individuals), 1)
+        self.tables: dict[tuple[str, str], Table] = defaultdict(lambda: Table(1, self.radix))
+        self.symbols: dict[str, Table] = {}
+        self._fill()
+        self.rows: list[Ints] = [np.empty((0, len(schema.terms)), np.int64) for schema in self.schemas]
+
+    def _individuals(self) -> Iterator[str]:
+        for members in self.problem.classes.values():
+            yield from members
+        yield from (TRUE, FALSE)
+        for symbol, value in self.initial.items():
+            yield from (*symbol.arguments, value)
+        for tuples in self.problem.relations.values():
+            for arguments in sorted(tuples):
+                yield from arguments
+        for schema in self.schemas:
+            for atom in schema.atoms:
+                yield from (term for term in atom.terms if not term.startswith("?"))
+            for _, effect in schema.effects:
+                yield from (term for term in (*effect.arguments, effect.value) if not term.startswith("?"))
+
+    def _fill(self) -> None:
+        for kind, members in self.problem.classes.items():
+            self._put(("class", kind), 1, [(name,) for name in members])
+        for relation, tuples in self.problem.relations.items():
+            for arity in sorted({len(arguments) for arguments in tuples}):
+                self._put(("relation", relation), arity, [a for a in tuples if len(a) == arity])
+        by_situation: dict[str, list[tuple[str, ...]]] = {name: [] for name in self.situations}
+        for symbol, value in self.initial.items():
+            if not self.situations[symbol.situation].boolean:
+                by_situation[symbol.situation].append((*symbol.arguments, value))
+            elif value == TRUE:
+                by_situation[symbol.situation].append(symbol.arguments)
+        for name, facts in by_situation.items():
+            situation = self.situations[name]
+            arity = len(situation.arguments) + (not situation.boolean)
+            self._put(("situation", name), arity, facts)
+            if not situation.boolean:
+                self.symbols[name] = Table(arity - 1, self.radix)
+                self.symbols[name].add(self.tables["situation", name].rows[:, :-1])
+
+    def _put(self, key: tuple[str, str], arity: int, rows: Sequence[tuple[str, ...]]) -> None:
+        number = self.number
+        table = self.tables[key] = Table(arity, self.radix)
+        flat = [number[name] for row in rows for name in row]
+        table.add(np.array(flat, np.int64).reshape(len(rows), arity))
+
+    def close(self) -> None:
+        """Join every schema with what is new, until nothing is."""
+        fluents = [("situation", name) for name in self.situations]
+        before = dict.fromkeys(fluents, 0)
+        found: list[list[Ints]] = [[] for _ in self.schemas]
+        first = True
+        while True:
+            size = {key: len(self.tables[key]) for key in fluents}
+            candidates: dict[tuple[str, str], list[Ints]] = defaultdict(list)
+            for i, schema in enumerate(self.schemas):
+                for rows in self._new_rows(schema, before, size, first):
+                    found[i].append(rows)
+                    for _, effect in schema.effects:
+                        if effect.value != FALSE:
+                            candidates["situation", effect.situation].append(self.effect_rows(schema, effect, rows))
+            for key, parts in candidates.items():
+                rows = np.concatenate(parts)
+                self.tables[key].add(rows[self._exists(key[1], rows)])
+            before, first = size, False
+            if all(len(self.tables[key]) == size[key] for key in fluents):
+                break
+        for i, parts in enumerate(found):
+            if parts:
+                rows = np.concatenate(parts)
+                _, unique = np.unique(pack(rows, self.radix), return_index=True)
+                self.rows[i] = rows[unique]
+
+    def _new_rows(
+        self, schema: Schema, before: Mapping[tuple[str, str], int], size: Mapping[tuple[str, str], int], first: bool
+    ) -> Iterator[Ints]:
+        """Yield the schema's rows that use at least one fact of the last round, each combination of facts once."""
+        fluent = [i for i, atom in enumerate(schema.atoms) if atom.fluent]
+        if not fluent and first:
+            yield from self.joined(schema, None, {})
+        for position, start in enumerate(fluent):
+            key = schema.atoms[start].table
+            ranges = {start: (before[key], size[key])}
+            ranges |= {i: (0, before[schema.atoms[i].table]) for i in fluent[:position]}
+            if all(low < high for low, high in ranges.values()):
+                yield from self.joined(schema, start, ranges)
+
+    def joined(
+        self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
+    ) -> Iterator[Ints]:
+        """Yield the rows of a schema's terms, at most once, that match every atom inside its range of rows."""
+        self.check_time()
+        columns: dict[str, Ints] = {}
+        count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
+        while waiting:
+            i = start if start in waiting else min(waiting, key=lambda i: self._fan_out(schema.atoms[i], columns))
+            assert i is not None
+            waiting.remove(i)
+            columns, count = self._step(schema.atoms[i], columns, count, (ranges or {}).get(i))
+            ready = [f for f in filters if self._variables(f, schema) <= columns.keys()]
+            filters = [f for f in filters if f not in ready]
+            for condition in ready:
+                keep = self._decide(condition, columns, count, schema.kinds)
+                columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
+            if not count:
+                return
+        for condition in filters:  # without atoms, or with local variables only
+            keep = self._decide(condition, columns, count, schema.kinds)
+            columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
+        if count:
+            yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
+
+    def check_time(self) -> None:
+        """Raise `OutOfTimeError` when the deadline has passed."""
+        if self.deadline is not None and perf_counter() > self.deadline:
+            raise OutOfTimeError("the time limit came first")
+
+    def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
+        """Estimate how many rows of the atom's table match one row of `columns`."""
+        free = len({t for t in atom.terms if t.startswith("?")} - columns.keys())
+        return float(max(len(self.tables[atom.table]), 1) ** (free / max(len(atom.terms), 1)) - (not free))
+
+    def _step(
+        self, atom: Atom, columns: dict[str, Ints], count: int, limits: tuple[int, int] | None
+    ) -> tuple[dict[str, Ints], int]:
+        """Join `columns` with an atom."""
+        table = self.tables[atom.table]
+        if table.arity != len(atom.terms):
+            return {name: column[:0] for name, column in columns.items()} | {
+                t: np.empty(0, np.int64) for t in atom.terms if t.startswith("?")
+            }, 0
+        known = [c for c, t in enumerate(atom.terms) if t in columns or not t.startswith("?")]
+        values = np.empty((count, len(known)), np.int64)
+        for place, column in enumerate(known):
+            term = atom.terms[column]
+            values[:, place] = columns[term] if term in columns else self.number[term]
+        if len(known) == table.arity:
+            right = table.find(values)
+            left = np.flatnonzero(right >= 0)
+            right = right[left]
+        elif not known and count == 1 and limits:
+            right = np.arange(*limits)
+            left = np.zeros(len(right), np.int64)
+        else:
+            left, right = table.match(known, values, self.most)
+        if limits:
+            inside = (right >= limits[0]) & (right < limits[1])
+            left, right = left[inside], right[inside]
+        joined = {name: column[left] for name, column in columns.items()}
+        keep = None
+        for column, term in enumerate(atom.terms):
+            if column in known:
+                continue
+            new = table.rows[right, column]
+            if term in joined:
+                same = joined[term] == new
+                keep = same if keep is None else keep & same
+            else:
+                joined[term] = new
+        if keep is None:
+            return joined, len(left)
+        return {name: column[keep] for name, column in joined.items()}, int(keep.sum())
+
+    def _variables(self, condition: Condition, schema: Schema) -> set[str]:
+        bound = {t for atom in schema.atoms for t in atom.terms}
+        return {t for t in mentions(condition) if t in bound}
+
+    def _decide(self, condition: Condition, columns: Mapping[str, Ints], count: int, kinds: Mapping[str, str]) -> Flags:
+        """Return for each row whether a static condition holds."""
+        match condition:
+            case EqualityCondition(left, right, negated):
+                a, b = (columns[t] if t in columns else self.number.get(t, -1) for t in (left, right))
+                return np.broadcast_to((np.asarray(a) == np.asarray(b)) != negated, (count,))
+            case RelationCondition(relation, terms, negated):
+                table = self.tables["relation", relation]
+                if all(t in columns for t in terms) and table.arity == len(terms):
+                    places = table.find(np.stack([columns[t] for t in terms], axis=1))
+                    return np.asarray((places >= 0) != negated)
+            case ClassCondition(term, kind, negated):
+                if term in columns:
+                    places = self.tables["class", kind].find(columns[term][:, None])
+                    return np.asarray((places >= 0) != negated)
+        used = sorted(mentions(condition) & columns.keys())
+        combinations, inverse = self.combinations(columns, used, count)
+        holds = [self.formulas.condition(condition, dict(zip(used, c, strict=True)), kinds) == () for c in combinations]
+        return np.array(holds, bool)[inverse]
+
+    def combinations(
+        self, columns: Mapping[str, Ints], used: Sequence[str], count: int
+    ) -> tuple[list[tuple[str, ...]], Ints]:
+        """Return the distinct combinations of individuals in some columns, and which of them each row has."""
+        if not used:
+            return [()], np.zeros(count, np.int64)
+        matrix = np.stack([columns[name] for name in used], axis=1)
+        _, first, inverse = np.unique(pack(matrix, self.radix), return_index=True, return_inverse=True)
+        return [tuple(self.individuals[i] for i in row) for row in matrix[first].tolist()], inverse.ravel()
+
+    @cached_property
+    def formulas(self) -> Formulas:
+        """Evaluates conditions; before bits are assigned, static ones only."""
+        return Formulas(self)
+
+    def effect_rows(self, schema: Schema, effect: ValueEffect, rows: Ints, value: bool = True) -> Ints:
+        """Return the table rows (the symbols' only, without `value`) that an effect makes true, one per row of the schema."""
+        boolean = self.situations[effect.situation].boolean
+        terms = effect.arguments if boolean or not value else (*effect.arguments, effect.value)
+        place = {name: column for column, name in enumerate(schema.terms)}
+        columns = [rows[:, place[t]] if t in place else np.full(len(rows), self.number[t]) for t in terms]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(rows), 0), np.int64)
+
+    def _exists(self, name: str, rows: Ints) -> Flags:
+        """Return for each row of a situation type's table whether there is such a symbol."""
+        situation = self.situations[name]
+        if not situation.boolean:
+            return self.symbols[name].find(rows[:, :-1]) >= 0
+        exists = np.ones(len(rows), bool)
+        for column, kind in enumerate(situation.arguments):
+            exists &= self.tables["class", kind].find(rows[:, [column]]) >= 0
+        return exists
+
+    def possible(self, symbol: Symbol, value: str) -> bool:
+        """Return whether a fact is reachable if nothing ever becomes false."""
+        situation = self.situations.get(symbol.situation)
+        if situation is None:
+            return False
+        if situation.boolean and value == FALSE:
+            return True
+        return self.find(situation, symbol.arguments, value) >= 0
+
+    def find(self, situation: SituationType, arguments: Sequence[str], value: str) -> int:
+        """Return the row of a fact in its table, or -1."""
+        words = arguments if situation.boolean else (*arguments, value)
+        numbers = [self.number.get(word, -1) for word in words]
+        table = self.tables["situation", situation.name]
+        if -1 in numbers or len(numbers) != table.arity:
+            return -1
+        return int(table.find(np.array([numbers], np.int64).reshape(1, -1))[0])
+
+
+Literals = tuple[int, ...] | None
+"""A conjunction of bits; the empty one is true, None is false."""
+
+
+class Formulas:
+    """Conditions with individuals put in, as conjunctions of bits. Disjunctions become derived bits, each made once.
+
+    Until `facts` is filled, situation types that change have no bits: only static conditions may be asked about.
+    """
+
+    def __init__(self, reached: Reached) -> None:
+        self.reached = reached
+        self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
+        self.size = 0
+        self.complements: dict[int, int] = {}
+        self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
+
+    def condition(
+        self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
+    ) -> Literals:
+        """Return what must hold for a condition (negated: its contrary) to hold."""
+
+        def put(names: Sequence[str]) -> tuple[str, ...]:
+            return tuple(terms.get(name, name) for name in names)
+
+        match condition:
+            case ValueCondition(situation, arguments, value, flipped):
+                return self.value(situation, put(arguments), terms.get(value, value), flipped is not negated)
+            case RelationCondition(relation, arguments, flipped):
+                holds = put(arguments) in self.reached.problem.relations.get(relation, ())
+            case ClassCondition(term, kind, flipped):
+                holds = terms.get(term, term) in self.members(kind)
+            case EqualityCondition(left, right, flipped):
+                holds = terms.get(left, left) == terms.get(right, right)
+            case Witness(variable, kind, conditions, flipped):
+                groups: Iterable[Sequence[Condition]] = [(ClassCondition(variable, kind), *conditions)]
+                inner = {name: term for name, term in terms.items() if name != variable}
+                return self._any(groups, inner, {**kinds, variable: kind}, flipped is not negated)
+            case AnyOf(alternatives, flipped):
+                return self._any(alternatives, terms, kinds, flipped is not negated)
+        return () if holds is not (flipped is not negated) else None
+
+    def _any(
+        self, groups: Iterable[Sequence[Condition]], terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
+    ) -> Literals:
+        """Return what must hold for some group to hold with some individuals for its own variables (negated: for none to)."""
+        cases = [(group, found) for group in groups for found in self._solutions(list(group), dict(terms), kinds)]
+        if negated:
+            return self.all_of(
+                self.any_of(self.condition(c, found, kinds, negated=True) for c in group) for group, found in cases
+            )
+        return self.any_of(self.all_of(self.condition(c, found, kinds) for c in group) for group, found in cases)
+
+    def _solutions(
+        self, group: list[Condition], terms: dict[str, str], kinds: Mapping[str, str]
+    ) -> Iterator[dict[str, str]]:
+        """Yield every way to put individuals in for a group's unbound variables that static knowledge doesn't rule out."""
+        unbound = sorted(plain_variables(group) - terms.keys())
+        if not unbound:
+            yield terms
+            return
+        name, values = min(
+            ((name, self._candidates(name, group, terms, kinds)) for name in unbound), key=lambda pair: len(pair[1])
+        )
+        for value in values:
+            yield from self._solutions(group, {**terms, name: value}, kinds)
+
+    def _candidates(
+        self, name: str, group: Sequence[Condition], terms: Mapping[str, str], kinds: Mapping[str, str]
+    ) -> Sequence[str]:
+        """Return individuals for a variable: those that a positive condition of the group leaves, else its whole class."""
+        members = self.members(kinds[name])
+        for c in group:
+            if isinstance(c, ValueCondition) and not c.negated and c.value == name:
+                arguments = tuple(terms.get(a, a) for a in c.arguments)
+                if not any(a.startswith("?") for a in arguments):
+                    return [v for v in self.values.get((c.situation, arguments), ()) if v in members]
+            if isinstance(c, RelationCondition) and not c.negated and name in c.arguments:
+                fixed = {i: terms[a] for i, a in enumerate(c.arguments) if a in terms}
+                place = c.arguments.index(name)
+                tuples = self.reached.problem.relations.get(c.relation, ())
+                found = {t[place] for t in tuples if all(t[i] == value for i, value in fixed.items())}
+                return [v for v in members if v in found]
+        return list(members)
+
+    @cached_property
+    def values(self) -> Mapping[tuple[str, tuple[str, ...]], list[str]]:
+        """The reachable values of each symbol that isn't boolean."""
+        found: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        names = self.reached.individuals
+        for name in self.reached.symbols:
+            for row in self.reached.tables["situation", name].rows.tolist():
+                found[name, tuple(names[i] for i in row[:-1])].append(names[row[-1]])
+        return found
+
+    def members(self, kind: str) -> dict[str, None]:
+        """Return the individuals of a class."""
+        if kind not in self._members:
+            self._members[kind] = dict.fromkeys(self.reached.problem.classes.get(kind, ()))
+        return self._members[kind]
+
+    @cached_property
+    def _members(self) -> dict[str, dict[str, None]]:
+        return {}
+
+    def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
+        """Return what must hold for a symbol to have a value (negated: not to have it)."""
+        kind = self.reached.situations.get(situation)
+        if kind is None:  # it doesn't exist on this level
+            return () if negated else None
+        if kind.boolean and value == FALSE:
+            if not all(a in self.members(k) for a, k in zip(arguments, kind.arguments, strict=True)):
+                return () if negated else None
+            return self.value(situation, arguments, TRUE, not negated)
+        bits = self.bits.get(situation)
+        if bits is None:
+            bit = -1 if self.reached.find(kind, arguments, value) >= 0 else None
+        else:
+            bit = bits.get(arguments if kind.boolean else (*arguments, value))
+        if bit is None or bit == -1:
+            return () if (bit is None) is negated else None
+        return (self.complement(bit) if negated else bit,)
+
+    def complement(self, bit: int) -> int:
+        """Return the bit that says that a fact doesn't hold."""
+        if bit not in self.complements:
+            self.complements[bit] = self.size
+            self.size += 1
+        return self.complements[bit]
+
+    def all_of(self, parts: Iterable[Literals]) -> Literals:
+        """Return the conjunction."""
+        found: set[int] = set()
+        for part in parts:
+            if part is None:
+                return None
+            found.update(part)
+        return tuple(sorted(found))
+
+    def any_of(self, parts: Iterable[Literals]) -> Literals:
+        """Return the disjunction: one derived bit unless it is simpler than that."""
+        found: set[tuple[int, ...]] = set()
+        for part in parts:
+            if part == ():
+                return ()
+            if part is not None:
+                found.add(part)
+        alternatives = tuple(sorted(found))
+        if len(alternatives) < 2:
+            return alternatives[0] if alternatives else None
+        if alternatives not in self.derived:
+            self.derived[alternatives] = self.size
+            self.size += 1
+        return (self.derived[alternatives],)
