@@ -105,7 +105,13 @@ def _optimal(request: Request) -> Outcome:
 def _paper(request: Request) -> Outcome:
     from planner.paper.hierarchy import plan
 
-    return plan(request.problem, request.links, limits=request.limits, grounds=request.grounds)
+    return plan(
+        request.problem,
+        request.links,
+        limits=request.limits,
+        grounds=request.grounds,
+        leave_levels=request.leave_levels,
+    )
 
 
 Mode: TypeAlias = "Callable[[Request], Outcome]"

@@ -10,6 +10,7 @@ from planner.hierarchical.planner import plan as default
 from planner.levels import levels_left
 from planner.paper.hierarchy import plan as paper
 from planner.plan import Outcome, Plan, Status
+from planner.solve import Request, solve
 from planner.validation import successor, validate
 from reasoner.symbols import FALSE, Problem, Symbol
 from tests.planner import naive
@@ -74,6 +75,12 @@ def test_a_level_that_may_not_be_left_is_not() -> None:
     assert outcome.reason is not None
     assert outcome.reason.text == "no plan of level 1 was found that can be refined, and levels aren't to be left"
     assert paper(served("no_beverage", "location7"), leave_levels=False).status is Status.SOLVED
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_no_mode_leaves_a_level_that_may_not_be_left(mode: str) -> None:
+    outcome = solve(Request(served("beverage1", "location7"), mode, leave_levels=False))
+    assert outcome.status is Status.GAVE_UP
 
 
 def test_where_a_level_is_left_what_it_asks_and_is_kept_is_not_named() -> None:
