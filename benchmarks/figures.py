@@ -89,6 +89,11 @@ class Block:
             raise NoHistoryError(done.stderr.strip().splitlines()[0])
         return done.stdout.split()
 
+    def last(self, root: Path) -> str:
+        """Return the last commit that changed what is measured: unlike the head, it outlives a rebase of what came after."""
+        command = ["git", "-C", str(root), "log", "-1", "--format=%h", "--", *self.measures]
+        return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
+
     def __str__(self) -> str:
         return f"{self.page.name} {self.name}"
 
@@ -132,9 +137,6 @@ def chosen(text: str, number: int) -> str:
 def write(wanted: Sequence[Block]) -> int:
     """Measure anew, and put what comes into the pages at once; 1 if some of it didn't come."""
     failed = 0
-    head = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE, text=True, check=True
-    )
     for command in dict.fromkeys(block.fields[0] for block in wanted):
         text = printed(command)
         for block in (block for block in wanted if block.fields[0] == command):
@@ -147,7 +149,7 @@ def write(wanted: Sequence[Block]) -> int:
                 (ASIDE / f"{block.name}.md").write_text(figures + "\n", "utf-8")
                 print(f"{block}: to be edited by hand, from {(ASIDE / block.name).relative_to(ROOT)}.md", flush=True)
             else:
-                header = DATE.sub(str(date.today()), COMMIT.sub(f"commit {head.stdout.strip()}", block.header))
+                header = DATE.sub(str(date.today()), COMMIT.sub(f"commit {block.last(ROOT)}", block.header))
                 new = f"<!-- figures {block.name}: {header} -->\n\n{figures}\n\n<!-- end -->"
                 old = block.page.read_text("utf-8")
                 this = next(m[0] for m in BLOCK.finditer(old) if m["name"] == block.name)

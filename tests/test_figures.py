@@ -56,6 +56,8 @@ def test_a_block_is_stale_once_what_it_measures_has_changed(tmp_path: Path) -> N
     first = commit(tmp_path, "first")
     page(tmp_path, GOOD.format(first))
     assert figures.stale(tmp_path) == []
+    (block,) = figures.blocks(tmp_path)
+    assert block.last(tmp_path) == first
     second = commit(tmp_path, "second")
     assert figures.stale(tmp_path) == [
         f"page.md one: of {first}, 1 commits behind {second}: python -m benchmarks counts"
