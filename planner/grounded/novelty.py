@@ -25,10 +25,8 @@ from planner.plan import Counts
 
 MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
 STATE_BYTES = 400  # that a state takes besides its bits
-CHILD, VISIT = (
-    20,
-    2,
-)  # bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
+# bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
+CHILD, VISIT = 20, 2
 AT_ONCE = 32  # states expanded in one turn
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
