@@ -40,6 +40,7 @@ from planner.experience.portfolio import Memory
 from planner.grounded.best_first import plan_level
 from planner.hierarchical import serialization as serialise
 from planner.hierarchical.planner import Compiled, compiled, plan
+from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.subplans import Ground, LimitError, Segments
 from planner.plan import Limits, Outcome, Reason, Status
 from planner.validation import validate
@@ -352,11 +353,6 @@ class Everything(Segments):
             cache[level] = [(g.behavior, g.arguments) for g in ground(self.program.problem, level)]
         yield from (g for g in cache[level] if self.forward[g[0]](*g[1]) is not None)
 
-    def nearest(self, level: int, cell: Any, value: str, effort: Any, found: dict[Ground, None]) -> int:
-        """Count what is off, and add every applicable behaviour."""
-        found.update(dict.fromkeys(self.relevant(level, {}, 1)))
-        return 1
-
 
 @contextmanager
 def budget(seconds: float) -> Iterator[None]:
@@ -383,6 +379,14 @@ def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
         return Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
 
 
+class Forgetful(dict[str, list[Template]]):
+    """Templates of which none is kept."""
+
+    def setdefault(self, behavior: str, default: list[Template]) -> list[Template]:
+        """Return the default, without keeping it."""
+        return default
+
+
 def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome]]:
     """Return planning calls by what they do without."""
     limits, level = Limits(expansions=10**7), problem.domain.levels[-1]
@@ -398,7 +402,7 @@ def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome
             serialise.Segments = kept  # type: ignore[attr-defined]
 
     def without_templates() -> Outcome:
-        return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, replay=False))
+        return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, Forgetful()))
 
     return {
         "nothing, memory leading": partial(guided.plan, problem, memory, "leading", limits),

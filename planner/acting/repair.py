@@ -303,7 +303,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
         return None
     if not step.steps:
         assert applicable is not None
-        call.refiner.apply(applicable[1])
+        call.segments.apply(applicable[1])
         return RefinedStep(step.level, step.behavior, step.arguments, applicable[0], ())
     below = []
     for position, child in enumerate(step.steps):

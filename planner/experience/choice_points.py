@@ -72,11 +72,7 @@ class Field:
         done = self.segments.forward[ground[0]](*ground[1])
         if done is None:
             return False
-        now = self.table.now
-        for situation, key, value in done[1]:
-            old = now[situation].get(key)
-            if old != value and (old is not None or self.segments.exists(situation, key)):
-                self.table.put(situation, key, value)
+        self.segments.apply(done[1])
         return True
 
     def works(self, steps: Sequence[Ground]) -> bool:

@@ -19,14 +19,13 @@ from typing import TypeAlias, cast
 
 from planner.hierarchical.operators import Program, named
 from planner.hierarchical.state import Cell, Key, Table
+from planner.language import walk
 from reasoner.memory.counts import Candidate, Conclusion, Pattern
 from reasoner.symbols import (
     FALSE,
     TRUE,
-    AnyOf,
     Behavior,
     ClassCondition,
-    Condition,
     Problem,
     SituationType,
     ValueCondition,
@@ -369,23 +368,11 @@ def mentioned(problem: Problem) -> tuple[str, ...]:
     """Return the classes that behaviours, situation types or terms tell apart: what can be done depends on no other."""
     found: dict[str, None] = {}
 
-    def look(conditions: Sequence[Condition]) -> None:
-        for condition in conditions:
-            match condition:
-                case ClassCondition(_, kind):
-                    found[kind] = None
-                case Witness(_, kind, inner):
-                    found[kind] = None
-                    look(inner)
-                case AnyOf(alternatives):
-                    for group in alternatives:
-                        look(group)
-
     for behavior in problem.domain.behaviors.values():
-        found.update(dict.fromkeys(term.kind for term in (*behavior.parameters, *behavior.variables)))
-        look(behavior.preconditions)
-        for effect in behavior.effects:
-            look(effect.when)
+        found.update(dict.fromkeys(behavior.kinds.values()))
+        for condition in (*behavior.preconditions, *(c for effect in behavior.effects for c in effect.when)):
+            kinds = [inner.kind for inner in walk(condition) if isinstance(inner, ClassCondition | Witness)]
+            found.update(dict.fromkeys(kinds))
     for situation in problem.domain.situations.values():
         found.update(dict.fromkeys((*situation.arguments, situation.range)))
     return tuple(sorted(found))

@@ -80,7 +80,6 @@ class Refiner:
         self.templates = templates
         self.hits = 0
         self.misses = 0
-        self.use_templates = True
         changed = {effect.situation for b in segments.program.domain.behaviors.values() for effect in b.effects}
         situations = segments.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
@@ -93,18 +92,10 @@ class Refiner:
             return None
         bindings, changes = done
         if level == self.levels[-1]:
-            self.apply(changes)
+            self.segments.apply(changes)
             return RefinedStep(level, name, arguments, bindings, ())
         children = self._refine(level, name, arguments, bindings, changes)
         return None if children is None else RefinedStep(level, name, arguments, bindings, children)
-
-    def apply(self, changes: Sequence[Change]) -> None:
-        """Make changes, as far as the symbols exist."""
-        now, put = self.table.now, self.table.put
-        for situation, key, value in changes:
-            old = now[situation].get(key)
-            if old != value and (old is not None or self.segments.exists(situation, key)):
-                put(situation, key, value)
 
     def targets(self, changes: Sequence[Change]) -> dict[Cell, str]:
         """Return what changes make different from what is now."""
@@ -134,7 +125,7 @@ class Refiner:
         if done is None:
             return None
         if not below:
-            self.apply(done[1])
+            self.segments.apply(done[1])
             return RefinedStep(level, name, arguments, done[0], ())
         mark = len(self.table.trail)
         targets = self.targets(done[1])
@@ -159,7 +150,7 @@ class Refiner:
         below = self.levels[self.levels.index(level) + 1]
         individuals = arguments + bindings
         known = self.templates.setdefault(name, [])
-        for position, template in enumerate(known if self.use_templates else ()):
+        for position, template in enumerate(known):
             for roles in self.roles(template, individuals):
                 steps = self.replay(below, template, roles, targets, keep)
                 if steps is not None:

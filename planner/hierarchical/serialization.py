@@ -91,15 +91,11 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
 
 @dataclass
 class Compiled:
-    """What can be kept between calls on problems with the same domain, individuals and static facts.
-
-    `replay` can be switched off, to see what templates are worth.
-    """
+    """What can be kept between calls on problems with the same domain, individuals and static facts."""
 
     program: Program
     templates: dict[str, list[Template]] = field(default_factory=dict)
     shapes: dict[object, Template | None] = field(default_factory=dict)
-    replay: bool = True
 
 
 def compiled(problem: Problem) -> Compiled:
@@ -118,7 +114,6 @@ class Call:
         self.table = Table(problem.domain.situations, problem.initial)
         self.segments = Segments(self.program, self.table, self.goal, deadline, most)
         self.refiner = Refiner(self.segments, using.templates)
-        self.refiner.use_templates = using.replay
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         self.rest = {
             (symbol.situation, key_of(symbol.arguments)): value

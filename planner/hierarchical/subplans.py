@@ -14,14 +14,14 @@ what is too long for that, is left to a search over a small world (`planner.hier
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.state import Cell, Key, Table, arguments_of
+from planner.hierarchical.state import Cell, Change, Key, Table, arguments_of
 from planner.hierarchical.subgoals import Env, Want, Wants
 from planner.plan import Counts
 from reasoner.symbols import FALSE
@@ -187,6 +187,14 @@ class Segments:
             else:
                 still[cell] = wanted
         return still, changes
+
+    def apply(self, changes: Sequence[Change]) -> None:
+        """Make changes, as far as the symbols exist."""
+        now, put = self.table.now, self.table.put
+        for situation, key, value in changes:
+            old = now[situation].get(key)
+            if old != value and (old is not None or self.exists(situation, key)):
+                put(situation, key, value)
 
     def expand(self, level: int) -> None:
         """Count an expansion, and look at the clock now and then."""
