@@ -59,8 +59,22 @@ class World:
 
     def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
         self.segments, self.level, self.width = segments, level, width
-        self.task: Task | None = None
         self.plan: tuple[int, ...] = ()
+        self.task: Task | None = None
+        while True:
+            try:
+                task = self._grounded(targets, keep, width)
+            except (TooLargeError, OutOfTimeError):
+                segments.check_time()
+                if width.breadth == 1:
+                    return
+                width = replace(width, breadth=width.breadth // 2)
+                continue
+            self.task = task if isinstance(task, Task) else None
+            return
+
+    def _grounded(self, targets: Mapping[Cell, str], keep: Keep, width: Width) -> Task | Reason:
+        segments, level = self.segments, self.level
         inside = None if width.questions is None else focus(segments, level, targets, width)
         small = problem_of(segments, level, inside, with_frozen(segments, level, inside) if inside else frozenset())
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
@@ -68,13 +82,7 @@ class World:
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
             if wanted == value:  # what isn't at rest may stay so; who touches it is found out by the caller
                 goal.setdefault(symbol, value)
-        try:
-            task = ground(small, level, goal=goal, most=width.work // SMALLEST, deadline=segments.deadline)
-        except (TooLargeError, OutOfTimeError) as error:
-            segments.check_time()
-            task = Reason(str(error))
-        if isinstance(task, Task):
-            self.task = task
+        return ground(small, level, goal=goal, most=width.work // SMALLEST, deadline=segments.deadline)
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""

@@ -9,7 +9,7 @@ from planner.plan import Plan, Status
 from planner.validation import successor, validate
 from reasoner.symbols import Problem
 
-SECONDS = 10.0
+SECONDS = 90.0
 
 AT_MOST: Mapping[str, Mapping[int, int]] = {
     # Small scenes: what level 1 needs, and what its steps need below in the least lucky order that level 1 allows.
