@@ -8,7 +8,7 @@ stage                   decides                                         module
 ======================  ==============================================  ==============================
 static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
-relaxed reachability    that a goal can't be reached                    `planner.grounded.grounding`
+relaxed reachability    that a goal can't be reached                    `planner.grounded.reachability`
 exhaustion              small problems, both ways                       `planner.grounded.state_space`
 flat search             the rest, until a limit comes                   `planner.grounded.best_first`
 ======================  ==============================================  ==============================
