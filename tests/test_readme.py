@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def test_the_python_of_the_readme_prints_what_it_says() -> None:
@@ -16,8 +17,19 @@ def test_the_python_of_the_readme_prints_what_it_says() -> None:
     assert result.failed == 0
 
 
+def test_every_function_that_the_docs_send_a_reader_to_is_in_that_file() -> None:
+    sent = 0
+    for page in PAGES:
+        for path, name in re.findall(r"`([\w/]+\.py): ([\w.]+)`", page.read_text(encoding="utf-8")):
+            assert (ROOT / path).exists(), f"{page.name} sends to {path}, which doesn't exist"
+            source, sent = (ROOT / path).read_text(encoding="utf-8"), sent + 1
+            for part in name.split("."):
+                assert re.search(rf"^ *(def|class) {part}\b", source, re.MULTILINE), f"{page.name}: no {name} in {path}"
+    assert sent >= 20
+
+
 def test_every_file_that_the_docs_point_to_exists() -> None:
-    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]:
+    for page in PAGES:
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), f"{page.name} points to {target}, which doesn't exist"
