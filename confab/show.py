@@ -70,13 +70,15 @@ def summary(outcome: Outcome) -> str:
         reason = outcome.reason.text if outcome.reason else "no reason given"
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
     bound = "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
-    lengths = " / ".join(map(str, outcome.plan.length.values())) or "no"
+    counts = outcome.plan.length
+    lengths = " / ".join(map(str, counts.values())) or "no"
+    on = " per level" if not counts or min(counts) == 1 else f" on levels {' / '.join(map(str, counts))}"
     effort = f"{expanded} expansions in all"
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
     breaks = [broken.text for left in outcome.left for broken in left.broken]
     by = f" by {outcome.engine}" if outcome.engine else ""
-    lines = [f"solved{by}: {lengths} steps per level, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"]
+    lines = [f"solved{by}: {lengths} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"]
     lines += outcome.given_up
     lines += [f"the plan breaks what only a level above asks: {text}" for text in breaks]
     return "\n".join(lines)
