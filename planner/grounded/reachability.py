@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.joins import Ints, Table, pack
+from planner.grounded.joins import Ints, Table, TooLargeError, pack
 from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
 from planner.language import mentions
 from reasoner.symbols import (
@@ -32,6 +32,10 @@ from reasoner.symbols import (
 )
 
 Flags: TypeAlias = NDArray[np.bool_]
+
+
+CONDITIONS_PER_ROW = 20
+"""Conditions that may be worked out with individuals put in, for each row that a join may have: nested groups multiply."""
 
 
 class OutOfTimeError(Exception):
@@ -316,11 +320,19 @@ class Formulas:
         self.size = 0
         self.complements: dict[int, int] = {}
         self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
+        self.asked = 0
 
     def condition(
         self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
     ) -> Literals:
         """Return what must hold for a condition (negated: its contrary) to hold."""
+        self.asked += 1
+        if self.asked > CONDITIONS_PER_ROW * self.reached.most:
+            raise TooLargeError(
+                f"more than {CONDITIONS_PER_ROW * self.reached.most} conditions with individuals put in"
+            )
+        if not self.asked % 1024:
+            self.reached.check_time()
 
         def put(names: Sequence[str]) -> tuple[str, ...]:
             return tuple(terms.get(name, name) for name in names)
