@@ -87,6 +87,9 @@ def solve(request: Request) -> Outcome:
             f"mode {request.mode} returned steps that are no plan: {faults[0].text} (step {list(faults[0].path)}); "
             "this is a fault of the planner, not of the scene: please report it with the scene's files"
         )
+    first = request.problem.domain.levels[0]
+    if all(step.level == first for step in outcome.plan.steps):
+        return outcome  # no level is left: nothing to tell
     return replace(outcome, left=tuple(levels_left(request.problem, outcome.plan)))
 
 

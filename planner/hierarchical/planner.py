@@ -31,12 +31,14 @@ from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.hierarchical.unsolvability import contested, unattainable
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status
-from reasoner.symbols import Problem
+from reasoner.symbols import FALSE, Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
+DETOURS = 1.25
+"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 FIRST_TURN = 2_000
@@ -146,16 +148,19 @@ def shorten(call: Call, improve: int, leave_levels: bool) -> None:
     before = call.steps
     improver.clusters_left = improve if before is first else (improve + 1) // 2
     call.steps = improver.improve(before)
-    if call.steps is not before and any(left.broken for left in levels_left(call.problem, call.tree())):
+    if length(call.steps) < length(before) and any(left.broken for left in levels_left(call.problem, call.tree())):
         call.steps = before
 
 
 def reordered(call: Call) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
-    Which goal comes first decides what has to be put aside. What is tried uses the most abstract level alone and expands no more
-    nodes than the call did.
+    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
+    tried uses the most abstract level alone and expands no more nodes than the call did.
     """
+    unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
+    if len(call.steps) <= DETOURS * unmet:
+        return call.steps
     best = call.steps
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))

@@ -45,7 +45,8 @@ def length(steps: Sequence[RefinedStep], level: int | None = None) -> int:
 
 def worth_it(old: Sequence[RefinedStep], new: Sequence[RefinedStep]) -> bool:
     """Whether new steps are shorter by enough for the steps of the most abstract level that they give up."""
-    given_up = [sum(step.level == min(s.level for s in old) for step in steps) for steps in (old, new)]
+    first = min(step.level for step in old) if old else 0
+    given_up = [sum(step.level == first for step in steps) for steps in (old, new)]
     return length(old) - length(new) > max(given_up[0] - given_up[1], 0) / PER_PRIMITIVE
 
 
