@@ -1,36 +1,60 @@
 """Confab: a robot planner whose knowledge lives in an ontology.
 
+================  =========================================================================================
+`scenes()`        the shipped scenes' names
+`load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a SPARQL endpoint
+`scene.query(…)`  ask it in SPARQL: a `Table`
+`scene.plan(…)`   plan in it: a `Result`
+`scene.verify(…)` carry a plan out in physics: a `Report`
+`scene.execute(…)`  act in a closed loop, and be interrupted: an `Execution`
+`Memory`          what was learned from all this
+`KnowledgeError`  what was given can't be used; the message says what, where, and what to do
+================  =========================================================================================
+
 >>> import confab
->>> result = confab.load("beverage-serving").plan()
->>> [str(step) for step in result.plan.steps][0]
-'22 B1_MOVE cup1 location7'
+>>> scene = confab.load("beverage-serving")
+>>> result = scene.plan("cup2 LOCATION location8")
+>>> print(result.plan.steps[0], result.plan.length)
+22 B1_MOVE cup1 location7 {1: 5, 2: 12, 3: 38}
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-if TYPE_CHECKING:
+if _TYPE_CHECKING:
+    from confab.execution import Execution
     from confab.memory import Memory
-    from confab.scene import Result, Scene, load
+    from confab.physics import Report
+    from confab.scene import Result, Scene, load, scenes
+    from confab.table import Table
     from reasoner.graph.knowledge import KnowledgeError
 
 __version__ = "0.1.0"
-__all__ = ["KnowledgeError", "Memory", "Result", "Scene", "load"]
+__all__ = ["Execution", "KnowledgeError", "Memory", "Report", "Result", "Scene", "Table", "load", "scenes"]
 
 _HOMES = {
+    "Execution": "confab.execution",
     "KnowledgeError": "reasoner.graph.knowledge",
     "Memory": "confab.memory",
+    "Report": "confab.physics",
     "Result": "confab.scene",
     "Scene": "confab.scene",
+    "Table": "confab.table",
     "load": "confab.scene",
+    "scenes": "confab.scene",
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import a public name when it is first asked for, so that the command line starts fast."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'confab' has no attribute '{name}'")
+        raise AttributeError(f"module 'confab' has no attribute '{name}'; it has {', '.join(__all__)}")
     from importlib import import_module
 
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, which is what the Tab key offers."""
+    return [*__all__, "__doc__", "__version__"]

@@ -216,6 +216,11 @@ class Execution:
     episode: Episode
 
     @property
+    def plan(self) -> Plan:
+        """The plan as it was carried out."""
+        return self.episode.done
+
+    @property
     def reached(self) -> bool:
         """Whether what was wanted was reached."""
         return self.episode.status is End.REACHED

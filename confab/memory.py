@@ -14,6 +14,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from confab.accepting import AnyPlan, plan_of
 from confab.table import Table
 from planner.paper.learning import LearningError
 from planner.paper.learning import learn as learn_plan
@@ -104,13 +105,14 @@ class Memory:
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
 
-    def learn(self, scene: Scene, plan: Plan, failed: tuple[int, ...] | None = None) -> None:
+    def learn(self, scene: Scene, plan: AnyPlan, failed: tuple[int, ...] | None = None) -> None:
         """Learn from a plan that was carried out from the scene's initial situation.
 
         Parameters
         ----------
         scene : Scene
-        plan : Plan
+        plan : Plan, Result, Execution or file
+            Of an execution all is learned, as by `live`.
         failed : path of a step, optional
             The step that failed; what came before it worked, what comes after it wasn't tried.
 
@@ -119,21 +121,29 @@ class Memory:
         KnowledgeError
             The plan can't be done in that situation; nothing is learned then.
         """
+        from confab.execution import Execution
+        from confab.scene import Result
+
+        if isinstance(plan, Execution):
+            self.live(scene.problem, plan.episode)
+            return
+        problem = replace(scene.problem, goal=plan.problem.goal) if isinstance(plan, Result) else scene.problem
+        plan = plan_of(plan, problem)
         try:
-            lived = decisions_of(scene.problem, plan, failed)
+            lived = decisions_of(problem, plan, failed)
             if failed is None:
                 self.links = self._linked(scene, plan)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         self.experience.learn(lived)
 
-    def teach(self, scene: Scene, plan: Plan) -> None:
+    def teach(self, scene: Scene, plan: AnyPlan) -> None:
         """Learn how a scene is best solved, on its first two levels: see `planner.experience.demonstrations`.
 
         Parameters
         ----------
         scene : Scene
-        plan : Plan
+        plan : Plan, Result or file
             For the paper's links.
 
         Raises
@@ -146,7 +156,7 @@ class Memory:
         from planner.hierarchical.operators import Program
 
         try:
-            links = self._linked(scene, plan)
+            links = self._linked(scene, plan_of(plan, scene.problem))
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         lived: list[Decision] = []

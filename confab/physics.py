@@ -124,7 +124,7 @@ def verify(
     rollouts: int = 1,
     seed: int = 0,
     perturb: bool = False,
-    video: Path | None = None,
+    video: str | Path | None = None,
     prepare: Callable[[World], None] | None = None,
     progress: Callable[[int, PrimitiveStep], None] | None = None,
     workers: int | str = 1,
@@ -161,6 +161,9 @@ def verify(
     KnowledgeError
         The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers or no screen.
     """
+    if rollouts < 1:
+        raise KnowledgeError(f"{rollouts} rollouts judge nothing; wanted 1 or more")
+    video = None if video is None else Path(video)
     steps = plan.primitives
     require_skills(scene, [step.behavior for step in steps])
     try:

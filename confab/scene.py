@@ -12,6 +12,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import ontology
+from confab.accepting import AnyPlan, Facts, plan_of, several
 from confab.interchange import outcome_json
 from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
@@ -22,7 +24,7 @@ from reasoner.graph.knowledge import load as load_graph
 from reasoner.limits import Deadline
 from reasoner.memory.links import Links
 from reasoner.names import Names, nearest
-from reasoner.reading.problem import Reading, read, with_goals
+from reasoner.reading.problem import Reading, parse_fact, read, with_goals
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import FALSE, TRUE, Fact, Problem
 
@@ -61,6 +63,7 @@ class Scene:
 
     knowledge: KnowledgeGraph
     seconds: dict[str, float] = field(default_factory=dict)
+    _edited: bool = field(default=False, init=False, repr=False, compare=False)
 
     @cached_property
     def reading(self) -> Reading:
@@ -68,6 +71,7 @@ class Scene:
 
         `plan` does without it: it reads what the task can need.
         """
+        self._settle()
         return read(self.knowledge)
 
     @property
@@ -85,16 +89,115 @@ class Scene:
         """Short names and the IRIs behind them."""
         return self.reading.names
 
+    @property
+    def objects(self) -> dict[str, str]:
+        """The objects by name, each with its most specific class.
+
+        >>> list(load("beverage-serving").objects.items())[:3]
+        [('bottle1', 'Bottle'), ('bottle2', 'Bottle'), ('cup1', 'Cup')]
+        """
+        self._settle()
+        problem = self.problem
+        spoken_of = {symbol.arguments[0]: "" for symbol in problem.initial if symbol.arguments}
+        names = dict.fromkeys((*problem.classes.get("Object", ()), *sorted(spoken_of)))
+        kinds = {name: [kind for kind, members in problem.classes.items() if name in members] for name in names}
+        above = {name: {sup for kind in of for sup in problem.parents.get(kind, ())} for name, of in kinds.items()}
+        own = {name: " ".join(k for k in of if k not in above[name] and "|" not in k) for name, of in kinds.items()}
+        return dict(sorted(own.items(), key=lambda pair: pair[1]))
+
+    @property
+    def facts(self) -> list[str]:
+        """What holds in the beginning, each as `with_fact` takes it.
+
+        >>> load("beverage-serving").facts[:2]
+        ['bottle1 BEVERAGE beverage1', 'bottle1 LOCATION location4']
+        """
+        self._settle()
+        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.initial.items())
+
+    @property
+    def goals(self) -> list[str]:
+        """What is wanted, each as `with_goal` and `plan` take it.
+
+        >>> load("beverage-serving").goals[:2]
+        ['bottle1 LOCATION location4', 'bottle2 LOCATION location3']
+        """
+        self._settle()
+        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items())
+
+    def with_fact(self, *facts: str) -> Scene:
+        """Return a scene in which some facts hold, each in place of what was stated of its symbol; this one stays as it is.
+
+        >>> load("beverage-serving").with_fact("cup1 LOCATION location7").plan().plan.length
+        {1: 3, 2: 8, 3: 26}
+
+        Raises
+        ------
+        KnowledgeError
+            A word names nothing of its kind, or the store is a remote one.
+        """
+        from reasoner.reading.restating import with_facts
+
+        return self._restated(with_facts, facts)
+
+    def with_goal(self, *goals: str) -> Scene:
+        """Return a scene in which some facts are wanted, each in place of the goal of its symbol; this one stays as it is.
+
+        >>> load("beverage-serving").with_goal("cup2 LOCATION location8").plan().plan.length
+        {1: 5, 2: 12, 3: 38}
+
+        Raises
+        ------
+        KnowledgeError
+            As `with_fact`.
+        """
+        from reasoner.reading.restating import with_goals
+
+        return self._restated(with_goals, goals)
+
+    def _restated(
+        self, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: Iterable[str]
+    ) -> Scene:
+        self._settle()
+        copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, fact)) for fact in facts])
+        infer(copy)
+        return Scene(copy, dict(self.seconds))
+
+    def picture(self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False) -> Any:
+        """Draw the table with its places, a behaviour, or the classes: into a file, or as an image that a notebook shows.
+
+        Returns
+        -------
+        Path or PIL.Image.Image
+            The file's path if one was given.
+
+        Raises
+        ------
+        KnowledgeError
+            As `confab.picturing.draw`.
+        """
+        from confab.picturing import draw
+
+        self._settle()
+        if path is not None:
+            return draw(self, Path(path), behavior, classes)
+        from tempfile import TemporaryDirectory
+
+        from PIL import Image
+
+        with (
+            TemporaryDirectory() as folder,
+            Image.open(draw(self, Path(folder, "scene.png"), behavior, classes)) as image,
+        ):
+            return image.copy()
+
     @cached_property
     def graph(self) -> rdflib.Graph:
-        """The scene's triples as an rdflib graph (a copy)."""
-        import rdflib
+        """The scene's triples as an rdflib graph; what is added to it or removed from it counts in `query` and `plan` at once."""
+        from reasoner.graph.rdflib_graph import rdflib_graph
 
-        graph = rdflib.Graph()
-        graph.parse(data=self.knowledge.ntriples(), format="nt")
-        for prefix, namespace in self.knowledge.prefixes.items():
-            graph.bind(prefix, namespace)
-        return graph
+        self._settle()
+        return rdflib_graph(self.knowledge, self._forget)
 
     @cached_property
     def embodiment(self) -> Embodiment:
@@ -115,11 +218,14 @@ class Scene:
             )
         return read_embodiment(self.knowledge.store, self.names.short, self.knowledge.folders)
 
-    def verify(self, plan: Plan, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
-        """Carry out the primitives of a plan in PyBullet: see `confab.physics.verify`."""
+    def verify(self, plan: AnyPlan, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+        """Carry out the primitives of a plan, or of what has one in it, in PyBullet: see `confab.physics.verify`."""
         from confab.physics import verify
 
-        return verify(self, plan, rollouts, seed, **options)
+        self._settle()
+        if isinstance(plan, Result):
+            options = {"goal": plan.problem.goal, **options}
+        return verify(self, plan_of(plan, self.problem), rollouts, seed, **options)
 
     @cached_property
     def _mirror(self) -> Mirror:
@@ -132,12 +238,20 @@ class Scene:
         """The scene as an owlready2 world; what is added through it is seen by `query` and `plan`."""
         return self._mirror.world
 
-    def _pull(self) -> None:
-        """Take over what was added through `owl`."""
+    def _forget(self) -> None:
+        """Forget what was read before an edit."""
+        for name in ("reading", "embodiment"):
+            self.__dict__.pop(name, None)
+        self._edited = True
+
+    def _settle(self) -> None:
+        """Take over what was edited through `owl`, and conclude anew what follows from what was edited anywhere."""
         if "_mirror" in self.__dict__ and self._mirror.pull():
             self.__dict__.pop("graph", None)
+            self._forget()
+        if self._edited:
+            self._edited = False
             infer(self.knowledge)
-            self.reading = read(self.knowledge)
 
     def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
         """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
@@ -154,7 +268,7 @@ class Scene:
         from reasoner.graph.apart import ask
         from reasoner.reading.affordance import SITUATION, write_situation
 
-        self._pull()
+        self._settle()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
         kind, columns, rows = ask(self.knowledge, sparql, limits)
@@ -172,7 +286,7 @@ class Scene:
         """
         from reasoner.graph.construct import write_construct
 
-        self._pull()
+        self._settle()
         return write_construct(self.knowledge, sparql, Path(path), limits)
 
     def applicable_query(self, behavior: str) -> str:
@@ -213,8 +327,8 @@ class Scene:
 
     def plan(
         self,
-        goals: Iterable[str] = (),
-        memory: Memory | Links | None = None,
+        goals: Facts = (),
+        memory: Memory | Links | str | Path | None = None,
         mode: str = DEFAULT_MODE,
         time_limit: float | Deadline | None = None,
         optimal: bool = False,
@@ -227,9 +341,9 @@ class Scene:
 
         Parameters
         ----------
-        goals : iterable of str
+        goals : str or iterable of str
             Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
-        memory : Memory, or Links alone in paper mode; optional
+        memory : Memory, its file or endpoint, or Links alone in paper mode; optional
             What was learned before; none if left out.
         mode : str
             ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
@@ -263,7 +377,7 @@ class Scene:
             raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
         if optimal and (mode == "paper" or memory is not None):
             raise KnowledgeError("the optimal search uses neither memory nor the paper's mode; leave one out")
-        self._pull()
+        self._settle()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
         if optimal and time_limit is None:
@@ -271,7 +385,17 @@ class Scene:
         deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
         with self.knowledge.until(deadline):
             how = "optimal" if optimal else mode
-            return self._plan(list(goals), memory, how, deadline, observed, engine, level, leave_levels)
+            return self._plan(
+                several(goals), self._memory(memory), how, deadline, observed, engine, level, leave_levels
+            )
+
+    def _memory(self, given: Memory | Links | str | Path | None) -> Memory | Links | None:
+        """Return a memory; one in a file or at an endpoint is read."""
+        if not isinstance(given, str | Path):
+            return given
+        from confab.memory import Memory
+
+        return Memory.load(given, self)
 
     def _plan(
         self,
@@ -352,11 +476,11 @@ class Scene:
 
     def execute(
         self,
-        plan: Result | Plan | str | Path | None = None,
-        interventions: Iterable[str] = (),
+        plan: AnyPlan | None = None,
+        interventions: Facts = (),
         world: str | World = "symbolic",
-        goals: Iterable[str] = (),
-        memory: Memory | Links | None = None,
+        goals: Facts = (),
+        memory: Memory | Links | str | Path | None = None,
         mode: str = DEFAULT_MODE,
         seed: int = 0,
         tell: Callable[[Moment], None] | None = None,
@@ -364,24 +488,21 @@ class Scene:
     ) -> Execution:
         """Carry the task out in a closed loop: see `confab.execution.execute`.
 
-        `plan` is what to begin with: a result, a plan, or the name of a file that ``confab plan --json`` wrote. Plans from
+        `plan` is what to begin with: a plan, a result, or the name of a file that ``confab plan --json`` wrote. Plans from
         scratch are made with `memory`; `Memory.live` learns from what came of it.
         """
         from confab.execution import execute, planner_of
-        from confab.interchange import read_plan
 
-        if isinstance(plan, Result):
-            problem, plan = plan.problem, plan.plan
-        else:
-            problem = with_goals(self.reading, goals)
-            if isinstance(plan, str | Path):
-                plan = read_plan(Path(plan), problem)
+        self._settle()
+        problem = plan.problem if isinstance(plan, Result) else with_goals(self.reading, several(goals))
+        begun = None if plan is None else plan_of(plan, problem)
+        memory = self._memory(memory)
         planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
         if planner is None and memory is not None and not isinstance(memory, Links):
             from planner.experience.portfolio import planner_with
 
             planner = planner_with(memory.advisor, mode)
-        return execute(self, problem, plan, interventions, world, planner, seed, tell, **options)
+        return execute(self, problem, begun, several(interventions), world, planner, seed, tell, **options)
 
     def __repr__(self) -> str:
         """Return what the scene is, in one line."""
@@ -414,7 +535,7 @@ class Result:
         """Carry out the plan in PyBullet: see `confab.physics.verify`."""
         return self.scene.verify(self.plan, rollouts, seed, goal=self.problem.goal, **options)
 
-    def execute(self, interventions: Iterable[str] = (), **options: Any) -> Execution:
+    def execute(self, interventions: Facts = (), **options: Any) -> Execution:
         """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
         return self.scene.execute(self, interventions, **options)
 
@@ -501,3 +622,12 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
     with graph.until(deadline or Deadline()):
         infer(graph)
     return Scene(graph, {"load": perf_counter() - begin})
+
+
+def scenes() -> list[str]:
+    """Return the names of the shipped scenes, which `load` takes.
+
+    >>> "beverage-serving" in scenes()
+    True
+    """
+    return list(ontology.scenes())

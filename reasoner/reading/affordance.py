@@ -23,6 +23,7 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.reading.problem import Reading
+from reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -39,10 +40,9 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, RDF
+from reasoner.vocabulary import ARGUMENTS, RDF
 
 SITUATION = BASE + "situation"
-VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
 RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
@@ -74,23 +74,12 @@ class Affordance:
 
 def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
     """Write a state into the graph `SITUATION`, in place of what was there; the initial state if none is given."""
-    name, iri = ox.NamedNode(SITUATION), reading.names.iri
-    properties = dict(_pairs(graph, VALUE_PROPERTIES))
+    name, properties = ox.NamedNode(SITUATION), value_properties(graph)
     graph.store.clear_graph(name)
     for number, (symbol, value) in enumerate((state or reading.problem.initial).items()):
-        if value == FALSE:
-            continue
-        prop = properties.get(iri(symbol.situation))
-        arguments = [ox.NamedNode(iri(argument)) for argument in symbol.arguments]
-        if prop and len(arguments) + (value != TRUE) == 2:
-            tail = arguments[1] if value == TRUE else ox.NamedNode(iri(value))
-            graph.store.add(ox.Quad(arguments[0], ox.NamedNode(prop), tail, name))
-            continue
-        node = ox.BlankNode(f"fact{number}")
-        parts = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": ox.NamedNode(iri(symbol.situation))}
-        parts |= {} if value == TRUE else {"value": ox.NamedNode(iri(value))}
-        graph.store.extend(ox.Quad(node, ox.NamedNode(CORE + part), term, name) for part, term in parts.items())
-        graph.store.add(ox.Quad(node, TYPE, ox.NamedNode(CORE + "SituatedObjectInstance"), name))
+        prop = properties.get(reading.names.iri(symbol.situation))
+        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{number}")):
+            graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, name))
 
 
 def applicable_query(

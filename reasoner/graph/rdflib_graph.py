@@ -1,0 +1,83 @@
+"""A knowledge graph as an rdflib graph for those who know rdflib: what is added to it or removed from it is so in both at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pyoxigraph as ox
+import rdflib
+from rdflib.plugins.stores.memory import Memory
+
+from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph
+
+
+def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Graph:
+    """Return the triples of a knowledge graph; `edited` is called whenever somebody has changed them.
+
+    What is added goes into the graph `asserted`; what is removed leaves every graph. Conclusions are as they were before.
+    """
+    store = _WriteThrough(graph, edited)
+    found = rdflib.Graph(store)
+    found.parse(data=graph.ntriples(), format="nt", bnode_context=_SameNames())
+    for prefix, namespace in graph.prefixes.items():
+        found.bind(prefix, namespace)
+    store.writes = True
+    return found
+
+
+class _SameNames(dict[str, str]):
+    """Blank nodes keep the names that the knowledge graph has for them."""
+
+    def get(self, name: str, default: object = None) -> str:
+        """Return the name itself."""
+        return name
+
+
+class _WriteThrough(Memory):
+    """rdflib's own store in memory, which hands every change on."""
+
+    def __init__(self, graph: KnowledgeGraph, edited: Callable[[], None]) -> None:
+        super().__init__()
+        self.graph, self.edited, self.writes = graph, edited, False
+
+    def add(self, triple: Any, context: Any, quoted: bool = False) -> None:
+        """Add a triple here and in the knowledge graph; raises `KnowledgeError` if that can't hold it."""
+        if self.writes:
+            quad = _quad(self.graph, triple, "asserted")
+            self.graph.store.add(quad)
+            self.edited()
+        super().add(triple, context, quoted)
+
+    def remove(self, triple_pattern: Any, context: Any = None) -> None:
+        """Remove what fits a pattern here and in the knowledge graph."""
+        gone = [triple for triple, _ in self.triples(triple_pattern, context)] if self.writes else []
+        for triple in gone:
+            for name in GRAPHS:
+                self.graph.store.remove(_quad(self.graph, triple, name))
+        super().remove(triple_pattern, context)
+        if gone:
+            self.edited()
+
+
+def _quad(graph: KnowledgeGraph, triple: Any, name: str) -> ox.Quad:
+    if graph.remote:
+        raise KnowledgeError(f"{graph.scene}: a remote store is only read; change it with its own tools")
+    try:
+        subject, predicate, value = map(_term, triple)
+        return ox.Quad(subject, predicate, value, ox.NamedNode(BASE + name))
+    except (TypeError, ValueError) as error:
+        raise KnowledgeError(f"{' '.join(map(str, triple))}: no triple of RDF, so it wasn't added: {error}") from error
+
+
+def _term(term: Any) -> Any:
+    match term:
+        case rdflib.URIRef():
+            return ox.NamedNode(str(term))
+        case rdflib.BNode():
+            return ox.BlankNode(str(term))
+        case rdflib.Literal(language=str(language)):
+            return ox.Literal(str(term), language=language)
+        case rdflib.Literal(datatype=datatype):
+            return ox.Literal(str(term), datatype=ox.NamedNode(str(datatype)) if datatype else None)
+    raise TypeError(f"{term!r} is no term")

@@ -1,0 +1,138 @@
+"""A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import pyoxigraph as ox
+
+from reasoner.files import as_iri_part
+from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
+from reasoner.limits import Deadline
+from reasoner.reading.problem import Reading
+from reasoner.symbols import FALSE, TRUE, Fact, Symbol
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE
+
+VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
+STATED = "SELECT ?node ?property ?value WHERE { ?node a :SituatedObjectInstance ; ?property ?value }"
+WANTED = "SELECT ?node ?property ?value WHERE { ?task :goal ?node . ?node ?property ?value }"
+TASKS = "SELECT DISTINCT ?task WHERE { ?task a/rdfs:subClassOf* :Task } ORDER BY ?task"
+
+Node = Mapping[str, str]
+
+
+def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -> KnowledgeGraph:
+    """Return a copy of a graph in which some facts hold, each in place of what was stated of its symbol.
+
+    What follows by inference is for the caller to conclude anew.
+    """
+    copy = _copied(graph)
+    properties = value_properties(graph)
+    for fact in facts:
+        symbol, iri = fact.symbol, reading.names.iri
+        about, prop = ox.NamedNode(iri(symbol.arguments[0])), properties.get(iri(symbol.situation))
+        if prop:
+            pair = iri(symbol.situation) in reading.schema.pairs
+            _remove(copy, about, ox.NamedNode(prop), ox.NamedNode(iri(symbol.arguments[1])) if pair else None)
+        for node in _about(copy, STATED, reading, symbol):
+            _remove(copy, node)
+        added = said(reading, fact, prop, ox.BlankNode())
+        copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, ox.NamedNode(BASE + "asserted")) for t in added)
+    return copy
+
+
+def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
+    """Return a copy of a graph in which some facts are wanted, each in place of the goal of its symbol."""
+    copy = _copied(graph)
+    asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
+    task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")
+    copy.add("asserted", [(task, TYPE, INDIVIDUAL), (task, TYPE, CORE + "Task")])
+    for goal in goals:
+        for old in _about(copy, WANTED, reading, goal.symbol):
+            _remove(copy, None, link, old)
+            _remove(copy, old)
+        name = ".".join(("goal", *goal.symbol.arguments, goal.symbol.situation))
+        node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{as_iri_part(name)}")
+        copy.store.extend(
+            ox.Quad(t.subject, t.predicate, t.object, asserted)
+            for t in (ox.Triple(ox.NamedNode(task), link, node), *_wanted(reading, goal, node))
+        )
+    return copy
+
+
+def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
+    """Return the property that states the values of a situation type, by the type's IRI."""
+    return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
+
+
+def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
+    """Yield what states a fact: by its value property if that holds all of it, else as a node of its own; false is left unsaid."""
+    iri, symbol, value = reading.names.iri, fact.symbol, fact.value
+    if value == FALSE:
+        return
+    arguments = [ox.NamedNode(iri(argument)) for argument in symbol.arguments]
+    if prop and len(arguments) + (value != TRUE) == 2:
+        tail = arguments[1] if value == TRUE else ox.NamedNode(iri(value))
+        yield ox.Triple(arguments[0], ox.NamedNode(prop), tail)
+        return
+    parts = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": ox.NamedNode(iri(symbol.situation))}
+    parts |= {} if value == TRUE else {"value": ox.NamedNode(iri(value))}
+    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "SituatedObjectInstance"))
+    for part, term in parts.items():
+        yield ox.Triple(node, ox.NamedNode(CORE + part), term)
+
+
+def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Triple]:
+    """Yield a value condition on individuals."""
+    iri, symbol, value = reading.names.iri, goal.symbol, goal.value
+    arguments = symbol.arguments
+    if iri(symbol.situation) in reading.schema.pairs:
+        if value == FALSE:
+            yield ox.Triple(node, ox.NamedNode(CORE + "negated"), ox.Literal(True))
+        arguments, value = arguments[:-1], arguments[-1]
+    terms = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": symbol.situation, "value": value}
+    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
+    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "ValueCondition"))
+    yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(str(goal), language="en"))
+    for part, name in terms.items():
+        yield ox.Triple(
+            node, ox.NamedNode(CORE + part), ox.NamedNode(CORE + name if name in (TRUE, FALSE) else iri(name))
+        )
+
+
+def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:
+    """Return the nodes of conditions or facts that speak of a symbol."""
+    nodes: dict[ox.NamedNode | ox.BlankNode, dict[str, str]] = {}
+    for node, prop, value in graph.select(query, SCENE):
+        if isinstance(node, ox.NamedNode | ox.BlankNode):
+            nodes.setdefault(node, {})[text(prop).removeprefix(CORE)] = text(value)
+    return [node for node, parts in nodes.items() if _symbol(parts, reading) == symbol]
+
+
+def _symbol(node: Node, reading: Reading) -> Symbol:
+    terms = [node[name] for name in ARGUMENTS if name in node]
+    if node.get("situationType") in reading.schema.pairs and "value" in node:
+        terms.append(node["value"])
+    return Symbol(reading.names.short(node.get("situationType", "")), tuple(map(reading.names.short, terms)))
+
+
+def _remove(
+    graph: KnowledgeGraph,
+    subject: ox.NamedNode | ox.BlankNode | None,
+    predicate: ox.NamedNode | None = None,
+    value: ox.NamedNode | ox.BlankNode | None = None,
+) -> None:
+    for name in SCENE:
+        for quad in list(graph.store.quads_for_pattern(subject, predicate, value, ox.NamedNode(BASE + name))):
+            graph.store.remove(quad)
+
+
+def _copied(graph: KnowledgeGraph) -> KnowledgeGraph:
+    if graph.remote:
+        raise KnowledgeError(f"{graph.scene}: a remote store is only read; change it with its own tools")
+    store = ox.Store()
+    store.bulk_load(input=graph.store.dump(format=ox.RdfFormat.N_QUADS), format=ox.RdfFormat.N_QUADS)
+    return replace(
+        graph, store=store, files=dict(graph.files), prefixes=dict(graph.prefixes), round_trips=0, deadline=Deadline()
+    )

@@ -1,0 +1,132 @@
+"""What a user types first works: names that the Tab key offers, facts as text, results where plans are wanted, edits that count."""
+
+import inspect
+from pathlib import Path
+
+import pytest
+import rdflib
+
+import confab
+from reasoner.generate import write_scene
+
+TABLETOP = rdflib.Namespace("https://w3id.org/confab/tabletop#")
+SERVING = rdflib.Namespace("https://w3id.org/confab/beverage-serving#")
+TABLE = rdflib.Namespace("https://w3id.org/confab/dining-table#")
+CUPS = "SELECT ?cup WHERE { ?cup a k:Cup } ORDER BY ?cup"
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def result(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
+
+
+def test_the_tab_key_offers_the_public_names_and_nothing_else() -> None:
+    assert {name for name in dir(confab) if not name.startswith("_")} == set(confab.__all__)
+    for name in confab.__all__:
+        assert inspect.getdoc(getattr(confab, name)), name
+
+
+def test_one_goal_can_be_given_as_it_is(scene: confab.Scene, result: confab.Result) -> None:
+    goal = "cup2 LOCATION location8"
+    assert scene.plan(goal).plan == scene.plan([goal]).plan != result.plan
+    assert scene.execute(goals=goal).reached
+
+
+def test_a_result_an_execution_and_a_file_stand_for_their_plan(
+    tmp_path: Path, scene: confab.Scene, result: confab.Result
+) -> None:
+    execution = scene.execute(result)
+    assert execution.plan.length == result.plan.length
+    assert scene.execute(result.save(tmp_path / "plan.json")).plan == execution.plan
+    one, other, third = (confab.Memory.of(scene) for _ in range(3))
+    one.learn(scene, result.plan)
+    other.learn(scene, result)
+    third.learn(scene, execution)
+    assert one.experience.totals() == other.experience.totals() == third.experience.totals() != {}
+    with pytest.raises(confab.KnowledgeError, match="wanted a plan"):
+        scene.verify(7)  # type: ignore[arg-type]
+
+
+def test_a_memory_may_be_the_name_of_its_file(tmp_path: Path, scene: confab.Scene, result: confab.Result) -> None:
+    memory = confab.Memory.of(scene)
+    memory.learn(scene, result)
+    path = memory.save(tmp_path / "memory.ttl")
+    assert scene.plan(memory=path).plan == scene.plan(memory=str(path)).plan == result.plan
+    assert scene.execute(memory=str(path)).reached
+    with pytest.raises(confab.KnowledgeError, match="no such memory file"):
+        scene.plan(memory="none.ttl")
+
+
+def test_no_rollouts_are_refused_in_words(scene: confab.Scene, result: confab.Result) -> None:
+    with pytest.raises(confab.KnowledgeError, match="0 rollouts judge nothing; wanted 1 or more"):
+        scene.verify(result, rollouts=0)
+
+
+def test_facts_and_goals_are_shown_as_they_are_given(scene: confab.Scene) -> None:
+    assert scene.objects["cup1"] == "Cup"
+    assert "cup1 LOCATION location2" in scene.facts
+    again = scene.with_fact(*scene.facts).with_goal(*scene.goals)
+    assert (again.facts, again.goals) == (scene.facts, scene.goals)
+    assert again.plan().plan == scene.plan().plan
+
+
+@pytest.mark.parametrize("name", ["couriers-small", "house-small", "towers-small", "canal-small", "laboratory-small"])
+def test_every_fact_of_any_world_can_be_stated_anew(name: str) -> None:
+    scene = confab.load(name)
+    again = scene.with_fact(*scene.facts).with_goal(*scene.goals)
+    assert again.problem == scene.problem
+
+
+def test_another_fact_makes_another_scene_and_leaves_the_first(tmp_path: Path, scene: confab.Scene) -> None:
+    moved = scene.with_fact("cup1 LOCATION location7")
+    assert moved.query("SELECT ?where WHERE { ?cup k:location ?where FILTER(STRENDS(STR(?cup), 'cup1')) }")[0] == (
+        "location7",
+    )
+    assert "cup1 LOCATION location2" in scene.facts
+    assert len(moved.plan().plan.steps) == 3
+    wanted = moved.with_goal("cup2 LOCATION location8", "cup1 BEVERAGE no_beverage")
+    assert {"cup2 LOCATION location8", "cup1 BEVERAGE no_beverage"} < set(wanted.goals)
+    assert len(wanted.goals) == len(scene.goals)
+    with pytest.raises(confab.KnowledgeError, match="did you mean 'location"):
+        scene.with_fact("cup1 LOCATION location77")
+
+
+def test_a_scene_without_a_task_can_be_given_a_goal(tmp_path: Path) -> None:
+    write_scene(tmp_path / "s.ttl", "served", 4)
+    text = (tmp_path / "s.ttl").read_text()
+    (tmp_path / "s.ttl").write_text(text.replace("c:Task", "c:Object").replace("c:goal", "rdfs:seeAlso"))
+    bare = confab.load(tmp_path / "s.ttl")
+    assert bare.goals == []
+    (first, *_) = [fact for fact in bare.facts if "LOCATION" in fact]
+    assert bare.with_goal(first).plan().plan.steps == ()
+
+
+def test_what_is_edited_in_the_rdflib_graph_is_asked_and_planned_with() -> None:
+    scene = confab.load("beverage-serving")
+    graph = scene.graph
+    before = len(scene.query(CUPS))
+    graph.add((SERVING.cup9, rdflib.RDF.type, TABLETOP.Cup))
+    assert len(scene.query(CUPS)) == before + 1
+    graph.remove((SERVING.cup9, None, None))
+    assert len(scene.query(CUPS)) == before
+    graph.set((SERVING.cup1, TABLETOP.location, TABLE.location7))
+    assert "cup1 LOCATION location7" in scene.facts
+    assert len(scene.plan().plan.steps) == 3
+    graph.update(
+        "DELETE { ?cup k:location ?l } INSERT { ?cup k:location t:location2 } WHERE { ?cup k:location ?l . FILTER(?cup = <"
+        + SERVING.cup1
+        + ">) }"
+    )
+    assert len(scene.plan().plan.steps) == 4
+    with pytest.raises(confab.KnowledgeError, match="no triple of RDF"):
+        graph.add((SERVING.cup1, rdflib.URIRef("no iri"), SERVING.cup1))
+
+
+def test_a_picture_is_an_image_in_a_notebook_and_a_file_where_one_is_named(tmp_path: Path, scene: confab.Scene) -> None:
+    assert scene.picture(classes=True).size[0] > 100
+    assert scene.picture(tmp_path / "card.png", behavior="B2_PICK").is_file()
