@@ -22,8 +22,9 @@ from reasoner.symbols import Symbol
 from sim.bodies import outer_radius
 from sim.faults import displaced, lying
 from sim.skills import skill
+from sim.staging import Perturbation
 from sim.verdict import SkillError
-from sim.world import Perturbation, World
+from sim.world import World
 
 NOISE = (0.0, 0.002, 0.005, 0.01, 0.02)
 """Standard deviations of perceived positions in metres."""

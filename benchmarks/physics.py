@@ -30,8 +30,9 @@ import pybullet
 import confab
 from benchmarks.perception import perception
 from sim.rollouts import Trial, rollouts, wilson
+from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
-from sim.world import Perturbation, World
+from sim.world import World
 
 WORKERS = 2
 """Processes that share perturbed rollouts."""

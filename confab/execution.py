@@ -369,7 +369,7 @@ def execute(
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
     from confab.physics import require_skills
     from sim.live import LiveWorld
-    from sim.world import Perturbation
+    from sim.staging import Perturbation
     from sim.world import World as Physics
 
     lowest = problem.domain.at_level(problem.domain.levels[-1])

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Fact, State
+from sim.engine import Engine
 from sim.rollouts import Done, Trial, wilson
 from sim.rollouts import rollouts as roll_out
+from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
-from sim.world import Perturbation, World
 from sim.world import Step as PrimitiveStep
+from sim.world import World
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -222,9 +224,9 @@ def _shown(
     gui: bool,
 ) -> Rollout:
     """Return the rollout of a seed that is filmed, or shown on the screen, or both."""
-    watching: list[Callable[[World], None]] = []
+    watching: list[Callable[[Engine], None]] = []
 
-    def watch(world: World) -> None:
+    def watch(world: Engine) -> None:
         for one in watching:
             one(world)
 

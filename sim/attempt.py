@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.engine import Engine
 from sim.motion import (
     SWIVELS,
     YAWS,
@@ -31,9 +31,6 @@ from sim.perception import tilt_of
 from sim.robot import Manipulator
 from sim.urdf import Array
 from sim.verdict import SkillError
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 Numbers = Mapping[str, float]
 
@@ -59,14 +56,14 @@ class Stage:
 class Attempt:
     """One execution of a skill: the world, the hand, what it holds, and bodies' positions and stray beads before it."""
 
-    world: World
+    world: Engine
     hand: Manipulator
     held: str | None
     before: Mapping[str, Array]
     stray: int
 
     @classmethod
-    def begin(cls, world: World, hand: str) -> Attempt:
+    def begin(cls, world: Engine, hand: str) -> Attempt:
         """Return an attempt that begins now."""
         before = {name: world.truth(name)[1] for name in world.bodies}
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())

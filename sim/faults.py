@@ -20,19 +20,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Shape
 from sim.bodies import KINDS, center_height
+from sim.engine import Engine, Thing
 from sim.kinematics import inverse
 from sim.motion import SWIVELS, poses_at, rotations
 from sim.urdf import Array
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 P = ParamSpec("P")
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -49,7 +47,7 @@ class Fault:
     arguments: tuple[Any, ...]
     options: tuple[tuple[str, Any], ...] = ()
 
-    def __call__(self, world: World) -> None:
+    def __call__(self, world: Engine) -> None:
         """Plant it."""
         PLANTS[self.kind](world, *self.arguments, **dict(self.options))
 
@@ -59,7 +57,7 @@ class Fault:
         return f"{self.kind}({', '.join([*map(repr, self.arguments), *options])})"
 
 
-def fault(plant: Callable[Concatenate[World, P], None]) -> Callable[P, Fault]:
+def fault(plant: Callable[Concatenate[Engine, P], None]) -> Callable[P, Fault]:
     """Turn a function that plants a fault in a world into one that chooses the fault."""
     PLANTS[plant.__name__] = plant
 
@@ -70,12 +68,12 @@ def fault(plant: Callable[Concatenate[World, P], None]) -> Callable[P, Fault]:
     return choose
 
 
-def later(world: World, step: int, seconds: float, act: Callable[[World], None]) -> None:
+def later(world: Engine, step: int, seconds: float, act: Callable[[Engine], None]) -> None:
     """Do something once, some simulated seconds after primitive number `step` began."""
     began: int | None = None
     earlier = world.disturb
 
-    def look(world: World) -> None:
+    def look(world: Engine) -> None:
         nonlocal began
         if earlier is not None:
             earlier(world)
@@ -92,7 +90,7 @@ def later(world: World, step: int, seconds: float, act: Callable[[World], None])
 
 @fault
 def hidden_wall(
-    world: World, before: str, distance: float = 0.075, size: tuple[float, float, float] = (0.02, 0.12, 0.16)
+    world: Engine, before: str, distance: float = 0.075, size: tuple[float, float, float] = (0.02, 0.12, 0.16)
 ) -> None:
     """Put up a wall that the robot doesn't perceive, `distance` metres on the robot's side of an object or place.
 
@@ -115,11 +113,9 @@ def hidden_wall(
 
 @fault
 def stranger(
-    world: World, point: tuple[float, float, float], size: tuple[float, float, float] = (0.06, 0.06, 0.12)
+    world: Engine, point: tuple[float, float, float], size: tuple[float, float, float] = (0.06, 0.06, 0.12)
 ) -> None:
     """Put a box on the table that the robot perceives and that no fact speaks of."""
-    from sim.world import Thing
-
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", mass=1.0, grasp_height=size[2] / 2, numbers=numbers)
     body = KINDS["box"].make(world.client, shape, np.array(point), np.array(UPRIGHT))
@@ -129,7 +125,7 @@ def stranger(
 # ------------------------------------------------------------------------------------------------- objects
 
 
-def _put(world: World, name: str, base: Array, orientation: tuple[float, float, float, float] = UPRIGHT) -> None:
+def _put(world: Engine, name: str, base: Array, orientation: tuple[float, float, float, float] = UPRIGHT) -> None:
     """Put a body somewhere, awake and at rest."""
     thing = world.bodies[name]
     up = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)[:, 2]
@@ -141,10 +137,10 @@ def _put(world: World, name: str, base: Array, orientation: tuple[float, float, 
 
 
 @fault
-def displaced(world: World, body: str, by: tuple[float, float], step: int = -1, seconds: float = 0.0) -> None:
+def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1, seconds: float = 0.0) -> None:
     """Shift an object by metres along x and y; what it contains stays behind."""
 
-    def shift(world: World) -> None:
+    def shift(world: Engine) -> None:
         _put(world, body, world.truth(body)[1] + np.array([*by, 0.0]))
 
     if step < 0:
@@ -154,10 +150,10 @@ def displaced(world: World, body: str, by: tuple[float, float], step: int = -1, 
 
 
 @fault
-def knocked(world: World, body: str, step: int, seconds: float, speed: float = 1.5) -> None:
+def knocked(world: Engine, body: str, step: int, seconds: float, speed: float = 1.5) -> None:
     """Hit an object's rim, so that it falls over."""
 
-    def hit(world: World) -> None:
+    def hit(world: Engine) -> None:
         thing = world.bodies[body]
         pybullet.resetBaseVelocity(thing.body, [0, speed / 3, 0.2], [-12 * speed, 0, 0], physicsClientId=world.client)
 
@@ -165,10 +161,10 @@ def knocked(world: World, body: str, step: int, seconds: float, speed: float = 1
 
 
 @fault
-def gone(world: World, body: str, step: int = -1, seconds: float = 0.0) -> None:
+def gone(world: Engine, body: str, step: int = -1, seconds: float = 0.0) -> None:
     """Take an object away."""
 
-    def take(world: World) -> None:
+    def take(world: Engine) -> None:
         thing = world.bodies.pop(body)
         del world.names[thing.body]
         pybullet.removeBody(thing.body, physicsClientId=world.client)
@@ -180,7 +176,7 @@ def gone(world: World, body: str, step: int = -1, seconds: float = 0.0) -> None:
 
 
 @fault
-def lying(world: World, body: str) -> None:
+def lying(world: Engine, body: str) -> None:
     """Lay an object on its side."""
     shape = world.bodies[body].shape
     side = np.array([0.0, 0.0, KINDS[shape.kind].outer(shape)])
@@ -190,13 +186,13 @@ def lying(world: World, body: str) -> None:
 
 
 @fault
-def heavy(world: World, body: str, mass: float) -> None:
+def heavy(world: Engine, body: str, mass: float) -> None:
     """Give an object another mass, in kilograms."""
     pybullet.changeDynamics(world.bodies[body].body, -1, mass=mass, physicsClientId=world.client)
 
 
 @fault
-def slippery(world: World, body: str, friction: float = 0.022) -> None:
+def slippery(world: Engine, body: str, friction: float = 0.022) -> None:
     """Give an object another coefficient of friction."""
     pybullet.changeDynamics(
         world.bodies[body].body,
@@ -209,7 +205,7 @@ def slippery(world: World, body: str, friction: float = 0.022) -> None:
 
 
 @fault
-def sealed(world: World, vessel: str, radius: float = 0.0235, height: float = 0.075) -> None:
+def sealed(world: Engine, vessel: str, radius: float = 0.0235, height: float = 0.075) -> None:
     """Let a ball swim in a vessel that is too large for its neck: tilted, it closes the neck."""
     rotation, base = world.truth(vessel)
     ball = pybullet.createMultiBody(
@@ -223,7 +219,7 @@ def sealed(world: World, vessel: str, radius: float = 0.0235, height: float = 0.
 
 
 @fault
-def drained(world: World, vessel: str, left: int = 0) -> None:
+def drained(world: Engine, vessel: str, left: int = 0) -> None:
     """Leave only so many beads in a vessel."""
     rotation, base = world.truth(vessel)
     reach = KINDS[world.bodies[vessel].shape.kind].outer(world.bodies[vessel].shape)
@@ -241,7 +237,7 @@ def drained(world: World, vessel: str, left: int = 0) -> None:
 
 
 @fault
-def place_displaced(world: World, place: str, by: tuple[float, float]) -> None:
+def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
     """Let a place be elsewhere than where it was when reach was computed, by metres along x and y."""
     known = world.embodiment.places[place]
     x, y, z = known.position
@@ -250,7 +246,7 @@ def place_displaced(world: World, place: str, by: tuple[float, float]) -> None:
 
 
 @fault
-def settings(world: World, /, behavior: str, **numbers: float) -> None:
+def settings(world: Engine, /, behavior: str, **numbers: float) -> None:
     """Carry a behaviour out with other numbers than the ontology's."""
     use = world.embodiment.skills[behavior]
     changed = replace(use, numbers={**use.numbers, **numbers})
@@ -261,16 +257,16 @@ def settings(world: World, /, behavior: str, **numbers: float) -> None:
 
 
 @fault
-def lets_go(world: World, hand: str, step: int, seconds: float) -> None:
+def lets_go(world: Engine, hand: str, step: int, seconds: float) -> None:
     """Open a hand in the middle of something."""
     later(world, step, seconds, lambda world: world.hands[hand].open())
 
 
 @fault
-def arm_at(world: World, hand: str, point: tuple[float, float, float], yaw: float, step: int) -> None:
+def arm_at(world: Engine, hand: str, point: tuple[float, float, float], yaw: float, step: int) -> None:
     """Let an arm be where nobody sent it: with its hand at a point, pointing along `yaw`."""
 
-    def go(world: World) -> None:
+    def go(world: Engine) -> None:
         arm = world.hands[hand].arm
         poses = poses_at(np.array(point), np.full(len(SWIVELS), yaw), 0.0, np.array(SWIVELS))
         q, valid = inverse(arm, rotations(poses), poses[:, :3], poses[:, 5], 0.03)
@@ -283,10 +279,10 @@ def arm_at(world: World, hand: str, point: tuple[float, float, float], yaw: floa
 
 
 @fault
-def jammed(world: World, hand: str, joint: int, step: int, seconds: float) -> None:
+def jammed(world: Engine, hand: str, joint: int, step: int, seconds: float) -> None:
     """Let a joint of an arm stay where it is from then on, which the robot doesn't know."""
 
-    def jam(world: World) -> None:
+    def jam(world: Engine) -> None:
         manipulator = world.hands[hand]
         number, angle = manipulator.joints[joint], float(manipulator.measured()[joint])
         pybullet.changeDynamics(
@@ -301,7 +297,7 @@ def jammed(world: World, hand: str, joint: int, step: int, seconds: float) -> No
 
 
 @fault
-def joint_range(world: World, hand: str, joint: int, lower: float, upper: float) -> None:
+def joint_range(world: Engine, hand: str, joint: int, lower: float, upper: float) -> None:
     """Give a joint of an arm narrower limits, in radians, which the robot knows."""
     manipulator = world.hands[hand]
     low, high = manipulator.arm.lower.copy(), manipulator.arm.upper.copy()
@@ -310,27 +306,27 @@ def joint_range(world: World, hand: str, joint: int, lower: float, upper: float)
 
 
 @fault
-def weak_arm(world: World, hand: str, share: float) -> None:
+def weak_arm(world: Engine, hand: str, share: float) -> None:
     """Leave the motors of an arm only a share of their torque."""
     manipulator = world.hands[hand]
     manipulator.efforts = tuple(effort * share for effort in manipulator.efforts)
 
 
 @fault
-def slow_arm(world: World, hand: str, share: float) -> None:
+def slow_arm(world: Engine, hand: str, share: float) -> None:
     """Let an arm move at a share of its speeds only, which the robot knows."""
     world.hands[hand].pace = share
 
 
 @fault
-def weak_grip(world: World, hand: str, newtons: float) -> None:
+def weak_grip(world: Engine, hand: str, newtons: float) -> None:
     """Let the fingers of a hand press with less force."""
     manipulator = world.hands[hand]
     manipulator.hand = replace(manipulator.hand, grip=newtons)
 
 
 @fault
-def shut(world: World, hand: str) -> None:
+def shut(world: Engine, hand: str) -> None:
     """Let the fingers of a hand stay closed."""
     manipulator = world.hands[hand]
     for finger in manipulator.fingers:
@@ -344,13 +340,13 @@ def shut(world: World, hand: str) -> None:
 
 
 @fault
-def noisy(world: World, metres: float) -> None:
+def noisy(world: Engine, metres: float) -> None:
     """Let perceived positions scatter with a standard deviation of so many metres."""
     world.noise = metres
 
 
 @fault
-def misaligned(world: World, by: tuple[float, float]) -> None:
+def misaligned(world: Engine, by: tuple[float, float]) -> None:
     """Let everything be perceived off by metres along x and y, as with a camera that was pushed."""
     true_sense = world.sense
 

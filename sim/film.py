@@ -12,11 +12,12 @@ import imageio.v2 as imageio
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from sim.engine import Engine
 from sim.picture import Camera, hide_vessels, picture, view_of
 from sim.urdf import Array
 
 if TYPE_CHECKING:
-    from sim.world import Step, World
+    from sim.world import Step
 
 SIZES = (17, 15, 13, 11)
 """Font sizes of the caption; the first that fits is used."""
@@ -80,13 +81,13 @@ class Film:
         else:
             self._end(keep=False)
 
-    def __call__(self, world: World) -> None:
+    def __call__(self, world: Engine) -> None:
         """Take a frame if it is time for one; what that costs is rendering, by the world's clock."""
         begin = time.process_time()
         self._take(world)
         world.clock.rendering += time.process_time() - begin
 
-    def _take(self, world: World) -> None:
+    def _take(self, world: Engine) -> None:
         if world.current != self._number:
             if self._number < 0:
                 hide_vessels(world)
@@ -96,7 +97,7 @@ class Film:
             self._latest = self.frame(world)
             self._write(self._latest)
 
-    def frame(self, world: World) -> Array:
+    def frame(self, world: Engine) -> Array:
         """Return the picture of now, captioned."""
         self.camera = self.camera or view_of(world.embodiment, self.width, self.height)
         return self._caption(picture(world, self.camera), world.current)

@@ -18,11 +18,13 @@ from planner.plan import Step
 from reasoner.embodiment.values import Body, PerceiverUse
 from reasoner.symbols import Fact, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
+from sim.engine import Bead, Engine, Thing
 from sim.perception import tilt_of
 from sim.skills import skill
+from sim.staging import pour_in
 from sim.urdf import Array
 from sim.verdict import SkillError, Verdict
-from sim.world import Bead, Thing, World
+from sim.world import World
 
 STOPPED = 0.02
 """Radians by which a joint stays behind its command if something stops it."""
@@ -132,7 +134,7 @@ class LiveWorld:
 
     # ------------------------------------------------------------------------------------------------- interfering
 
-    def _each_step(self, world: World) -> None:
+    def _each_step(self, world: Engine) -> None:
         happened = False
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
@@ -204,7 +206,7 @@ def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
     if value != use.values.get("empty"):
-        world._pour_in(symbol.arguments[0], value)
+        pour_in(world, symbol.arguments[0], value, world.perturb)
 
 
 def take_away(world: World, name: str) -> None:

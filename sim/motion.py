@@ -26,6 +26,9 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 JUMP = 0.35
 """Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
 
+FEWEST = 5
+"""Samples of a path that timing needs: it is at rest at the first and the last, and speeds up and brakes between them."""
+
 YAWS = np.linspace(-np.pi, np.pi, 48, endpoint=False)
 SWIVELS = np.linspace(-1.6, 1.6, 17)
 """Headings of a hand and swivels of an elbow that are tried at a point."""
@@ -248,6 +251,9 @@ def timed(arm: Arm, q: Array, limits: Limits, rate: float) -> tuple[Array, Array
     """
     if len(q) < 2 or np.abs(q - q[0]).max() < 1e-9:
         return q[-1:], np.zeros((1, 7))
+    if len(q) < FEWEST:  # between two samples that are both at rest nothing could ever move
+        spread = np.linspace(0, len(q) - 1, FEWEST)
+        q = np.stack([np.interp(spread, np.arange(len(q)), joint) for joint in q.T], -1)
     rows = np.concatenate([q, hand_frames(arm, q)[1]], -1)
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)

@@ -12,15 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reasoner.embodiment.values import PerceiverUse
+from sim.engine import Engine
 from sim.urdf import Array
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 
 @dataclass
@@ -35,7 +32,7 @@ class Draft:
 class Perceiver:
     """How a kind of situation type is read off the world and set up in it."""
 
-    observe: Callable[[World, PerceiverUse, tuple[str, ...]], str | None]
+    observe: Callable[[Engine, PerceiverUse, tuple[str, ...]], str | None]
     arrange: Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]
     code: str
 
@@ -48,7 +45,7 @@ def tilt_of(rotation: Array) -> float:
 # ------------------------------------------------------------------------------------------ where an object is
 
 
-def observe_place(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return the place on which the object stands, or `in_hand` if a hand carries it."""
     body = arguments[0]
     if body not in world.bodies:
@@ -73,7 +70,7 @@ def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 # ------------------------------------------------------------------------------------------ what a vessel contains
 
 
-def observe_content(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+def observe_content(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return which of the situation type's values the vessel contains at least `least` servings of (the most), or `empty`."""
     if arguments[0] not in world.bodies:
         return None
@@ -91,12 +88,12 @@ def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...],
 # ------------------------------------------------------------------------------------------ what a hand does
 
 
-def observe_held(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return what both fingers press, or `nothing`."""
     return world.held(arguments[0], use.numbers["force"]) or use.values["nothing"]
 
 
-def observe_position(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return where a hand is: `raised`, at an object, or at a place.
 
     What counts is the lowest point of the hand's load, or of its grip if it is empty, above the nearest place. Low enough, it
@@ -123,7 +120,7 @@ def observe_position(world: World, use: PerceiverUse, arguments: tuple[str, ...]
     return place if distance < numbers["nearness"] else None
 
 
-def observe_tilt(world: World, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return whether a hand is `upright` or `tilted`, or None between the two."""
     angle = tilt_of(world.hands[arguments[0]].frame()[0])
     if angle <= use.numbers["upright_angle"]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 
 from reasoner.embodiment.values import Embodiment, Shape
 from sim.bodies import outline, wall
+from sim.engine import Engine
 from sim.urdf import Array
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 NEAR, FAR = 0.1, 8.0
 SUN = np.array([0.45, 0.35, 0.82])
@@ -110,14 +108,14 @@ def _three(point: Array) -> tuple[float, float, float]:
     return (float(point[0]), float(point[1]), float(point[2]))
 
 
-def hide_vessels(world: World) -> None:
+def hide_vessels(world: Engine) -> None:
     """Leave vessels to `picture`: PyBullet's renderer shall leave them out."""
     for thing in world.bodies.values():
         if thing.shape.kind == "vessel":
             pybullet.changeVisualShape(thing.body, -1, rgbaColor=[1, 1, 1, 0], physicsClientId=world.client)
 
 
-def picture(world: World, camera: Camera) -> Array:
+def picture(world: Engine, camera: Camera) -> Array:
     """Return what the camera sees."""
     image, depth = _opaque(world, camera)
     _cast_shadows(world, image, depth, camera)
@@ -135,7 +133,7 @@ def picture(world: World, camera: Camera) -> Array:
     return shown
 
 
-def _cast_shadows(world: World, image: Array, depth: Array, camera: Camera) -> None:
+def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> None:
     """Darken table tops where hands and bodies keep the light off, more softly the higher these are."""
     casters = list(_casters(world))
     for fixture in world.embodiment.fixtures:
@@ -169,7 +167,7 @@ def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
     return distance.astype(np.float32), x.astype(np.float32), y.astype(np.float32)
 
 
-def _casters(world: World) -> Iterator[tuple[Array, float]]:
+def _casters(world: Engine) -> Iterator[tuple[Array, float]]:
     """Yield spheres (centre, radius) that cast shadows: those of the arms, and some up each body."""
     for hand in world.hands.values():
         mover = hand.mover()
@@ -181,7 +179,7 @@ def _casters(world: World) -> Iterator[tuple[Array, float]]:
             yield base + rotation[:, 2] * height, float(np.interp(height, heights, radii)) * 0.9
 
 
-def _opaque(world: World, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
+def _opaque(world: Engine, camera: Camera) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return PyBullet's picture on a backdrop, and the depth of each pixel along the forward axis."""
     _, _, colors, buffer, _ = pybullet.getCameraImage(
         camera.width,
@@ -225,7 +223,7 @@ def _soften(image: NDArray[Any]) -> None:
     pixels[at] = pixels[at] / 4 + around / 8 + corners / 16
 
 
-def _drops(world: World) -> Iterator[tuple[Array, float, Array]]:
+def _drops(world: Engine) -> Iterator[tuple[Array, float, Array]]:
     """Yield centre, radius and colour of the beverage's beads."""
     get = pybullet.getBasePositionAndOrientation
     for bead in world.beads:

@@ -9,20 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.attempt import CLOSE, Attempt, Numbers, Stage, fan, named
 from sim.bodies import height_of
+from sim.engine import Engine
 from sim.motion import poses_at, rotations
 from sim.perception import tilt_of
 from sim.robot import Manipulator
 from sim.urdf import Array
 from sim.verdict import SkillError
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""
@@ -49,7 +46,7 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
     return attempt.check_arrival(start[chosen[best]], numbers)
 
 
-def tilt(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
+def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
     """Pour a serving: roll about the lip until it has left the source, then roll back so far that no more flows."""
     attempt = Attempt.begin(world, roles["hand"])
     source, target = roles["source"], attempt.body(roles["target"])
@@ -89,7 +86,7 @@ def _check_pour(source: str, target: str, measured: Mapping[str, float], numbers
         raise SkillError("under-pour", (source, target), **measured)
 
 
-def stand_upright(world: World, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
+def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
     """Roll a tilted hand back about the lip of what it holds."""
     attempt = Attempt.begin(world, roles["hand"])
     hand, now = attempt.hand, attempt.hand.pose
@@ -116,7 +113,7 @@ def stand_upright(world: World, roles: Mapping[str, str], numbers: Numbers) -> M
     return measured
 
 
-def _filling(world: World, vessel: str) -> str | None:
+def _filling(world: Engine, vessel: str) -> str | None:
     """Return what there is most of in a vessel, or None if it's empty."""
     amounts = {name: world.amount(vessel, name) for name in world.embodiment.fillings}
     best = max(amounts, key=amounts.__getitem__, default=None)
@@ -203,7 +200,7 @@ class _Servo:
 
     ACCELERATION = 14.0
 
-    def __init__(self, world: World, hand: Manipulator, way: _Way, angle: float = 0.0) -> None:
+    def __init__(self, world: Engine, hand: Manipulator, way: _Way, angle: float = 0.0) -> None:
         self.world, self.hand, self.way, self.angle, self.rate = world, hand, way, angle, 0.0
         self.tick = 1 / world.rate
 

@@ -18,8 +18,10 @@ from typing import Any
 
 from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import State
+from sim.engine import Engine
+from sim.staging import Perturbation
 from sim.verify import Rollout, verify
-from sim.world import Perturbation, Step, World
+from sim.world import Step, World
 
 TRIES = 3
 """So many processes may die at a rollout before it is given up."""
@@ -46,7 +48,7 @@ class Trial:
     def run(
         self,
         seed: int,
-        watch: Callable[[World], None] | None = None,
+        watch: Callable[[Engine], None] | None = None,
         progress: Callable[[int, Step], None] | None = None,
         gui: bool = False,
     ) -> Rollout:

@@ -10,15 +10,12 @@ import ctypes.util
 import os
 import sys
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pybullet
 
+from sim.engine import Engine
 from sim.picture import view_of
-
-if TYPE_CHECKING:
-    from sim.world import World
 
 OFTEN = 4
 """Steps between two looks at the clock."""
@@ -66,7 +63,7 @@ class Screen:
         self._begin: tuple[float, int] | None = None
         self._current, self._caption = -1, -1
 
-    def __call__(self, world: World) -> None:
+    def __call__(self, world: Engine) -> None:
         """Keep pace with the clock, and write what is done."""
         if self._begin is None:
             self._begin = time.monotonic(), world.steps
@@ -80,7 +77,7 @@ class Screen:
             if ahead > 0:
                 time.sleep(ahead)
 
-    def _look(self, world: World) -> None:
+    def _look(self, world: Engine) -> None:
         """Turn the window's camera to where films are taken from."""
         camera = view_of(world.embodiment)
         x, y, z = np.array(camera.target) - np.array(camera.eye)
@@ -91,7 +88,7 @@ class Screen:
             pybullet.configureDebugVisualizer(option, 0, physicsClientId=client)
         pybullet.resetDebugVisualizerCamera(distance, yaw, pitch, camera.target, physicsClientId=client)
 
-    def _write(self, world: World) -> None:
+    def _write(self, world: Engine) -> None:
         """Write the primitive that is done now above the middle of the places."""
         if not 0 <= self._current < len(self.titles):
             return

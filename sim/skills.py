@@ -22,24 +22,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.attempt import Attempt, Numbers, Stage, fan, grip_stages
+from sim.engine import Engine
 from sim.motion import pose_of, poses_at, rotations, turned_near
 from sim.perception import tilt_of
 from sim.pouring import reach_over, stand_upright, tilt
 from sim.verdict import SkillError
 
-if TYPE_CHECKING:
-    from sim.world import World
-
 Roles = Mapping[str, str]
-Skill = Callable[["World", Roles, Numbers], Mapping[str, float]]
+Skill = Callable[["Engine", Roles, Numbers], Mapping[str, float]]
 
 
-def reach(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
+def reach(world: Engine, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     """Bring a hand to an object or a place: empty to take, with a vessel over another one to pour, or above a place."""
     attempt = Attempt.begin(world, roles["hand"])
     target = roles["target"]
@@ -94,7 +91,7 @@ def _reach_place(attempt: Attempt, place: str, numbers: Numbers) -> dict[str, fl
     return measured | {"off_place_m": off}
 
 
-def grasp(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
+def grasp(world: Engine, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     """Close the hand until both fingers have pressed the object for a while."""
     attempt = Attempt.begin(world, roles["hand"])
     target, hand = attempt.body(roles["object"]), attempt.hand
@@ -113,7 +110,7 @@ def grasp(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     return {"force_n": min(hand.pressing(body)), "seconds": waited / world.rate}
 
 
-def lift(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
+def lift(world: Engine, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     """Raise the hand with what it holds above its place; an empty hand goes on to its rest posture."""
     attempt = Attempt.begin(world, roles["hand"])
     hand, held = attempt.hand, attempt.held
@@ -140,7 +137,7 @@ def lift(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     return measured
 
 
-def put_down(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
+def put_down(world: Engine, roles: Roles, numbers: Numbers) -> Mapping[str, float]:
     """Let what the hand holds down at a place, open, and draw the hand back."""
     attempt = Attempt.begin(world, roles["hand"])
     hand, body, place = attempt.hand, roles["object"], roles["place"]
@@ -169,7 +166,7 @@ def put_down(world: World, roles: Roles, numbers: Numbers) -> Mapping[str, float
     return measured
 
 
-def _supports(world: World) -> list[str]:
+def _supports(world: Engine) -> list[str]:
     """Return the furniture, which what stands on it touches."""
     return [fixture.name for fixture in world.embodiment.fixtures]
 

@@ -10,9 +10,11 @@ from typing import Any
 from planner.validation import successor
 from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import Problem, State
+from sim.engine import Clock, Engine
 from sim.perception import perceiver
+from sim.staging import Perturbation
 from sim.verdict import Verdict
-from sim.world import Clock, Perturbation, Step, World
+from sim.world import Step, World
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def verify(
     beads: bool = True,
     noise: float = 0.0,
     prepare: Callable[[World], None] | None = None,
-    watch: Callable[[World], None] | None = None,
+    watch: Callable[[Engine], None] | None = None,
     progress: Callable[[int, Step], None] | None = None,
     gui: bool = False,
 ) -> Rollout:

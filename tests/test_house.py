@@ -18,9 +18,8 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "experience": {"hierarchical", "paper"},
     "acting": {"hierarchical"},
 }
-OPEN_CYCLES = [  # what still imports each other: a world and its skills, a scene and what can be done with it
+OPEN_CYCLES = [  # what still imports each other: a scene and what can be done with it
     {"confab.execution", "confab.memory", "confab.physics", "confab.picturing", "confab.reaching", "confab.scene"},
-    {"sim.attempt", "sim.perception", "sim.pouring", "sim.skills", "sim.world"},
 ]
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 

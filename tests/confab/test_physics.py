@@ -165,7 +165,7 @@ def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
         return 7
 
     monkeypatch.setattr("sim.screen.pybullet.addUserDebugText", write)
-    monkeypatch.setattr("sim.world.pybullet.GUI", pybullet.DIRECT)
+    monkeypatch.setattr("sim.engine.pybullet.GUI", pybullet.DIRECT)
     begin = time.monotonic()
     with World(scene.embodiment, scene.problem.initial, watch=Screen(("REACH", "GRASP"), 4.0), gui=True) as world:
         for world.current in (0, 1):

@@ -70,3 +70,14 @@ def test_timing_keeps_the_limits_and_ends_at_rest(serving: Case, rate: float) ->
     assert np.all(velocities[-1] == 0)
     assert np.all(np.abs(velocities) <= limits.velocity * 1.02)
     assert np.abs(np.diff(velocities, axis=0)).max() * rate < 3 * limits.acceleration
+
+
+def test_a_move_too_short_for_a_third_sample_is_timed_like_a_longer_one(serving: Case) -> None:
+    free = reacher(serving.embodiment)
+    for step in (0.001, 0.014):
+        q = free.follow(line(START, START + np.array([step, 0, 0, 0, 0, 0])))
+        assert q is not None
+        assert len(q) == 2
+        positions, _ = timed(free.arm, q, Limits(free.arm.velocity, 8.0, 1.0, 4.0), 240.0)
+        np.testing.assert_allclose(positions[-1], q[-1])
+        assert len(positions) < 60

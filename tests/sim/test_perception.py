@@ -6,7 +6,8 @@ import pytest
 from benchmarks.perception import perception
 from reasoner.symbols import State
 from sim.faults import displaced, drained, lying
-from sim.world import Perturbation, World
+from sim.staging import Perturbation
+from sim.world import World
 
 from .conftest import Case, case
 

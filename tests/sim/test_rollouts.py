@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from sim.rollouts import Trial, rollouts, wilson
-from sim.world import Perturbation, World
+from sim.staging import Perturbation
+from sim.world import World
 
 from .conftest import Case
 

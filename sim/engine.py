@@ -1,0 +1,273 @@
+"""PyBullet with the things of a scene in it: stepping, and sensing what is there.
+
+Rule 1: time is counted in steps of ``1 / RATE`` seconds, and every loop has a bound in steps.
+Rule 2: nothing is set but motor targets; only `sim.staging` before the first step and planted faults (`sim.faults`) may.
+Rule 3: every random number comes from `Engine.rng`, so the same arguments give the same world, bit by bit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pybullet
+
+from reasoner.embodiment.values import Embodiment, Shape
+from sim.bodies import center_height, height_of, inner_radius, outer_radius, outline, vessel_height
+from sim.collision import Solid, Surroundings, box, column
+from sim.robot import Manipulator
+from sim.urdf import Array, Spheres
+from sim.verdict import SkillError
+
+RATE = 240.0
+"""Simulation steps per second."""
+
+LAG = 0.08
+"""Radians that a joint may stay behind its command."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object in the world: its PyBullet body and its shape, as perturbed."""
+
+    body: int
+    shape: Shape
+
+
+@dataclass(frozen=True)
+class Bead:
+    """A drop of a beverage."""
+
+    body: int
+    filling: str
+
+
+@dataclass
+class Clock:
+    """CPU seconds by what they were spent on."""
+
+    planning: float = 0.0
+    stepping: float = 0.0
+    rendering: float = 0.0
+
+
+class Engine:
+    """A physics server with bodies, hands and beads: what skills move and perceivers look at.
+
+    Parameters
+    ----------
+    embodiment : Embodiment
+    seed : int
+        Of everything random.
+    noise : float
+        Standard deviation in metres of perceived positions.
+    gui : bool
+        Open PyBullet's window (`sim.screen.require_screen` first: where there is no screen PyBullet ends the process).
+    """
+
+    def __init__(self, embodiment: Embodiment, seed: int = 0, noise: float = 0.0, gui: bool = False) -> None:
+        self.embodiment = embodiment
+        self.rng = np.random.default_rng(seed)
+        self.noise, self.gui = noise, gui
+        self.watch: Callable[[Engine], None] | None = None
+        self.disturb: Callable[[Engine], None] | None = None
+        self.steps, self.current, self.clock = 0, -1, Clock()
+        self.names: dict[int, str] = {}
+        self.bodies: dict[str, Thing] = {}
+        self.hands: dict[str, Manipulator] = {}
+        self.standing: dict[str, Spheres] = {}
+        self.beads: list[Bead] = []
+        self.contents: dict[str, list[str]] = {}
+        self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
+        self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+        if self.client < 0:
+            raise RuntimeError("PyBullet could not start a physics server")
+        pybullet.setGravity(0, 0, -9.81, physicsClientId=self.client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=1 / RATE,
+            numSolverIterations=50,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+
+    def close(self) -> None:
+        """Free the physics server."""
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    # ------------------------------------------------------------------------------------------------- stepping
+
+    def run(self, steps: int) -> None:
+        """Simulate a number of steps with the motors' targets as they are."""
+        begin, rendering = time.process_time(), self.clock.rendering
+        hands = [hand for hand in self.hands.values() if hand.closing]
+        for _ in range(steps):
+            for hand in hands:
+                hand.drive()
+            pybullet.stepSimulation(physicsClientId=self.client)
+            self.steps += 1
+            if self.disturb is not None:
+                self.disturb(self)
+            if self.watch is not None:
+                self.watch(self)
+        self.clock.stepping += time.process_time() - begin - (self.clock.rendering - rendering)
+
+    def follow(self, hand: Manipulator, positions: Array, velocities: Array) -> None:
+        """Drive an arm along timed postures; raise `SkillError` if it stays behind its command."""
+        for i, (q, v) in enumerate(zip(positions, velocities, strict=True)):
+            hand.command(q, v)
+            self.run(1)
+            if i % 6 == 5:
+                self.check_course(hand)
+        hand.command(positions[-1])
+        self.run(6)
+        self.check_course(hand)
+
+    def check_course(self, hand: Manipulator) -> None:
+        """Raise `SkillError` if the skill's time is over, or if a joint is too far from its command.
+
+        The latter names what the arm touches, else the hand.
+        """
+        if self.steps > hand.deadline:
+            raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)
+        lag = float(np.abs(hand.measured() - hand.posture).max())
+        if lag > LAG:
+            raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
+
+    def touching(self, hand: Manipulator) -> tuple[str, ...]:
+        """Return what a hand's robot, or a body that it touches or holds, is in contact with, the held one excepted."""
+        held = self.held(hand.hand.name)
+        around = self._contacts(hand.body)
+        if held is not None:
+            around.add(held)
+        furniture = {fixture.name for fixture in self.embodiment.fixtures}
+        for name in sorted(around & self.bodies.keys()):
+            around |= self._contacts(self.bodies[name].body) - furniture
+        return tuple(sorted(around - {held, hand.robot.name}))
+
+    def _contacts(self, body: int) -> set[str]:
+        """Return what presses against a body."""
+        found = pybullet.getContactPoints(body, physicsClientId=self.client)
+        return {self.names[c[2]] for c in found if c[9] > 0.5 and c[2] != body and c[2] in self.names}
+
+    @property
+    def rate(self) -> float:
+        """Simulation steps per second."""
+        return RATE
+
+    @property
+    def seconds(self) -> float:
+        """Simulated seconds since the world began."""
+        return self.steps / RATE
+
+    # ------------------------------------------------------------------------------------------------- sensing
+
+    def truth(self, name: str) -> tuple[Array, Array]:
+        """Return where a body is: its rotation (3, 3) and the middle of its base (3,) in metres.
+
+        Raises
+        ------
+        SkillError
+            The world has no such body any more.
+        """
+        if name not in self.bodies:
+            raise SkillError("misplaced", (name,), f"{name} is nowhere to be seen", seen=0.0)
+        thing = self.bodies[name]
+        position, orientation = pybullet.getBasePositionAndOrientation(thing.body, physicsClientId=self.client)
+        rotation = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
+        return rotation, np.array(position) - rotation[:, 2] * center_height(thing.shape)
+
+    def sense(self, name: str) -> tuple[Array, Array]:
+        """Return a body's rotation and base as the robot perceives them, noise included."""
+        rotation, position = self.truth(name)
+        if self.noise:
+            position = position + self.rng.normal(0.0, self.noise, 3)
+        return rotation, position
+
+    def reading(self, name: str) -> Array:
+        """Return a body's perceived position."""
+        return self.sense(name)[1]
+
+    def top(self, name: str) -> Array:
+        """Return the middle of a body's perceived top: of a vessel, its mouth."""
+        rotation, base = self.sense(name)
+        return base + rotation[:, 2] * height_of(self.bodies[name].shape)
+
+    def nearest_place(self, point: Array) -> tuple[str, float]:
+        """Return the place that is horizontally nearest to a point, and its distance."""
+        gaps = {n: float(np.hypot(*(point[:2] - place.position[:2]))) for n, place in self.embodiment.places.items()}
+        name = min(gaps, key=gaps.__getitem__)
+        return name, gaps[name]
+
+    def held(self, hand: str, force: float = 1.0) -> str | None:
+        """Return the body that both fingers of a hand press with at least `force` newtons."""
+        manipulator = self.hands[hand]
+        for name, thing in self.bodies.items():
+            if min(manipulator.pressing(thing.body)) >= force:
+                return name
+        return None
+
+    def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> int:
+        """Return how many beads, of one filling or of all, are inside a vessel, where that is or is `sensed`."""
+        shape = self.bodies[vessel].shape
+        beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
+        if shape.kind != "vessel" or not beads:
+            return 0
+        rotation, base = self.sense(vessel) if sensed else self.truth(vessel)
+        local = (self._places_of(beads) - base) @ rotation
+        within = np.hypot(local[:, 0], local[:, 1]) < inner_radius(shape, local[:, 2]) + 0.001
+        return int(np.sum(within & (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)))
+
+    def _places_of(self, beads: Sequence[Bead]) -> Array:
+        get = pybullet.getBasePositionAndOrientation
+        return np.array([get(bead.body, physicsClientId=self.client)[0] for bead in beads])
+
+    def amount(self, vessel: str, filling: str) -> float:
+        """Return how many servings of a filling a vessel contains, as the robot perceives it."""
+        if not self.beads:
+            return float(filling in self.contents.get(vessel, ()))
+        return self.inside(vessel, filling, sensed=True) / self.embodiment.fillings[filling].serving
+
+    def stray(self) -> int:
+        """Return how many beads are in no vessel."""
+        return len(self.beads) - sum(self.inside(name) for name in self.bodies)
+
+    # ------------------------------------------------------------------------------------------------- surroundings
+
+    def surroundings(self, mover: str, held: str | None = None) -> Surroundings:
+        """Return what a hand must not touch: furniture, bodies as perceived, the robots' trunks and other arms."""
+        solids = [box(fixture) for fixture in self.embodiment.fixtures]
+        for name, thing in self.bodies.items():
+            if name != held:
+                rotation, base = self.sense(name)
+                half = height_of(thing.shape) / 2
+                radius = outer_radius(thing.shape)
+                size, center = np.array([radius, radius, half]), base + rotation[:, 2] * half
+                solids.append(Solid(name, "cylinder", size, center, rotation))
+        around = Surroundings(tuple(solids))
+        for name, spheres in self.standing.items():
+            around = around.plus(name, spheres)
+        for name, other in self.hands.items():
+            if name != mover:
+                arm = other.mover()
+                load = self.held(name)
+                if load is not None:
+                    arm = arm.holding(self.load_spheres(other, load))
+                around = around.plus(name, Spheres(arm.at(other.posture[None])[0], arm.spheres.radii))
+        return around
+
+    def in_hand(self, hand: Manipulator, body: str) -> tuple[Array, Array]:
+        """Return a body's rotation and base in the hand's frame."""
+        rotation, point = hand.frame()
+        turned, base = self.sense(body)
+        return rotation.T @ turned, rotation.T @ (base - point)
+
+    def load_spheres(self, hand: Manipulator, body: str) -> Spheres:
+        """Return spheres for a held body in the hand's frame; its lowest centimetres, which may touch the table, left out."""
+        shape = self.bodies[body].shape
+        rotation, base = self.in_hand(hand, body)
+        spheres = column(*outline(shape), bottom=min(0.03, height_of(shape) / 3))
+        return Spheres(spheres.centers @ rotation.T + base, spheres.radii)

@@ -1,0 +1,146 @@
+"""Setting the stage: furniture, robots, and the bodies and beads that a draft speaks of, put into an engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from reasoner.embodiment.values import Fixture, Shape
+from sim.bodies import KINDS, packed
+from sim.engine import Bead, Engine, Thing
+from sim.perception import Draft
+from sim.robot import load
+from sim.urdf import Array
+
+SETTLING = 120
+"""Steps in which bodies and beads come to rest before anything is done."""
+
+SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
+"""A triangle too small to see: `sim.picture` draws the beads, PyBullet would draw them at great cost."""
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """How a rollout may differ from the nominal world: each range is drawn from evenly, per body."""
+
+    position: float = 0.010
+    yaw: float = np.pi
+    friction: tuple[float, float] = (0.6, 1.2)
+    mass: tuple[float, float] = (0.7, 1.3)
+    fill: tuple[float, float] = (0.95, 1.1)
+
+
+def furnish(engine: Engine) -> None:
+    """Put the furniture and the robots of the embodiment into an engine."""
+    for fixture in engine.embodiment.fixtures:
+        engine.names[_make_fixture(engine.client, fixture)] = fixture.name
+    for robot in engine.embodiment.robots:
+        number, hands, still = load(engine.client, robot)
+        engine.names[number], engine.standing[robot.name] = robot.name, still
+        engine.hands |= {hand.hand.name: hand for hand in hands}
+
+
+def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: bool) -> None:
+    """Put the bodies of a draft, and what fills them, into an engine; let all come to rest."""
+    for name, place in draft.places.items():
+        if place not in engine.embodiment.places:
+            raise ValueError(
+                f"'{place}', where {name} is, has no position (places: {', '.join(engine.embodiment.places)})"
+            )
+        if name not in engine.embodiment.bodies:
+            raise ValueError(f"object '{name}' has no shape: give its class one")
+        shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)
+        orientation = np.array([0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)])
+        body = KINDS[shape.kind].make(engine.client, shape, position, orientation)
+        engine.names[body] = name
+        engine.bodies[name] = Thing(body, shape)
+    engine.contents = {name: list(fillings) for name, fillings in draft.contents.items()}
+    if beads:
+        for name, filling in ((name, filling) for name, all_in in draft.contents.items() for filling in all_in):
+            pour_in(engine, name, filling, perturb)
+    engine.run(SETTLING)
+    doze(engine)
+    engine.steps = 0
+
+
+def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None) -> tuple[Shape, Array, float]:
+    """Return shape, position and yaw of a body at a place, perturbed if that is wanted."""
+    position, yaw = np.array(engine.embodiment.places[place].position), 0.0
+    if perturb is not None:
+        limit = perturb.position
+        position[:2] += engine.rng.uniform(-limit, limit, 2)
+        yaw = float(engine.rng.uniform(-perturb.yaw, perturb.yaw))
+        friction, mass = engine.rng.uniform(*perturb.friction), engine.rng.uniform(*perturb.mass)
+        shape = Shape(
+            shape.kind,
+            shape.mass * mass,
+            shape.grasp_height,
+            shape.profile,
+            shape.numbers,
+            shape.color,
+            shape.friction * friction,
+        )
+    return shape, position, yaw
+
+
+def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | None = None) -> None:
+    """Let a vessel's beads go just above its bottom; PyBullet shows them only in a window."""
+    kind = engine.embodiment.fillings[filling]
+    share = 1.0 if perturb is None else float(engine.rng.uniform(*perturb.fill))
+    count = round(kind.serving * engine.embodiment.bodies[name].servings * share)
+    rotation, base = engine.truth(name)
+    collision = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=kind.radius, physicsClientId=engine.client)
+    look: dict[str, Any] = {"shapeType": pybullet.GEOM_MESH, "vertices": SPECK, "indices": [0, 1, 2]}
+    if engine.gui:
+        look = {"shapeType": pybullet.GEOM_SPHERE, "radius": kind.radius, "rgbaColor": kind.color}
+    speck = pybullet.createVisualShape(**look, physicsClientId=engine.client)
+    for spot in packed(engine.bodies[name].shape, count, kind.radius):
+        bead = pybullet.createMultiBody(
+            kind.mass,
+            collision,
+            speck,
+            basePosition=(base + rotation @ spot).tolist(),
+            useMaximalCoordinates=True,
+            physicsClientId=engine.client,
+        )
+        pybullet.changeDynamics(
+            bead,
+            -1,
+            lateralFriction=kind.friction,
+            restitution=0.0,
+            linearDamping=0.02,
+            angularDamping=0.5,
+            physicsClientId=engine.client,
+        )
+        engine.beads.append(Bead(bead, filling))
+
+
+def doze(engine: Engine) -> None:
+    """Let what has come to rest sleep until something touches it: beads at rest cost nothing then."""
+    for body in [*[thing.body for thing in engine.bodies.values()], *[bead.body for bead in engine.beads]]:
+        for state in (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_SLEEP):
+            pybullet.changeDynamics(body, -1, activationState=state, physicsClientId=engine.client)
+
+
+def _make_fixture(client: int, fixture: Fixture) -> int:
+    """Make a piece of furniture that does not move."""
+    half = [extent / 2 for extent in fixture.size]
+    body = pybullet.createMultiBody(
+        0,
+        pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client),
+        pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=half,
+            rgbaColor=fixture.color,
+            specularColor=[0.1, 0.1, 0.1],
+            physicsClientId=client,
+        ),
+        basePosition=fixture.position,
+        baseOrientation=pybullet.getQuaternionFromEuler([0, 0, fixture.yaw]),
+        physicsClientId=client,
+    )
+    pybullet.changeDynamics(body, -1, lateralFriction=fixture.friction, physicsClientId=client)
+    return int(body)
