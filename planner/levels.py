@@ -10,8 +10,7 @@ level should have been applicable that makes this change, maybe together with th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections.abc import Callable, Iterator, Sequence
 
 from planner.plan import Broken, Left, Plan, Step
 from planner.validation import Bindings, Cell, Facts, Rules, stretches
@@ -28,7 +27,6 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    substituted,
 )
 
 
@@ -107,7 +105,9 @@ class _Watch:
                 found, asked = self.nearest(level, behavior, effect, terms, change.symbol)
                 arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
                 if best is None or len(asked) < len(best.conditions):
-                    text = f"{change}: {' '.join((behavior.name, *arguments))} asks that {_all(asked)}"
+                    text = (
+                        f"{change}: {' '.join((behavior.name, *arguments))} asks that {' and '.join(map(said, asked))}"
+                    )
                     best = Broken(step.path, change, behavior.name, arguments, asked, text)
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
 
@@ -162,44 +162,40 @@ class _Watch:
         self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, symbol: Symbol
     ) -> tuple[Bindings, tuple[Condition, ...]]:
         """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
-        conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
-        mixed = self.mixed(level, symbol)
-        for size in range(1, len(conditions) + 1):
-            for without in combinations(range(len(conditions)), size):
-                rest = [c for i, c in enumerate(conditions) if i not in without]
-                for facts in (mixed, self.views[level]):
-                    found = self.rules.satisfied(rest, terms, kinds, facts)
-                    if found is not None:
-                        return found, tuple(substituted(conditions[i], found) for i in without)
-        return terms, ()
+        conditions = (*behavior.preconditions, *effect.when)
+        return self.rules.lacking(conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level]))
 
 
 def _seen(problem: Problem, level: int) -> dict[Symbol, str]:
     return {symbol: value for symbol, value in problem.initial.items() if problem.sees(level, symbol, value)}
 
 
-def _all(conditions: Sequence[Condition]) -> str:
-    return " and ".join(map(said, conditions))
+Words = Callable[[Fact | str], str]
+"""How a fact, or the name of an individual, a class or a relation, is written."""
 
 
-def said(condition: Condition) -> str:
-    """Return a condition as people write it.
+def said(condition: Condition, words: Words = str) -> str:
+    """Return a condition as people write it, with their own words for facts and names if they give them.
 
     >>> said(RelationCondition("canReach", ("left_hand", "location7")))
     'left_hand canReach location7'
     >>> said(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "location7"),), negated=True))
     'there is no Cup ?o with ?o LOCATION location7'
     """
+
+    def all_(conditions: Sequence[Condition]) -> str:
+        return " and ".join(said(inner, words) for inner in conditions)
+
     match condition:
         case ValueCondition(situation, arguments, value, negated):
-            return ("not " if negated else "") + str(Fact(Symbol(situation, arguments), value))
+            return ("not " if negated else "") + words(Fact(Symbol(situation, arguments), value))
         case RelationCondition(relation, arguments, negated):
-            return ("not " if negated else "") + " ".join((arguments[0], relation, *arguments[1:]))
+            return ("not " if negated else "") + " ".join(map(words, (arguments[0], relation, *arguments[1:])))
         case ClassCondition(term, kind, negated):
-            return f"{term} is {'no' if negated else 'a'} {kind}"
+            return f"{words(term)} is {'no' if negated else 'a'} {words(kind)}"
         case EqualityCondition(left, right, negated):
-            return f"{left} is {'not ' if negated else ''}{right}"
+            return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
         case Witness(variable, kind, conditions, negated):
-            return f"there is {'no' if negated else 'a'} {kind} {variable} with {_all(conditions)}"
+            return f"there is {'no' if negated else 'a'} {words(kind)} {words(variable)} with {all_(conditions)}"
         case AnyOf(alternatives, negated):
-            return ("not " if negated else "") + f"({' or '.join(map(_all, alternatives))})"
+            return ("not " if negated else "") + f"({' or '.join(map(all_, alternatives))})"

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import combinations, groupby
 from typing import TypeAlias
 
 from planner.plan import Plan, Step
@@ -30,6 +30,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"
@@ -41,6 +42,9 @@ Choice: TypeAlias = "tuple[str, frozenset[str], Callable[[Facts, Bindings], Iter
 """A variable, the individuals of its class, and those of which one can be it."""
 Part: TypeAlias = "Test | Choice"
 Change: TypeAlias = "tuple[str, Arguments, str]"
+
+MOST_LACKING = 4
+"""Conditions that are left out together where it is asked which of them a behaviour lacks."""
 
 
 @dataclass(frozen=True)
@@ -260,6 +264,23 @@ class Rules:
     ) -> Bindings | None:
         """Return a way to put individuals in for the other variables of conditions with which all hold, or None."""
         return _first(self.conjunction(conditions, set(terms), kinds), facts, terms)
+
+    def lacking(
+        self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
+    ) -> tuple[Bindings, tuple[Condition, ...]]:
+        """Return the fewest conditions without which the others hold in one of some states, with individuals put in.
+
+        Also returns with which individuals the others hold. More than `MOST_LACKING` are looked for one by one.
+        """
+        for size in range(1, min(len(conditions), MOST_LACKING) + 1):
+            for without in combinations(range(len(conditions)), size):
+                rest = [c for i, c in enumerate(conditions) if i not in without]
+                for facts in views:
+                    found = self.satisfied(rest, terms, kinds, facts)
+                    if found is not None:
+                        return found, tuple(substituted(conditions[i], found) for i in without)
+        alone = [c for c in conditions if all(self.satisfied([c], terms, kinds, facts) is None for facts in views)]
+        return terms, tuple(substituted(condition, terms) for condition in alone)
 
     def _behavior(self, behavior: Behavior) -> tuple[list[Part], list[tuple[list[Part], ValueEffect]]]:
         kinds = {p.name: p.kind for p in (*behavior.parameters, *behavior.variables)}

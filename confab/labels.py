@@ -1,0 +1,129 @@
+"""What people call things: sentences about facts, conditions and steps in the ontology's labels, not in names and IDs.
+
+A behaviour's label is a sentence about its roles ("move object to location"), so the individuals are put in for the roles that
+it mentions ("move cup 1 to location 7"); what it doesn't mention stands in brackets behind it. A fact is said by the label of its
+situation type's property ("cup 1 is at location 7"). What has no label keeps its name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from planner.levels import said
+from planner.plan import Plan, Step
+from reasoner.graph.knowledge import text
+from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem
+
+if TYPE_CHECKING:
+    from confab.scene import Scene
+
+LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
+  VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""
+PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property } ORDER BY ?situation ?property"
+AT_ONCE = 400
+"""So many labels are asked for in one query."""
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Names and what people call them; `verbs` are the labels of situation types' properties."""
+
+    words: Mapping[str, str]
+    verbs: Mapping[str, str]
+    domain: Domain
+
+    def name(self, name: str) -> str:
+        """Return what people call something."""
+        return self.words.get(name, name.lstrip("?"))
+
+    def fact(self, fact: Fact) -> str:
+        """Return a fact as a sentence."""
+        situation, (about, *rest) = fact.symbol.situation, fact.symbol.arguments or ("",)
+        boolean = situation in self.domain.situations and self.domain.situations[situation].boolean
+        if situation not in self.verbs and situation in self.words and about and not boolean:
+            of = " ".join(map(self.name, (about, *rest)))
+            return f"{self.words[situation]} of {of} is {self.name(fact.value)}"
+        verb = self.verbs.get(situation, situation)
+        value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
+        words = [*([self.name(about)] if about else []), verb, *map(self.name, (*rest, *value))]
+        return ("not: " if boolean and fact.value == FALSE else "") + " ".join(words)
+
+    def condition(self, condition: Condition) -> str:
+        """Return a condition as a sentence."""
+        return said(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.name(what))
+
+    def step(self, step: Step) -> str:
+        """Return what a step does as a sentence."""
+        behavior = self.domain.behaviors[step.behavior]
+        terms = dict(zip((p.name for p in behavior.parameters), step.arguments, strict=True))
+        terms |= {f"?{name.lstrip('?')}": value for name, value in step.bindings.items()}
+        return self.behavior(behavior, terms)
+
+    def behavior(self, behavior: Behavior, terms: Mapping[str, str]) -> str:
+        """Return what a behaviour does, with individuals for some of its roles, as a sentence."""
+        label = self.words.get(behavior.name)
+        if label is None:
+            return " ".join((behavior.name, *(self.name(terms.get(p.name, p.name)) for p in behavior.parameters)))
+        changed = {term for effect in behavior.effects for term in (*effect.arguments, effect.value)}
+        roles = [p.name for p in behavior.parameters]
+        roles += [v.name for v in behavior.variables if v.name in changed]
+        mentioned = {
+            role: re.compile(rf"\b(?:the |an? )?{re.escape(role.lstrip('?'))}\b", re.IGNORECASE)
+            for role in terms
+            if re.search(rf"\b{re.escape(role.lstrip('?'))}\b", label, re.IGNORECASE)
+        }
+        marks = {f"\0{number}\0": self.name(terms[role]) for number, role in enumerate(mentioned)}
+        for mark, pattern in zip(marks, mentioned.values(), strict=True):
+            label = pattern.sub(mark, label, count=1)
+        for mark, name in marks.items():
+            label = label.replace(mark, name)
+        rest = dict.fromkeys(self.name(terms[role]) for role in roles if role in terms and role not in mentioned)
+        return f"{label} ({', '.join(rest)})" if rest else label
+
+
+def labels_of(scene: Scene, problem: Problem, plan: Plan | None = None) -> Labels:
+    """Return the labels of a problem's behaviours, situation types and classes, and of the individuals that are spoken of.
+
+    Parameters
+    ----------
+    scene : Scene
+    problem : Problem
+    plan : Plan, optional
+        The individuals of its steps; all of the problem's if left out.
+    """
+    domain = problem.domain
+    names = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
+    names |= {name for s in problem.goal for name in (*s.arguments, problem.goal[s])}
+    if plan is None:
+        names |= {name for members in problem.classes.values() for name in members}
+    else:
+        steps = list(plan.walk())
+        names |= {name for step in steps for name in (*step.arguments, *step.bindings.values())}
+        names |= {name for symbol, value in problem.initial.items() if names & {*symbol.arguments} for name in (value,)}
+    return read_labels(scene, names, domain)
+
+
+def read_labels(scene: Scene, names: Iterable[str], domain: Domain) -> Labels:
+    """Return the labels of names; English ones before those of no language, these before others."""
+    table = scene.names
+    properties = {table.short(text(row[0])): text(row[1]) for row in scene.knowledge.select(PROPERTIES)}
+    iris = {table.iri(name): name for name in names if name in table}
+    found = _labels(scene, sorted({*iris, *properties.values()}))
+    words = {name: found[iri] for iri, name in iris.items() if iri in found}
+    verbs = {situation: found[iri] for situation, iri in properties.items() if iri in found}
+    return Labels(words, verbs, domain)
+
+
+def _labels(scene: Scene, iris: list[str]) -> dict[str, str]:
+    found: dict[str, tuple[int, str]] = {}
+    for start in range(0, len(iris), AT_ONCE):
+        those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])
+        for row in scene.knowledge.select(LABELS.format(those=those)):
+            iri, label, language = (text(term) for term in row)
+            rank = 0 if language.startswith("en") else 1 if not language else 2
+            if iri not in found or rank < found[iri][0]:
+                found[iri] = rank, label
+    return {iri: label for iri, (_, label) in found.items()}

@@ -1,0 +1,272 @@
+"""What each step of a plan is for: the causal links to the goal, to the step above it, or to the later step that needs it.
+
+A step is needed by a later one of its level if that one can't be done, or doesn't do what is needed of it, in the same state
+but for one fact that the earlier step gave, which is put back to what it was before. So a link is found whatever kind of
+condition makes it ("nobody stands there" as well as "the hand holds it"), and `planner.validation` rejects the rest of the plan
+without it. Each level has its own order of steps; where a plan leaves a level, the steps below stand in it.
+
+What a step is asked to look at is noted while it looks, so that only facts that it read are put back: the effort grows with
+what the plan's steps read and not with the square of its length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from planner.plan import Plan, Step
+from planner.validation import Arguments, Cell, Facts, Rules
+from reasoner.symbols import Condition, Fact, Problem, Symbol, substituted
+
+Path = tuple[int, ...]
+
+
+class Kind(Enum):
+    """What needs a fact."""
+
+    GOAL = "goal"  # it is wanted in the end
+    ABOVE = "above"  # the step above brings it about, or leaves it as it was
+    REST = "rest"  # it is the rest value of what was touched
+    LATER = "later"  # a later step of the same level asks for it, or does what it does because of it
+
+
+@dataclass(frozen=True)
+class Change:
+    """A fact that a step makes true, and the value that the symbol had before."""
+
+    fact: Fact
+    before: str
+
+
+@dataclass(frozen=True)
+class Need:
+    """What would break without some of what a step gives.
+
+    `gives` are the facts at issue; `by` is the path of the step that needs them, empty for the goal and for what is at rest in the
+    end of the whole plan. `conditions` are the preconditions of a later step that fail without them, with individuals put in; none
+    where it could be done all the same and would do something else.
+    """
+
+    kind: Kind
+    gives: tuple[Change, ...]
+    by: Path = ()
+    conditions: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True)
+class Purpose:
+    """What a step gives, as its level says it, and what needs it: the nearest first. No need: the goal is reached without it."""
+
+    gives: tuple[Change, ...]
+    needs: tuple[Need, ...]
+
+
+def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
+    """Return the purpose of every step, by its path.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        One that `planner.validation.validate` finds nothing wrong with.
+    """
+    gives: dict[Path, tuple[Change, ...]] = {}
+    needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
+    for level in sorted({step.level for step in plan.walk()}):
+        course = _Course(problem, plan, level)
+        for path, need in course.links():
+            if need not in needs[path]:
+                needs[path].append(need)
+        gives |= course.gives
+    return {path: Purpose(gives[path], tuple(sorted(found, key=_nearest(path)))) for path, found in needs.items()}
+
+
+def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
+    """Return the order of a step's needs: the goal, those beside it, the step above, those elsewhere, what is at rest."""
+    order = {Kind.GOAL: 0, Kind.ABOVE: 2, Kind.REST: 4}
+
+    def key(need: Need) -> tuple[int, Path]:
+        beside = need.by[:-1] == path[:-1]
+        return order.get(need.kind, 1 if beside else 3), need.by
+
+    return key
+
+
+def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
+    """Yield the steps of a level in order; where it is left or ends, those that stand in its place."""
+    for step in steps:
+        if step.level >= level or not step.steps:
+            yield step
+        else:
+            yield from on_level(step.steps, level)
+
+
+@dataclass
+class _Written:
+    """Who gave a cell its value, and what it was before."""
+
+    by: int
+    before: str
+
+
+class _Noting(Facts):
+    """Facts that note which cells they are asked for, and which holders of which value."""
+
+    def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
+        super().__init__(problem, state)
+        self.cells: dict[Cell, None] = {}
+        self.of_value: dict[tuple[str, str], None] = {}
+
+    def value(self, situation: str, arguments: Arguments) -> str | None:
+        self.cells[situation, arguments] = None
+        return super().value(situation, arguments)
+
+    def holders(self, situation: str, value: str) -> Iterable[Arguments]:
+        self.of_value[situation, value] = None
+        return list(super().holders(situation, value))
+
+
+class _Course:
+    """The steps of one level, carried out in their order."""
+
+    def __init__(self, problem: Problem, plan: Plan, level: int) -> None:
+        self.problem, self.level = problem, level
+        self.steps = list(on_level(plan.steps, level))
+        self.rules = Rules(problem)
+        self.facts = _Noting(problem, problem.initial)
+        self.written: dict[Cell, _Written] = {}
+        self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # cells that have, or had before, a value
+        self.gives: dict[Path, tuple[Change, ...]] = {}
+        self.groups = {step.path: step for step in plan.walk() if step.steps and _least(step.steps) == level}
+        self.whole = plan.steps if _least(plan.steps) == level else ()
+
+    def links(self) -> Iterator[tuple[Path, Need]]:
+        """Yield each step that is needed, with the need."""
+        found: list[tuple[Path, Need]] = []
+        deeds: list[tuple[int, int, tuple[Change, ...], frozenset[Cell]]] = []
+        open_: dict[Path, tuple[int, int, dict[Cell, str]]] = {}
+        for number, step in enumerate(self.steps):
+            for path, group in self.groups.items():
+                if group.steps[0].path == step.path:
+                    open_[path] = number, len(self.facts.log), self.changes(group) or {}
+            for writer, changes, conditions, differs in self.asked(step):
+                if conditions or not differs:
+                    found.append((self.steps[writer].path, Need(Kind.LATER, changes, step.path, conditions)))
+                else:
+                    deeds.append((writer, number, changes, differs))
+            self.done(number, step)
+            for path in [path for path in open_ if self.groups[path].steps[-1].path == step.path]:
+                first, mark, wanted = open_.pop(path)
+                found += self.left(path, self.groups[path].level, first, mark, wanted)
+        if self.whole:
+            goal = {(symbol.situation, symbol.arguments): value for symbol, value in self.problem.goal.items()}
+            found += self.left((), 0, 0, 0, goal)
+        needed = {(path, change.fact) for path, need in found for change in need.gives}
+        for writer, number, changes, differs in reversed(deeds):
+            step = self.steps[number]
+            if any((step.path, self.fact_of(number, cell)) in needed for cell in differs):
+                found.append((self.steps[writer].path, Need(Kind.LATER, changes, step.path)))
+                needed |= {(self.steps[writer].path, change.fact) for change in changes}
+        yield from found
+
+    def changes(self, step: Step) -> dict[Cell, str] | None:
+        """Return what a step says it changes now; None if it can't be done."""
+        behavior = self.problem.domain.behaviors[step.behavior]
+        found = self.rules.changes(behavior, step.arguments, self.facts)
+        return None if found is None else {(situation, key): value for situation, key, value in found}
+
+    def asked(self, step: Step) -> Iterator[tuple[int, tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]]]:
+        """Yield who gave what a step needs, the conditions that fail without it, or the cells that it would leave otherwise."""
+        facts, behavior = self.facts, self.problem.domain.behaviors[step.behavior]
+        facts.cells, facts.of_value = {}, {}
+        before = self.changes(step) or {}
+        read = dict.fromkeys(cell for cell in facts.cells if cell in self.written)
+        for wanted in facts.of_value:
+            read.update(self.having.get(wanted, {}))
+        given: list[Change] = []
+        for cell, value in before.items():
+            if (old := facts.value(*cell)) is not None and old != value:
+                given.append(Change(Fact(Symbol(*cell), value), old))
+        self.gives[step.path] = tuple(given)
+        terms = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
+        bound = self.rules.satisfied(behavior.preconditions, terms, behavior.kinds, facts) or terms
+        by: dict[int, list[Cell]] = {}
+        for cell in read:
+            by.setdefault(self.written[cell].by, []).append(cell)
+        for writer, cells in sorted(by.items()):
+            alone = [found for cell in cells if (found := self.without(step, [cell], before, bound)) is not None]
+            if not alone and len(cells) > 1:
+                alone = [found for found in (self.without(step, cells, before, bound),) if found is not None]
+            for changes, conditions, differs in alone:
+                yield writer, changes, conditions, differs
+
+    def without(
+        self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
+    ) -> tuple[tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]] | None:
+        """Return what breaks for a step if cells have the values that they had before they were written; None if nothing does."""
+        facts, mark = self.facts, len(self.facts.log)
+        now = {cell: str(facts.value(*cell)) for cell in cells}
+        for cell in cells:
+            facts.put(*cell, self.written[cell].before)
+        after = self.changes(step)
+        preconditions = self.problem.domain.behaviors[step.behavior].preconditions
+        broken: list[Condition] = []
+        if after is None:
+            grounded = [substituted(condition, bound) for condition in preconditions]
+            broken = [c for c in grounded if self.rules.satisfied([c], {}, {}, facts) is None]
+        for cell, value in now.items():
+            facts.put(*cell, value)
+        del facts.log[mark:]
+        changes = tuple(Change(Fact(Symbol(*cell), value), self.written[cell].before) for cell, value in now.items())
+        if after is None:
+            return changes, tuple(broken), frozenset()
+        differs = frozenset(cell for cell, value in before.items() if after.get(cell) != value and cell not in now)
+        return (changes, (), differs) if differs else None
+
+    def done(self, number: int, step: Step) -> None:
+        """Carry a step out, with all below it, and note what it gave."""
+        mark = len(self.facts.log)
+        for primitive in Plan((step,)).primitives:
+            for cell, value in (self.changes(primitive) or {}).items():
+                self.facts.put(*cell, value)
+        for cell, before in self.facts.since(mark).items():
+            if cell in self.written:
+                for value in (self.written[cell].before, before):
+                    self.having.get((cell[0], value), {}).pop(cell, None)
+            self.written[cell] = _Written(number, before)
+            for value in (before, str(self.facts.value(*cell))):
+                self.having.setdefault((cell[0], value), {})[cell] = None
+
+    def left(
+        self, path: Path, level: int, first: int, mark: int, wanted: Mapping[Cell, str]
+    ) -> Iterator[tuple[Path, Need]]:
+        """Yield what a group of steps, of the step above or of the whole plan (level 0), has to leave, with who gave it."""
+        touched = dict[Cell, str]()
+        for situation, arguments, old in self.facts.log[mark:]:
+            touched.setdefault((situation, arguments), old)
+        for cell, begun in touched.items():
+            written = self.written.get(cell)
+            if written is None or written.by < first:
+                continue
+            symbol, value = Symbol(*cell), str(self.facts.value(*cell))
+            kind = self.problem.domain.situations[symbol.situation]
+            if wanted.get(cell) == value:
+                why = Kind.ABOVE if level else Kind.GOAL
+            elif level and value == begun and self.problem.sees(level, symbol, begun):
+                why = Kind.ABOVE
+            elif value == kind.rest and level < self.problem.first_level(symbol) <= self.level:
+                why = Kind.REST
+            else:
+                continue
+            yield self.steps[written.by].path, Need(why, (Change(Fact(symbol, value), written.before),), path)
+
+    def fact_of(self, number: int, cell: Cell) -> Fact | None:
+        """Return the fact that a step gives to a cell."""
+        given = self.gives.get(self.steps[number].path, ())
+        return next((c.fact for c in given if (c.fact.symbol.situation, c.fact.symbol.arguments) == cell), None)
+
+
+def _least(steps: Sequence[Step]) -> int:
+    """Return the most abstract level that steps beside each other have."""
+    return min((step.level for step in steps), default=0)

@@ -1,0 +1,195 @@
+"""Why not that? An alternative is made to happen, and what follows is planned and costed; or what it lacks is named.
+
+Two kinds of alternative are asked for. A *step* in the place of another one: the plan up to there is kept, the step is done
+(and refined) there, and what is left is planned anew. A *choice*, which individual shall take part in what changes a symbol: every
+behaviour that changes this symbol and could take the individual has to take it, and everything is planned anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from planner.causal_links import on_level
+from planner.plan import Outcome, Plan, Reason, Step, renumbered
+from planner.validation import Bindings, Facts, Rules, successor, validate
+from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol
+
+Ask = Callable[[Problem], Outcome]
+"""Plans: `planner.solve.solve` with whatever mode and limits."""
+
+
+class NoChoiceError(ValueError):
+    """The choice that is asked for isn't there to be made; the message says why."""
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """What became of an alternative.
+
+    `behavior` and `arguments` are the step that was asked for (where one was), `instead` the step in whose place it is done. With
+    `lacks`, it can't be done: these conditions fail there. With `plan`, that is what follows from the beginning to the end, and
+    `cost` and `before` are what it and the plan that it is compared with cost. With `reason`, no plan follows. With none of
+    these, `instead` is that very step: the plan has it.
+    """
+
+    before: float
+    behavior: str = ""
+    arguments: tuple[str, ...] = ()
+    instead: Step | None = None
+    lacks: tuple[Condition, ...] = ()
+    plan: Plan | None = None
+    cost: float | None = None
+    reason: Reason | None = None
+
+
+def cost_of(problem: Problem, plan: Plan) -> float:
+    """Return what the primitives of a plan cost."""
+    return sum(problem.domain.behaviors[step.behavior].cost for step in plan.primitives)
+
+
+def instead_of(
+    problem: Problem, plan: Plan, behavior: Behavior, given: Bindings, ask: Ask, place: Step | None = None
+) -> Contrast:
+    """Return what follows if a step is done in the place of one of a plan.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+    behavior : Behavior
+    given : mapping of parameters to individuals
+        The others may be anything with which it can be done.
+    ask : callable
+        Plans.
+    place : Step, optional
+        In whose place, a step of the same level; if left out, of the most similar step where it can be done.
+    """
+    rules, before = Rules(problem), cost_of(problem, plan)
+    course = list(on_level(plan.steps, behavior.level))
+    places = [i for i, step in enumerate(course) if place is None or step.path == place.path]
+    states = _states(problem, course)
+    for i in places:
+        if course[i].behavior == behavior.name and given.items() <= _terms(behavior, course[i].arguments).items():
+            return Contrast(before, behavior.name, course[i].arguments, course[i])
+    possible: list[tuple[int, tuple[str, ...]]] = []
+    for i in places:
+        found = rules.satisfied(behavior.preconditions, given, behavior.kinds, Facts(problem, states[i]))
+        if found is not None:
+            possible.append((i, tuple(found[p.name] for p in behavior.parameters)))
+    if not possible:
+        return _lacking(rules, behavior, given, [(course[i], Facts(problem, states[i])) for i in places], before)
+    at, arguments = max(possible, key=lambda one: (_alike(course[one[0]], behavior, one[1]), -one[0]))
+    asked = Contrast(before, behavior.name, arguments, course[at])
+    step, why = _refined(problem, states[at], behavior, arguments, ask)
+    if step is None:
+        return replace(asked, reason=why)
+    after = states[at]
+    for primitive in Plan((step,)).primitives:
+        after = successor(problem, problem.domain.behaviors[primitive.behavior], primitive.arguments, after) or after
+    rest = ask(_from(problem, behavior.level, after))
+    if rest.plan is None:
+        return replace(asked, reason=rest.reason)
+    whole = Plan(renumbered((*course[:at], step, *rest.plan.steps)))
+    if faults := validate(problem, whole):
+        return replace(asked, reason=Reason(faults[0].text))
+    return replace(asked, plan=whole, cost=cost_of(problem, whole))
+
+
+def with_choice(problem: Problem, plan: Plan, symbol: Symbol, who: str, ask: Ask) -> Contrast:
+    """Return what follows if an individual takes part wherever it could in what changes a symbol.
+
+    Raises
+    ------
+    NoChoiceError
+        No behaviour that changes such a symbol could take the individual.
+    """
+    behaviors = {b.name: _bound_to(problem, b, symbol, who) for b in problem.domain.behaviors.values()}
+    if behaviors == problem.domain.behaviors:
+        raise NoChoiceError(f"no behaviour that changes {symbol} has a part for {who}")
+    outcome = ask(replace(problem, domain=replace(problem.domain, behaviors=behaviors)))
+    before = cost_of(problem, plan)
+    if outcome.plan is None:
+        return Contrast(before, reason=outcome.reason)
+    return Contrast(before, plan=outcome.plan, cost=cost_of(problem, outcome.plan))
+
+
+def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) -> Behavior:
+    """Return a behaviour that changes a symbol only with an individual in one of its parts, if it has a part for it."""
+    parts = [name for name, kind in behavior.kinds.items() if who in problem.members(kind)]
+    parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
+                                               if effect.situation == symbol.situation)]  # fmt: skip
+    if not parts:
+        return behavior
+    asks: list[Condition] = []
+    for effect in behavior.effects:
+        terms = [
+            (t, a) for t, a in zip(effect.arguments, symbol.arguments, strict=False) if t in behavior.kinds or t != a
+        ]
+        if effect.situation != symbol.situation or any(term not in behavior.kinds for term, _ in terms):
+            continue
+        others = [(EqualityCondition(term, name, negated=True),) for term, name in terms]
+        asks.append(AnyOf(tuple((EqualityCondition(part, who),) for part in parts) + tuple(others)))
+    return replace(behavior, preconditions=(*behavior.preconditions, *dict.fromkeys(asks)))
+
+
+def _states(problem: Problem, course: Sequence[Step]) -> list[State]:
+    """Return the state before each of some steps."""
+    states = [problem.initial]
+    for step in course[:-1]:
+        state = states[-1]
+        for primitive in Plan((step,)).primitives:
+            state = (
+                successor(problem, problem.domain.behaviors[primitive.behavior], primitive.arguments, state) or state
+            )
+        states.append(state)
+    return states
+
+
+def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
+    return {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
+
+
+def _alike(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
+    """Return how much a step is like another: by what takes part in both, then by what is done."""
+    return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
+
+
+def _lacking(
+    rules: Rules, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
+) -> Contrast:
+    """Return where a behaviour lacks the fewest conditions, and which."""
+    best: Contrast | None = None
+    for step, facts in places:
+        found, lacks = rules.lacking(behavior.preconditions, given, behavior.kinds, (facts,))
+        if best is None or len(lacks) < len(best.lacks):
+            arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
+            best = Contrast(before, behavior.name, arguments, step, lacks)
+    assert best is not None, "a plan without steps has no place for another one"
+    return best
+
+
+def _refined(
+    problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
+) -> tuple[Step | None, Reason | None]:
+    """Return a step with its refinement from a state, or why there is none."""
+    step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
+    after = successor(problem, behavior, arguments, state)
+    if behavior.level == problem.domain.levels[-1] or after is None or after == state:
+        return step, None
+    only = tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=True))
+    forced = replace(behavior, preconditions=(*behavior.preconditions, *only))
+    lower = {b.name: b for b in problem.domain.behaviors.values() if b.level > behavior.level}
+    goal = {symbol: value for symbol, value in after.items() if state.get(symbol) != value}
+    domain = replace(problem.domain, behaviors={behavior.name: forced, **lower})
+    outcome = ask(replace(problem, domain=domain, initial=state, goal=goal))
+    if outcome.plan is None or [s.behavior for s in outcome.plan.steps] != [behavior.name]:
+        return None, outcome.reason or Reason(f"no steps of the level below do what {step} says")
+    return replace(outcome.plan.steps[0], id=step.id), None
+
+
+def _from(problem: Problem, level: int, state: State) -> Problem:
+    """Return what is left to be done from a state between two steps of a level, by behaviours of that level and those below."""
+    behaviors = {b.name: b for b in problem.domain.behaviors.values() if b.level >= level}
+    goal = problem.goal_on(level)
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors), initial=state, goal=goal)

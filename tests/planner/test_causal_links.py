@@ -1,0 +1,82 @@
+"""What a step is said to be needed for breaks, by the checker, when what it gave is taken away just before."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from planner.causal_links import Kind, Need, purposes
+from planner.hierarchical.planner import plan as default
+from planner.plan import Plan, Step
+from planner.validation import Fault, validate
+from reasoner.symbols import Behavior, Problem, Symbol, ValueEffect
+from tests.planner.small import CASES
+from worlds.families import tabletop
+from worlds.hierarchies import hierarchy
+
+UNDO = "UNDO"
+
+
+def undone(problem: Problem, plan: Plan, need: Need) -> list[Fault]:
+    """Return what the checker says of a plan in which what is needed is put back, by a step of its own, before it is needed."""
+    depth = max(step.level for step in plan.walk())
+    effects = tuple(ValueEffect(c.fact.symbol.situation, c.fact.symbol.arguments, c.before) for c in need.gives)
+    undo = Behavior(UNDO, depth, (), effects=effects)
+    domain = replace(problem.domain, behaviors={**problem.domain.behaviors, UNDO: undo})
+    wider = replace(problem, domain=domain)
+    step = Step((-1,), wider.id_of(UNDO, ()), depth, UNDO, ())
+
+    def put(steps: Sequence[Step], above: tuple[int, ...]) -> tuple[Step, ...]:
+        found: list[Step] = []
+        for one in steps:
+            found += [step] if need.kind is Kind.LATER and one.path == need.by else []
+            found.append(replace(one, steps=put(one.steps, one.path)))
+        at_its_end = need.kind is not Kind.LATER and above == need.by and found
+        return (*found, step) if at_its_end else tuple(found)
+
+    return [fault for fault in validate(wider, Plan(put(plan.steps, ()))) if fault.path != step.path]
+
+
+def check(problem: Problem) -> int:
+    """Hold all links of a problem's plan against the checker; return how many there are."""
+    plan = default(problem).plan
+    if plan is None:
+        return 0
+    links = purposes(problem, plan)
+    assert links.keys() == {step.path for step in plan.walk()}
+    for path, purpose in links.items():
+        for need in purpose.needs:
+            faults = undone(problem, plan, need)
+            assert faults, (path, need)
+            if need.conditions or need.kind in (Kind.GOAL, Kind.ABOVE):
+                assert need.by in {fault.path for fault in faults}, (path, need, faults)
+    return sum(len(purpose.needs) for purpose in links.values())
+
+
+@pytest.mark.parametrize("block", range(5))
+def test_on_random_worlds_what_is_named_breaks(block: int) -> None:
+    assert sum(check(hierarchy(seed)) for seed in range(1000 + 12 * block, 1012 + 12 * block)) > 100
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
+def test_on_the_cases_of_levels_what_is_named_breaks(case) -> None:  # type: ignore[no-untyped-def]
+    assert check(case().problem) > 0
+
+
+def test_on_the_table_every_step_is_needed_and_the_first_level_for_the_goal() -> None:
+    problem = tabletop()
+    plan = default(problem).plan
+    assert plan is not None
+    links = purposes(problem, plan)
+    assert all(purpose.needs for purpose in links.values())
+    assert {links[step.path].needs[0].kind for step in plan.steps} == {Kind.GOAL}
+    assert check(problem) > 60
+
+
+def test_a_step_that_nothing_needs_is_said_to_be_needed_by_nothing() -> None:
+    problem = tabletop()
+    plan = default(problem).plan
+    assert plan is not None
+    wanted = plan.steps[0]
+    goal = {s: v for s, v in problem.goal.items() if s != Symbol("LOCATION", wanted.arguments[:1])}
+    assert purposes(replace(problem, goal=goal), plan)[wanted.path].needs == ()
