@@ -20,8 +20,9 @@ import typer
 from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
+    from confab.explaining import Explanation
     from confab.memory import Memory
-    from confab.scene import Scene
+    from confab.scene import Result, Scene
     from planner.plan import Plan
     from reasoner.limits import Deadline
 
@@ -442,42 +443,70 @@ def validate(
 @app.command()
 def explain(
     scene: SceneName,
+    which: Annotated[
+        str | None,
+        typer.Argument(metavar="STEP", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."),
+    ] = None,
+    instead: Annotated[
+        str | None,
+        typer.Option(
+            "--not",
+            metavar="WHAT",
+            help="Why not this: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
+        ),
+    ] = None,
     goal: Goals = None,
     memory: MemoryFile = None,
     step: Annotated[int, typer.Option(metavar="N", min=0, help="Which step of the level, counted from 0.")] = 0,
     level: Annotated[int, typer.Option(metavar="L", help="On which level of the plan.")] = 1,
     against: Annotated[
-        str | None, typer.Option(metavar="BEHAVIOR", help="The alternative, e.g. 'B2_PICK right_hand cup1'.")
+        str | None, typer.Option(metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
     ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the reasons: PNG, SVG or PDF.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say why this behaviour and not that, or why no plan."""
-    from confab.explaining import explain as explain_step
-    from confab.interchange import ground_named
-
+    """Say why each step is there, why not another one, or why no plan."""
     loaded = _load(scene)
     remembered = _memory(memory, False, loaded)
     result = loaded.plan(goal or (), remembered)
-    if not result.solved or remembered is None:
-        if result.solved:
-            raise KnowledgeError("there is a plan; to explain a choice in it, give the --memory that made it")
+    if not result.solved:
         _print(result.json() if as_json else result)
         raise typer.Exit(EXIT[result.outcome.status.value])
-    steps = [(s.behavior, s.arguments) for s in result.plan.at_level(level)]
     if level not in result.problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
+    if which is None and (step, level) != (0, 1):
+        which = f"L{level}#{step}"
+    if instead is not None:
+        told: Any = result.why_not(instead, which)
+    elif remembered is not None:
+        told = _by_memory(result, remembered, which or "L1#0", against, plot)
+    else:
+        if against is not None or plot is not None:
+            raise KnowledgeError(
+                "--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT"
+            )
+        told = result.explain() if which is None else result.why(which)
+    _print(told.json() if as_json else told)
+
+
+def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
+    """Return why memory prefers a step of a plan to another one, and draw it."""
+    from confab.explaining import explain as explain_step
+    from confab.interchange import ground_named
+    from confab.why import find_step
+
     if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise KnowledgeError(f"{plot}: can't draw into '{plot.suffix}'; wanted .png, .svg or .pdf")
+    asked = find_step(result.plan, which, result.labels)
+    on = result.plan.at_level(asked.level)
+    steps = [(s.behavior, s.arguments) for s in on]
     other = ground_named(result.problem, against) if against else None
-    found = explain_step(result.problem, remembered, steps, step, other)
+    found = explain_step(result.problem, memory, steps, on.index(asked), other, result.labels)
     if not found.note and not any(counts.evaluated for counts in result.outcome.search.values()):
-        found = replace(
-            found, note="the fast planner found this plan before memory was asked: so memory sees its choices"
-        )
+        found = replace(found, note="the planner found this plan before memory was asked: so memory sees its choices")
     if plot is not None:
         found.plot(plot)
-    _print(found.json() if as_json else str(found))
+    return found
 
 
 @memory_app.command()

@@ -13,6 +13,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from confab.lifted import sentence
 from planner.experience.choice_points import Field, Ground, single_level
 from planner.experience.scoring import TOGETHER, Judge
 from planner.hierarchical.operators import Program
@@ -23,6 +24,7 @@ from reasoner.symbols import Problem
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from confab.labels import Labels
     from confab.memory import Memory
 
 SHOWN = 8
@@ -32,7 +34,10 @@ PRIOR = "how often it is chosen at all"
 
 @dataclass(frozen=True)
 class Why:
-    """One fact: what it is of the chosen behaviour and of the alternative, and how much it spoke for the choice."""
+    """One fact: what it is of the chosen behaviour and of the alternative, and how much it spoke for the choice.
+
+    `says` and `says_other` say this in sentences, where labels were given.
+    """
 
     fact: str
     chosen: str
@@ -40,6 +45,8 @@ class Why:
     weight: float
     drop: float | None = None
     also: tuple[str, ...] = ()
+    says: str = ""
+    says_other: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,10 @@ class Explanation:
         """Return the explanation as JSON data."""
         return asdict(self)
 
+    def __rich__(self) -> str:
+        """Return the explanation for rich."""
+        return str(self)
+
     def __str__(self) -> str:
         """Return the explanation in a few lines."""
         if not self.other:
@@ -76,7 +87,12 @@ class Explanation:
                 f" (in other words: {', '.join(why.also[:2])}{' …' if len(why.also) > 2 else ''})" if why.also else ""
             )
             drop = "" if why.drop is None else f"; without it the lead is {self.lead - why.drop:+.2f}"
-            lines.append(f"  {why.weight:+6.2f}  {why.fact}: {why.chosen}, there {why.other}{also}{drop}")
+            if why.says:
+                there = f"; there: {why.says_other}" if why.says_other else ""
+                also = f" ({len(why.also)} more say so in other words)" if why.also else ""
+                lines.append(f"  {why.weight:+6.2f}  {why.says}{there}{also}{drop}")
+            else:
+                lines.append(f"  {why.weight:+6.2f}  {why.fact}: {why.chosen}, there {why.other}{also}{drop}")
         return "\n".join([*lines, *([f"({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -107,7 +123,12 @@ class Explanation:
 
 
 def explain(
-    problem: Problem, memory: Memory, steps: Sequence[Ground], number: int = 0, against: Ground | None = None
+    problem: Problem,
+    memory: Memory,
+    steps: Sequence[Ground],
+    number: int = 0,
+    against: Ground | None = None,
+    labels: Labels | None = None,
 ) -> Explanation:
     """Explain one step of a plan.
 
@@ -121,6 +142,8 @@ def explain(
         Which of them is to be explained.
     against : behaviour and arguments, optional
         The alternative; if left out, the most cogent one.
+    labels : Labels, optional
+        To say it in sentences.
 
     Raises
     ------
@@ -156,7 +179,28 @@ def explain(
     first = _decisive(reasons, lambda facts: _lead(_judge(memory, field, facts), chosen, other), lead)
     named = {first.fact, *first.also} if first else set()
     rest = tuple(why for why in reasons if why.fact not in named)
-    return Explanation(_words(steps[number]), _words(against), lead, (first, *rest) if first else rest, note)
+    shown = (first, *rest) if first else rest
+    if labels is None:
+        return Explanation(_words(steps[number]), _words(against), lead, shown, note)
+    said = tuple(_in_sentences(why, chosen, other, labels) for why in shown)
+    return Explanation(_sentence(steps[number], labels), _sentence(against, labels), lead, said, note)
+
+
+def _sentence(ground: Ground, labels: Labels) -> str:
+    behavior = labels.domain.behaviors[ground[0]]
+    return labels.behavior(behavior, dict(zip((p.name for p in behavior.parameters), ground[1], strict=True)))
+
+
+def _in_sentences(why: Why, chosen: Candidate, other: Candidate, labels: Labels) -> Why:
+    if why.fact == PRIOR:
+        return replace(why, says=PRIOR)
+    if why.fact == TOGETHER:
+        return why
+    says, there = (
+        sentence(why.fact, value, labels, dict(candidate.roles))
+        for value, candidate in ((why.chosen, chosen), (why.other, other))
+    )
+    return replace(why, says=says, says_other=there)
 
 
 def _decisive(reasons: Sequence[Why], lead_without: Callable[[frozenset[str]], float], lead: float) -> Why | None:

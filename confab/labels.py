@@ -8,17 +8,14 @@ situation type's property ("cup 1 is at location 7"). What has no label keeps it
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from planner.levels import said
-from planner.plan import Plan, Step
-from reasoner.graph.knowledge import text
+from planner.plan import Step
+from reasoner.graph.knowledge import KnowledgeGraph, text
+from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem
-
-if TYPE_CHECKING:
-    from confab.scene import Scene
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""
@@ -49,7 +46,7 @@ class Labels:
         verb = self.verbs.get(situation, situation)
         value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
         words = [*([self.name(about)] if about else []), verb, *map(self.name, (*rest, *value))]
-        return ("not: " if boolean and fact.value == FALSE else "") + " ".join(words)
+        return ("not: " if boolean and fact.value == FALSE else "") + _joined(words)
 
     def condition(self, condition: Condition) -> str:
         """Return a condition as a sentence."""
@@ -84,44 +81,55 @@ class Labels:
         return f"{label} ({', '.join(rest)})" if rest else label
 
 
-def labels_of(scene: Scene, problem: Problem, plan: Plan | None = None) -> Labels:
-    """Return the labels of a problem's behaviours, situation types and classes, and of the individuals that are spoken of.
+PLACING = {"at", "in", "on", "under", "to"}
+
+
+def _joined(parts: Sequence[str]) -> str:
+    """Return parts of a sentence as one, without a word said twice or two prepositions in a row.
+
+    >>> _joined(["left hand", "hand is at", "cup 1"]), _joined(["cup 1", "is at", "in a hand"])
+    ('left hand is at cup 1', 'cup 1 is in a hand')
+    """
+    words: list[str] = []
+    for part in parts:
+        for number, word in enumerate(part.split()):
+            if words and number == 0 and word == words[-1]:
+                continue
+            if words and number == 0 and {word, words[-1]} <= PLACING:
+                words.pop()
+            words.append(word)
+    return " ".join(words)
+
+
+def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem) -> Labels:
+    """Return the labels of a problem's behaviours, situation types, classes and individuals.
 
     Parameters
     ----------
-    scene : Scene
+    knowledge : KnowledgeGraph
+    names : Names
+        Lead to the IRIs.
     problem : Problem
-    plan : Plan, optional
-        The individuals of its steps; all of the problem's if left out.
     """
     domain = problem.domain
-    names = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
-    names |= {name for s in problem.goal for name in (*s.arguments, problem.goal[s])}
-    if plan is None:
-        names |= {name for members in problem.classes.values() for name in members}
-    else:
-        steps = list(plan.walk())
-        names |= {name for step in steps for name in (*step.arguments, *step.bindings.values())}
-        names |= {name for symbol, value in problem.initial.items() if names & {*symbol.arguments} for name in (value,)}
-    return read_labels(scene, names, domain)
-
-
-def read_labels(scene: Scene, names: Iterable[str], domain: Domain) -> Labels:
-    """Return the labels of names; English ones before those of no language, these before others."""
-    table = scene.names
-    properties = {table.short(text(row[0])): text(row[1]) for row in scene.knowledge.select(PROPERTIES)}
-    iris = {table.iri(name): name for name in names if name in table}
-    found = _labels(scene, sorted({*iris, *properties.values()}))
+    spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
+    spoken |= {name for members in problem.classes.values() for name in members}
+    behaviors = domain.behaviors.values()
+    spoken |= {term for b in behaviors for effect in b.effects for term in (*effect.arguments, effect.value)}
+    properties = {names.short(text(row[0])): text(row[1]) for row in knowledge.select(PROPERTIES)}
+    iris = {names.iri(name): name for name in spoken if name in names}
+    found = _read(knowledge, sorted({*iris, *properties.values()}))
     words = {name: found[iri] for iri, name in iris.items() if iri in found}
     verbs = {situation: found[iri] for situation, iri in properties.items() if iri in found}
     return Labels(words, verbs, domain)
 
 
-def _labels(scene: Scene, iris: list[str]) -> dict[str, str]:
+def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
+    """Return the labels of some IRIs; English ones before those of no language, these before others."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])
-        for row in scene.knowledge.select(LABELS.format(those=those)):
+        for row in knowledge.select(LABELS.format(those=those)):
             iri, label, language = (text(term) for term in row)
             rank = 0 if language.startswith("en") else 1 if not language else 2
             if iri not in found or rank < found[iri][0]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -34,10 +34,13 @@ if TYPE_CHECKING:
     from rich.tree import Tree
 
     from confab.execution import Execution
+    from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
+    from confab.why import Account, Because, WhyNot
     from planner.acting.episode import World
     from planner.acting.executive import Moment
+    from planner.causal_links import Purpose
     from reasoner.embodiment.values import Embodiment
     from reasoner.graph.apart import QueryLimits
     from reasoner.graph.mirror import Mirror
@@ -504,6 +507,10 @@ class Scene:
             planner = planner_with(memory.advisor, mode)
         return execute(self, problem, begun, several(interventions), world, planner, seed, tell, **options)
 
+    def explain(self, goals: Facts = (), **options: Any) -> Account:
+        """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes."""
+        return self.plan(goals, **options).explain()
+
     def __repr__(self) -> str:
         """Return what the scene is, in one line."""
         problem = self.problem
@@ -538,6 +545,75 @@ class Result:
     def execute(self, interventions: Facts = (), **options: Any) -> Execution:
         """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
         return self.scene.execute(self, interventions, **options)
+
+    @cached_property
+    def labels(self) -> Labels:
+        """What people call the behaviours, situation types and individuals of the problem."""
+        from confab.labels import labels_of
+
+        return labels_of(self.scene.knowledge, self.scene.names, self.problem)
+
+    @cached_property
+    def purposes(self) -> dict[tuple[int, ...], Purpose]:
+        """The causal links of each step, by its path (`planner.causal_links`)."""
+        from planner.causal_links import purposes
+
+        return purposes(self.problem, self.plan)
+
+    def why(self, step: int | str | tuple[int, ...]) -> Because:
+        """Return why a step is in the plan: what it gives, and what needs that.
+
+        Parameters
+        ----------
+        step : int, str or path
+            Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words.
+
+        Examples
+        --------
+        >>> load("beverage-serving").plan().why("pick cup 1")
+        L2#0  pick cup 1 with left hand
+          gives   left hand holds cup 1 (before: nothing)
+          gives   cup 1 is in a hand (before: location 2)
+          because “place cup 1 in left hand to location 7” (L2#1) asks that left hand holds cup 1
+        """
+        from confab.why import because, find_step
+
+        found = find_step(self.plan, step, self.labels)
+        return because(self.plan, found, self.purposes[found.path], self.labels)
+
+    def why_not(self, asked: str, instead: int | str | None = None, seconds: float | None = None) -> WhyNot:
+        """Return why something else isn't done: what it lacks, or what plan follows from it and what that costs more.
+
+        Parameters
+        ----------
+        asked : str
+            ``cup2 LOCATION location8``, also with ``by left_hand``; or ``B2_PICK right_hand cup1``, ``B2_PICK hand=right_hand``.
+        instead : int or str, optional
+            In the place of which step; if left out, of the most similar one where it can be done.
+        seconds : float, optional
+            Limit of each planning call.
+        """
+        from confab.why import find_step, why_not
+
+        labels = self.labels
+
+        def ask(problem: Problem) -> Outcome:
+            return solve(Request(problem, DEFAULT_MODE, Limits(seconds=seconds)))
+
+        def replan(goals: Sequence[str]) -> tuple[Problem, Outcome, Labels]:
+            other = self.scene.plan(goals, time_limit=seconds)
+            return other.problem, other.outcome, other.labels
+
+        place = None if instead is None else find_step(self.plan, instead, labels)
+        return why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+
+    def explain(self) -> Account:
+        """Return why each step of the plan is there; or, where there is no plan, why."""
+        from confab.show import summary
+        from confab.why import Account, account
+
+        headline = summary(self.outcome)
+        return account(self.plan, self.purposes, self.labels, headline) if self.solved else Account(headline)
 
     @property
     def solved(self) -> bool:

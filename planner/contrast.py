@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from planner.causal_links import on_level
 from planner.plan import Outcome, Plan, Reason, Step, renumbered
 from planner.validation import Bindings, Facts, Rules, successor, validate
-from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol
+from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]
 """Plans: `planner.solve.solve` with whatever mode and limits."""
@@ -123,13 +123,17 @@ def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, who: str) ->
         return behavior
     asks: list[Condition] = []
     for effect in behavior.effects:
-        terms = [
+        pairs = [
             (t, a) for t, a in zip(effect.arguments, symbol.arguments, strict=False) if t in behavior.kinds or t != a
         ]
-        if effect.situation != symbol.situation or any(term not in behavior.kinds for term, _ in terms):
+        if effect.situation != symbol.situation or any(term not in behavior.kinds for term, _ in pairs):
             continue
-        others = [(EqualityCondition(term, name, negated=True),) for term, name in terms]
-        asks.append(AnyOf(tuple((EqualityCondition(part, who),) for part in parts) + tuple(others)))
+        taken = tuple((EqualityCondition(part, who),) for part in parts)
+        inner = tuple(substituted(condition, dict(pairs)) for condition in effect.when)
+        if inner:  # the change is made only where this holds, which may be what determines the terms
+            asks.append(AnyOf((*taken, (AnyOf((inner,), negated=True),))))
+        else:
+            asks.append(AnyOf((*taken, *((EqualityCondition(term, name, negated=True),) for term, name in pairs))))
     return replace(behavior, preconditions=(*behavior.preconditions, *dict.fromkeys(asks)))
 
 

@@ -272,13 +272,20 @@ class Rules:
 
         Also returns with which individuals the others hold. More than `MOST_LACKING` are looked for one by one.
         """
+
+        def gives(number: int) -> bool:
+            """Whether a condition gives a variable its value: without it the others hold of what isn't there."""
+            c = conditions[number]
+            return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
+
+        order = sorted(range(len(conditions)), key=gives)
         for size in range(1, min(len(conditions), MOST_LACKING) + 1):
-            for without in combinations(range(len(conditions)), size):
+            for without in combinations(order, size):
                 rest = [c for i, c in enumerate(conditions) if i not in without]
                 for facts in views:
                     found = self.satisfied(rest, terms, kinds, facts)
                     if found is not None:
-                        return found, tuple(substituted(conditions[i], found) for i in without)
+                        return found, tuple(substituted(conditions[i], found) for i in sorted(without))
         alone = [c for c in conditions if all(self.satisfied([c], terms, kinds, facts) is None for facts in views)]
         return terms, tuple(substituted(condition, terms) for condition in alone)
 

@@ -1,0 +1,405 @@
+"""Why a step is in a plan, and why another one isn't, in sentences: `Result.why`, `Result.why_not` and `Scene.explain`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from confab.labels import Labels
+from planner.causal_links import Change, Kind, Need, Purpose
+from planner.contrast import Ask, Contrast, NoChoiceError, cost_of, instead_of, with_choice
+from planner.plan import Outcome, Plan, Status, Step
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import nearest
+from reasoner.reading.problem import parse_fact
+from reasoner.symbols import Behavior, Fact, Problem, Symbol
+
+if TYPE_CHECKING:
+    from rich.tree import Tree
+
+Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
+"""Plans anew for some goals; also returns the problem that was planned in, and what people call what is in it."""
+BY = re.compile(r"\s+(?:by|with)\s+(\S+)\s*$")
+SHOWN = 3
+"""Of what needs a step, so many are said; the rest is counted."""
+
+
+@dataclass(frozen=True)
+class Because:
+    """Why a step is there: what it gives, and what needs that, the nearest first.
+
+    `number` is how it is asked for: ``L2#3`` is the step 3 of level 2, counted from 0.
+    """
+
+    number: str
+    path: tuple[int, ...]
+    id: int
+    step: str
+    what: str
+    gives: tuple[str, ...]
+    needs: tuple[str, ...]
+
+    def json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {**asdict(self), "path": list(self.path), "gives": list(self.gives), "needs": list(self.needs)}
+
+    def __str__(self) -> str:
+        """Return it in a few lines."""
+        more = len(self.needs) - SHOWN
+        return "\n".join(
+            [
+                f"{self.number}  {self.what}",
+                *(f"  gives   {fact}" for fact in self.gives),
+                *(f"  because {need}" for need in self.needs[:SHOWN]),
+                *([f"          and {more} more"] if more > 0 else []),
+            ]
+        )
+
+    def __repr__(self) -> str:
+        """Return it in a few lines."""
+        return str(self)
+
+    def __rich__(self) -> str:
+        """Return it for rich."""
+        return str(self)
+
+
+@dataclass(frozen=True)
+class WhyNot:
+    """Why an alternative isn't what is done: what it lacks, or what plan follows from it and what that costs more.
+
+    `answer` says it. `plan` is the plan that follows, from the beginning to the end, where there is one; `more` what it costs more.
+    """
+
+    asked: str
+    answer: str
+    lacks: tuple[str, ...] = ()
+    plan: Plan | None = None
+    more: float | None = None
+    steps: tuple[str, ...] = ()
+
+    def json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        from confab.interchange import step_json
+
+        steps = None if self.plan is None else [step_json(step) for step in self.plan.steps]
+        return {
+            "asked": self.asked,
+            "answer": self.answer,
+            "lacks": list(self.lacks),
+            "more": self.more,
+            "steps": steps,
+        }
+
+    def __str__(self) -> str:
+        """Return it in a few lines."""
+        return "\n".join([self.answer, *(f"  {line}" for line in (*self.lacks, *self.steps))])
+
+    def __repr__(self) -> str:
+        """Return it in a few lines."""
+        return str(self)
+
+    def __rich__(self) -> str:
+        """Return it for rich."""
+        return str(self)
+
+
+@dataclass(frozen=True)
+class Account:
+    """Why a plan is as it is, step by step; or, where there is none, why: `reason`."""
+
+    headline: str
+    steps: tuple[Because, ...] = ()
+    plan: Plan | None = field(default=None, repr=False)
+
+    def json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {"headline": self.headline, "steps": [step.json() for step in self.steps]}
+
+    def __str__(self) -> str:
+        """Return it as text, a step to a line, and what needs it behind it."""
+        lines = [self.headline]
+        for step in self.steps:
+            why = f": {step.needs[0]}" if step.needs else ""
+            lines.append(f"{'  ' * len(step.path)}{step.number}  {step.what}{why}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        """Return it as text."""
+        return str(self)
+
+    def __rich__(self) -> Tree:
+        """Return it as a tree for rich."""
+        from rich.text import Text
+        from rich.tree import Tree
+
+        tree = Tree(Text(self.headline), guide_style="dim")
+        branches: dict[tuple[int, ...], Tree] = {(): tree}
+        for step in self.steps:
+            why = Text(f"  {step.needs[0]}" if step.needs else "", "italic dim")
+            branches[step.path] = branches[step.path[:-1]].add(
+                Text.assemble((f"{step.number} ", "dim"), step.what, why)
+            )
+        return tree
+
+
+# ------------------------------------------------------------------------------------------------------------------ why
+
+
+def number_of(plan: Plan, step: Step) -> str:
+    """Return how a step is asked for: its level, and which step of that level it is, counted from 0."""
+    return f"L{step.level}#{[other.path for other in plan.at_level(step.level)].index(step.path)}"
+
+
+def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
+    """Return how each step is asked for, by its path."""
+    seen: dict[int, int] = {}
+    found = {}
+    for step in plan.walk():
+        seen[step.level] = seen.get(step.level, -1) + 1
+        found[step.path] = f"L{step.level}#{seen[step.level]}"
+    return found
+
+
+def find_step(plan: Plan, asked: int | str | Sequence[int], labels: Labels) -> Step:
+    """Return the step that is asked for.
+
+    Parameters
+    ----------
+    plan : Plan
+    asked : int, str or path
+        Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3, counted from 0; the position in the tree,
+        ``0.1.2``; or words: of the step as it is printed, or of its label.
+    labels : Labels
+
+    Raises
+    ------
+    KnowledgeError
+        No step, or more than one, is so called.
+    """
+    steps = list(plan.walk())
+    if isinstance(asked, int):
+        if not 0 <= asked < len(plan.steps):
+            raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0")
+        return plan.steps[asked]
+    if not isinstance(asked, str):
+        found = [step for step in steps if step.path == tuple(asked)]
+        if not found:
+            raise KnowledgeError(f"no step at {'.'.join(map(str, asked))} in the tree of the plan")
+        return found[0]
+    text = asked.strip()
+    if re.fullmatch(r"[lL]\d+#\d+", text):
+        level, at = map(int, text[1:].split("#"))
+        on = plan.at_level(level)
+        if at >= len(on):
+            raise KnowledgeError(f"no step {text}: level {level} has {len(on)}, counted from 0")
+        return on[at]
+    if re.fullmatch(r"\d+(\.\d+)*", text):
+        return find_step(plan, [int(part) for part in text.split(".")], labels)
+    words = " ".join(text.lower().split())
+    names = {step.path: (str(step).lower(), labels.step(step).lower()) for step in steps}
+    for fits in (
+        lambda name: words == name or f" {words}" == name[name.find(" ") :],
+        lambda name: words in name,
+    ):
+        found = [step for step in steps if any(fits(name) for name in names[step.path])]
+        tops = [step for step in found if not any(step.path[: len(o.path)] == o.path for o in found if o is not step)]
+        if len(tops) == 1:
+            return tops[0]
+        if tops:
+            shown = "; ".join(f"{number_of(plan, step)} {labels.step(step)}" for step in tops[:6])
+            raise KnowledgeError(
+                f"'{asked}' is said of {len(tops)} steps: {shown}; ask for one, e.g. {number_of(plan, tops[0])}"
+            )
+    known = [labels.step(step) for step in steps]
+    raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, 'confab explain SCENE lists its steps')}")
+
+
+def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels, number: str | None = None) -> Because:
+    """Return why a step is there."""
+    by_path = {other.path: other for other in plan.walk()}
+    needs = tuple(dict.fromkeys(_sentence(need, by_path, plan, labels) for need in purpose.needs))
+    return Because(
+        number or number_of(plan, step),
+        step.path,
+        step.id,
+        str(step),
+        labels.step(step),
+        tuple(f"{labels.fact(change.fact)} (before: {labels.name(change.before)})" for change in purpose.gives),
+        needs or ("nothing that follows needs what it gives",),
+    )
+
+
+def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Labels, headline: str) -> Account:
+    """Return why each step of a plan is there."""
+    number = numbers(plan)
+    steps = tuple(because(plan, step, purposes[step.path], labels, number[step.path]) for step in plan.walk())
+    return Account(headline, steps, plan)
+
+
+def _sentence(need: Need, steps: Mapping[tuple[int, ...], Step], plan: Plan, labels: Labels) -> str:
+    facts = " and ".join(labels.fact(change.fact) for change in need.gives)
+    if need.kind is Kind.GOAL:
+        return f"it is wanted that {facts}"
+    if need.kind is Kind.REST:
+        where = f" after “{labels.step(steps[need.by])}”" if need.by else " in the end"
+        return f"so it is at rest{where}: {facts}"
+    by = f"“{labels.step(steps[need.by])}” ({number_of(plan, steps[need.by])})"
+    if need.kind is Kind.ABOVE:
+        return f"{by} is to leave that {facts}"
+    asks = " and ".join(labels.condition(condition) for condition in need.conditions)
+    if not asks:
+        return f"{by} does what it does because {facts}"
+    if asks == facts:
+        return f"{by} asks that {asks}"
+    return f"{by} asks that {asks}; {_instead(need.gives, labels)}"
+
+
+def _instead(changes: Sequence[Change], labels: Labels) -> str:
+    return "before: " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
+
+
+# -------------------------------------------------------------------------------------------------------------- why not
+
+
+def why_not(
+    asked: str, problem: Problem, plan: Plan, labels: Labels, ask: Ask, replan: Replan, instead: Step | None = None
+) -> WhyNot:
+    """Return why an alternative isn't what is done.
+
+    Parameters
+    ----------
+    asked : str
+        A fact, ``cup2 LOCATION location8``, that could have been wanted; with ``by hand2`` behind it, who shall take part in what
+        changes it. Or a behaviour, ``B2_PICK right_hand cup1``, with individuals for its parameters in their order, or some of
+        them by name: ``B2_PICK hand=right_hand``.
+    problem, plan
+        The problem and its plan.
+    labels : Labels
+    ask, replan : callable
+        Plan in a problem that is given; plan in the scene for other goals.
+    instead : Step, optional
+        In whose place the behaviour would be done.
+
+    Raises
+    ------
+    KnowledgeError
+        That names what the scene doesn't have.
+    """
+    first, _, rest = asked.strip().partition(" ")
+    behavior = problem.domain.behaviors.get(first)
+    if behavior is not None:
+        return _step_told(
+            asked,
+            problem,
+            plan,
+            labels,
+            instead_of(problem, plan, behavior, _given(problem, behavior, rest), ask, instead),
+        )
+    by = BY.search(asked)
+    fact = BY.sub("", asked.strip())
+    if len(fact.split()) < 2 or fact.split()[1] not in problem.domain.situations:
+        known = [*problem.domain.behaviors, *problem.domain.situations]
+        hint = nearest(first, problem.domain.behaviors) or nearest([*fact.split(), "", ""][1], known)
+        raise KnowledgeError(
+            f"'{asked}' is neither a fact (cup2 LOCATION location8, maybe with 'by left_hand') nor a behaviour{hint}"
+        )
+    return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan)
+
+
+def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
+    """Return the individuals that are named for a behaviour's parameters."""
+    names = [p.name for p in behavior.parameters]
+    given: dict[str, str] = {}
+    for position, word in enumerate(text.split()):
+        role, equals, value = word.rpartition("=")
+        name = f"?{role.lstrip('?')}" if equals else names[position] if position < len(names) else ""
+        if name not in behavior.kinds:
+            roles = ", ".join(term.lstrip("?") for term in behavior.kinds)
+            raise KnowledgeError(
+                f"'{word}': {behavior.name} has no such part{nearest(role, roles.split(', '))} (its parts: {roles})"
+            )
+        members = problem.classes.get(behavior.kinds[name], ())
+        if value not in members:
+            raise KnowledgeError(f"'{value}' is no {behavior.kinds[name]}{nearest(value, members)}")
+        given[name] = value
+    return given
+
+
+def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:
+    behavior = problem.domain.behaviors[found.behavior]
+    terms = dict(zip((p.name for p in behavior.parameters), found.arguments, strict=True))
+    what = labels.behavior(behavior, {t: v for t, v in terms.items() if not v.startswith("?")})
+    assert found.instead is not None
+    place = (
+        f"“{labels.step(found.instead)}” ({number_of(plan, found.instead)})"
+        if found.instead in list(plan.walk())
+        else labels.step(found.instead)
+    )
+    if found.lacks:
+        lacks = tuple(labels.condition(condition) for condition in found.lacks)
+        return WhyNot(
+            asked,
+            f"“{what}” can't be done; where the fewest conditions fail, in the place of {place}, it asks that",
+            lacks,
+        )
+    if found.plan is not None:
+        return _planned(asked, f"“{what}” in the place of {place}", problem, plan, labels, found)
+    if found.reason is not None:
+        return WhyNot(
+            asked,
+            f"“{what}” could be done in the place of {place}, but no plan was found from there: {found.reason.text}",
+        )
+    return WhyNot(asked, f"it is what is done: {place}", more=0.0)
+
+
+def _fact_told(
+    asked: str, fact: str, by: str | None, problem: Problem, plan: Plan, labels: Labels, ask: Ask, replan: Replan
+) -> WhyNot:
+    about, of, *_ = fact.split()
+    goals = [
+        str(Fact(symbol, value))
+        for symbol, value in sorted(problem.goal.items())
+        if (symbol.arguments[:1], symbol.situation) != ((about,), of) or symbol.arguments[1:]
+    ]
+    try:
+        symbol, value = parse_fact(problem, fact)
+    except KnowledgeError:  # what the task can't need isn't in the problem, and may be in the scene
+        problem, outcome, labels = replan([*goals, fact])
+        symbol, value = parse_fact(problem, fact)
+    else:
+        outcome = Outcome(Status.SOLVED, plan)
+        if problem.goal.get(symbol) != value:
+            problem, outcome, labels = replan([*goals, fact])
+    words = labels.fact(Fact(symbol, value))
+    if by is None and problem.goal.get(symbol) == value and outcome.plan is plan:
+        return WhyNot(asked, f"it is what is wanted: {words}", more=0.0)
+    before = cost_of(problem, plan)
+    if by is not None:
+        if not any(by in members for members in problem.classes.values()):
+            known = {name for members in problem.classes.values() for name in members}
+            raise KnowledgeError(f"unknown individual '{by}' in '{asked}'{nearest(by, known)}")
+        try:
+            found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)
+        except NoChoiceError as error:
+            return WhyNot(asked, str(error))
+        words += f", with {labels.name(by)} in all that changes it for {labels.name(about)}"
+        found = replace(found, before=before)
+    else:
+        cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
+        found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
+    if found.plan is None:
+        return WhyNot(asked, f"that {words}: there is no such plan: {found.reason.text if found.reason else ''}")
+    return _planned(asked, f"that {words}", problem, plan, labels, found)
+
+
+def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:
+    assert found.plan is not None
+    assert found.cost is not None
+    more = found.cost - found.before
+    count = f"{len(found.plan.primitives)} primitives in the place of {len(plan.primitives)}"
+    said = f"costs {more:g} more" if more > 0 else "costs as much" if more == 0 else f"would cost {-more:g} less"
+    steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
+    return WhyNot(asked, f"{what}: it can be done, and {said} ({count}):", (), found.plan, more, steps)

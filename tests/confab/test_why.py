@@ -1,0 +1,135 @@
+"""Why a step is there, and why another one isn't: in the scene's own words, in any kind of scene."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import confab
+from confab.cli import app
+from planner.contrast import cost_of
+from planner.validation import validate
+
+DOMAIN = """(define (domain lamps) (:requirements :strips :typing) (:types lamp room)
+ (:predicates (in ?r - room) (door ?a ?b - room) (lit ?l - lamp) (hangs ?l - lamp ?r - room))
+ (:action walk :parameters (?a ?b - room) :precondition (and (in ?a) (door ?a ?b)) :effect (and (in ?b) (not (in ?a))))
+ (:action light :parameters (?l - lamp ?r - room) :precondition (and (in ?r) (hangs ?l ?r)) :effect (lit ?l)))"""
+PROBLEM = """(define (problem evening) (:domain lamps) (:objects hall attic - room bulb - lamp)
+ (:init (in hall) (door hall attic) (hangs bulb attic)) (:goal (lit bulb)))"""
+
+
+@pytest.fixture(scope="module")
+def serving() -> confab.Result:
+    return confab.load("beverage-serving").plan()
+
+
+@pytest.fixture(scope="module")
+def lamps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lamps")
+    (folder / "d.pddl").write_text(DOMAIN)
+    (folder / "p.pddl").write_text(PROBLEM)
+    made = CliRunner().invoke(
+        app, ["import", str(folder / "d.pddl"), str(folder / "p.pddl"), "-o", str(folder / "evening.ttl")]
+    )
+    assert made.exit_code == 0, made.output
+    return folder / "evening.ttl"
+
+
+def test_a_step_is_asked_for_by_number_level_path_and_words(serving: confab.Result) -> None:
+    first = serving.why(0)
+    assert (
+        serving.why("L1#0") == serving.why("0") == serving.why("move cup 1") == serving.why("22 B1_MOVE cup1 location7")
+    )
+    assert first.what == "move cup 1 to location 7"
+    assert first.needs[0] == "it is wanted that cup 1 is at location 7"
+    assert serving.why("0.1.1").path == (0, 1, 1)
+
+
+@pytest.mark.parametrize("asked", ["lift", "L3#99", "9.9", 7, "make tea"])
+def test_what_is_no_step_or_several_is_said(serving: confab.Result, asked: str | int) -> None:
+    with pytest.raises(confab.KnowledgeError, match="step"):
+        serving.why(asked)
+
+
+def test_reasons_are_sentences_and_name_no_id(serving: confab.Result) -> None:
+    said = str(serving.explain())
+    assert "“place cup 1 in left hand to location 7” (L2#1) asks that left hand holds cup 1" in said
+    assert not {"HOLDS", "LOCATION", "B2_PICK", "left_hand"} & set(said.replace("(", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("asked", "lacks"),
+    [
+        ("B1_POUR bottle1 cup2", "there is a hand hand with hand can reach location 4 and hand can reach location 1"),
+        ("B2_PICK left_hand bottle1", "left hand can reach location 4"),
+    ],
+)
+def test_what_cannot_be_done_names_the_condition(serving: confab.Result, asked: str, lacks: str) -> None:
+    assert serving.why_not(asked).lacks == (lacks,)
+
+
+@pytest.mark.parametrize("asked", ["B1_MOVE cup2 location1", "B2_PICK right_hand cup1", "B1_MOVE bottle1 location6"])
+def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Result, asked: str) -> None:
+    told = serving.why_not(asked)
+    assert told.plan is not None
+    assert validate(serving.problem, told.plan) == []
+    assert told.more == cost_of(serving.problem, told.plan) - cost_of(serving.problem, serving.plan)
+    behavior, *arguments = asked.split()
+    assert (behavior, tuple(arguments)) in {(s.behavior, s.arguments) for s in told.plan.walk()}
+
+
+def test_who_takes_part_can_be_asked(serving: confab.Result) -> None:
+    told = serving.why_not("cup1 LOCATION location7 by right_hand")
+    assert told.plan is not None
+    moving = [
+        s for s in told.plan.at_level(2) if "cup1" in (*s.arguments, *s.bindings.values()) and s.behavior != "B2_POUR"
+    ]
+    assert moving
+    assert all("right_hand" in step.arguments for step in moving)
+    assert serving.why_not("cup2 LOCATION location5 by right_hand").plan is None
+    assert serving.why_not("cup1 LOCATION location7").more == 0
+
+
+def test_another_wish_is_planned_for(serving: confab.Result) -> None:
+    told = serving.why_not("cup2 LOCATION location8")
+    assert told.more is not None
+    assert told.more > 0
+    assert "cup 2 is at location 8" in told.answer
+
+
+@pytest.mark.parametrize("asked", ["cup2 LOCATOIN location8", "B1_MOV cup2 location8", "B1_MOVE cup2 nowhere", "hello"])
+def test_what_is_misspelt_is_said(serving: confab.Result, asked: str) -> None:
+    with pytest.raises(confab.KnowledgeError):
+        serving.why_not(asked)
+
+
+def test_a_flat_import_is_explained(lamps: Path) -> None:
+    result = confab.load(lamps).plan()
+    walk, light = (result.why(i) for i in range(2))
+    assert any(light.step.split(" ", 1)[1] in need or light.what in need for need in walk.needs)
+    assert "it is wanted" in light.needs[0]
+    assert result.why_not(f"{result.plan.steps[1].behavior} bulb hall").lacks
+
+
+@pytest.mark.parametrize("scene", ["towers-small", "laboratory-small", "house-small", "couriers-small"])
+def test_symbolic_worlds_are_explained(scene: str) -> None:
+    account = confab.load(scene).explain()
+    assert account.steps
+    assert all(step.needs for step in account.steps)
+
+
+def test_no_plan_is_explained() -> None:
+    told = confab.load("beverage-serving").explain(["cup1 LOCATION location7", "cup2 LOCATION location7"])
+    assert told.steps == ()
+    assert "location7" in told.headline
+
+
+def test_the_command_line_tells_all_of_it() -> None:
+    run = CliRunner().invoke
+    assert "it is wanted that cup 1" in run(app, ["explain", "beverage-serving"]).output
+    assert "asks that left hand holds cup 1" in run(app, ["explain", "beverage-serving", "L2#0"]).output
+    assert (
+        "left hand can reach location 4"
+        in run(app, ["explain", "beverage-serving", "--not", "B2_PICK left_hand bottle1"]).output
+    )
+    assert run(app, ["explain", "beverage-serving", "L9#0"]).exit_code != 0
