@@ -1,7 +1,8 @@
 """A small world cut out of a large one, grounded and searched: for what no short chain of relevant steps achieves.
 
 focus      the individuals that may act and be acted on: those of the targets, and those that chains towards the targets meet
-frozen     others that have a value of theirs: they stand where they stand, so that an absence is judged as in the whole world
+frozen     others that have a value of theirs, or that a condition looks for: they stand where they stand, so that whether there is
+           somebody who … is judged as in the whole world
 targets    the symbols that shall get a value; what is kept besides is said by a function, as for `planner.hierarchical.subplans`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
@@ -10,7 +11,7 @@ proves nothing. Everything is done on one level; the caller refines the steps an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import product
@@ -20,11 +21,10 @@ from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
 from planner.grounded.task import Task
 from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Ground, Keep, Segments
+from planner.language import walk
 from planner.plan import Limits, Reason, Status
 from reasoner.symbols import (
     FALSE,
-    AnyOf,
-    Condition,
     Parameter,
     Problem,
     RelationCondition,
@@ -174,12 +174,13 @@ def problem_of(
 def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set[str]:
     """Return individuals with those on whom it depends what they can do, though these don't take part.
 
-    These are the values that they have, the values of these and so on; and where a behaviour asks that there is no individual such
-    that …, those who have one of them as a value, and those in a static relation to them.
+    These are the values that they have, the values of these and so on; and where a behaviour asks whether there is an individual
+    such that …, those who have one of them as a value, and those in a static relation to them.
     """
     program, table = segments.program, segments.table
     behaviors = program.domain.at_level(level)
-    witnesses = [w for b in behaviors for c in (b.preconditions, *(e.when for e in b.effects)) for w in absences(c)]
+    conditions = [c for b in behaviors for c in (*b.preconditions, *(c for e in b.effects for c in e.when))]
+    witnesses = [inner for c in conditions for inner in walk(c) if isinstance(inner, Witness)]
     there, fresh = set(inside), set(inside)
     for _ in range(1 + max([depth(witness) for witness in witnesses], default=0)):
         met: set[str] = set()
@@ -207,16 +208,3 @@ def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set
 def depth(witness: Witness) -> int:
     """Return how many witnesses are asked for one inside the other."""
     return 1 + max([depth(inner) for inner in witness.conditions if isinstance(inner, Witness)], default=0)
-
-
-def absences(conditions: Iterable[Condition], inside: bool = False) -> Iterator[Witness]:
-    """Yield the witnesses of which conditions ask that there is none, and those inside of these."""
-    for condition in conditions:
-        match condition:
-            case Witness(_, _, inner, negated):
-                if negated or inside:
-                    yield condition
-                yield from absences(inner, negated or inside)
-            case AnyOf(alternatives, negated):
-                for group in alternatives:
-                    yield from absences(group, negated or inside)

@@ -67,6 +67,15 @@ def test_other_numbers_of_hands_are_served(hands: int) -> None:
         assert validate(problem, outcome.plan) == []
 
 
+@pytest.mark.parametrize("name", ["served", "swap", "rotate"])
+def test_whoever_of_many_a_condition_looks_for_is_in_the_small_world(name: str) -> None:
+    """Some hand of eight must reach both places: without these hands in it no small world had a plan, only the whole one."""
+    outcome = plan(family(name, 20, hands=8))
+    assert outcome.plan is not None
+    assert outcome.fallbacks == 0
+    assert outcome.search[1].generated < 5_000  # 9,000 to 110,000 in the whole world
+
+
 def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
     small, large = plan(family("served", 100), improve=0), plan(family("served", 1000), improve=0)
     assert large.plan is not None
