@@ -23,12 +23,23 @@ if TYPE_CHECKING:
     from confab.explaining import Explanation
     from confab.memory import Memory
     from confab.scene import Result, Scene
+    from confab.table import Table
     from planner.plan import Plan
     from reasoner.limits import Deadline
 
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
 LONGEST = 2_000
 """Signs of a message: it quotes what others wrote, which may be of any length."""
+FORMS = {
+    ".ttl": "turtle",
+    ".txt": "table",
+    ".csv": "csv",
+    ".json": "json",
+    ".tsv": "tsv",
+    ".srj": "sparql-json",
+    ".srx": "sparql-xml",
+}
+"""What a query's answer can be written as, by the ending of the file's name."""
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
 CLICK_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
@@ -263,9 +274,15 @@ def query(
     affords: Annotated[
         str | None, typer.Option(metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
     ] = None,
-    form: Annotated[str, typer.Option("--format", help="table, csv or json.")] = "table",
+    form: Annotated[
+        str | None, typer.Option("--format", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
+    ] = None,
+    iris: Annotated[bool, typer.Option("--iris", help="Whole IRIs in place of short names.")] = False,
     out: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE.ttl", help="What CONSTRUCT gives, as an ontology.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology."
+        ),
     ] = None,
     time_limit: Annotated[
         float, typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which the query ends (exit 3).")
@@ -287,26 +304,22 @@ def query(
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
     loaded = _load(scene, iri)
     if show is not None:
-        from reasoner.reading.quantification import behavior_named, query_for
-
-        behavior = behavior_named(loaded.reading, show)
-        print(loaded.applicable_query(show) if applicable else query_for(loaded.reading, behavior))
+        print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
         return
     if sparql is None and affords is None:
         raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
-    if out is not None:
+    if out is not None and out.suffix.lower() == ".ttl":
         if sparql is None:
-            raise KnowledgeError("-o takes what a CONSTRUCT query gives; give the query, too")
-        print(f"{_turtle(out)}: {loaded.construct(_sparql(sparql), out, limits)} triples")
+            raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
+        print(f"{out}: {loaded.construct(_sparql(sparql), out, limits)} triples")
         return
     table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql), limits)
-    form = "json" if as_json else form
-    if form == "csv":
-        print(table.csv(), end="")
-    elif form in ("table", "json"):
-        _print(table.records() if form == "json" else table)
-    else:
-        raise KnowledgeError(f"unknown format '{form}'; wanted table, csv or json")
+    form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
+    if form is None or form not in FORMS.values():
+        wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
+        raise KnowledgeError(f"unknown format '{form or out}'; {wanted}")
+    _rows(table.iris() if iris else table, form, out, loaded.knowledge.spoken)
+    raise typer.Exit(NO if table.truth is False else YES)
 
 
 @app.command()
@@ -639,6 +652,31 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
             raise
         _say(f"{error}; planning goes on without memory")
         return None
+
+
+def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -> None:
+    """Print the rows of a query, or write them into a file."""
+    if form == "table" and out is None:
+        _print("true" if table.truth else table if table.truth is None else "false")
+        return
+    if form == "table":
+        text = f"{table!r}\n"
+    elif form == "csv":
+        text = table.csv()
+    elif form == "json":
+        data = table.records() if table.truth is None else table.truth
+        text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+    elif form == "turtle":
+        text = table.turtle(prefixes)
+    else:
+        text = table.standard(form).decode("utf-8").rstrip("\n") + "\n"
+    if out is None:
+        print(text, end="")
+        return
+    from reasoner.files import write_whole
+
+    write_whole(out, text)
+    print(f"{out}: {len(table)} rows")
 
 
 def _sparql(given: str) -> str:

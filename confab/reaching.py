@@ -23,7 +23,13 @@ def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:
     A scene whose bodies aren't complete yet can be planned in all the same; `tell` then hears what is missing.
     """
     graph = scene.knowledge
-    if graph.remote or graph.path is None or graph.path.is_relative_to(ontology.ROOT) or not graph.select(ROBOTS):
+    if (
+        graph.remote
+        or graph.faults
+        or graph.path is None
+        or graph.path.is_relative_to(ontology.ROOT)
+        or not graph.select(ROBOTS)
+    ):
         return scene
     file = graph.path.with_name(f"{graph.path.stem}.reach.ttl")
     own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]

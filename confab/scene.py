@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -10,7 +11,9 @@ from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
+
+import pyoxigraph as ox
 
 import ontology
 from confab.accepting import AnyPlan, Facts, plan_of, several
@@ -19,7 +22,7 @@ from confab.table import Table
 from planner.plan import Limits, Outcome, Plan, Status
 from planner.solve import MODES, Request, solve
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import NO_ROWS, KnowledgeError, KnowledgeGraph
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.graph.knowledge import load as load_graph
 from reasoner.limits import Deadline
 from reasoner.memory.links import Links
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     from reasoner.graph.apart import QueryLimits
     from reasoner.graph.mirror import Mirror
 
+log = logging.getLogger(__name__)
 DEFAULT_MODE = "guarded"
 NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
@@ -67,6 +71,7 @@ class Scene:
     knowledge: KnowledgeGraph
     seconds: dict[str, float] = field(default_factory=dict)
     _edited: bool = field(default=False, init=False, repr=False, compare=False)
+    _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     @cached_property
     def reading(self) -> Reading:
@@ -75,6 +80,7 @@ class Scene:
         `plan` does without it: it reads what the task can need.
         """
         self._settle()
+        self.knowledge.require_whole()
         return read(self.knowledge)
 
     @property
@@ -87,10 +93,14 @@ class Scene:
         """What is there, what can be done, what holds and what is wanted."""
         return self.reading.problem
 
-    @property
+    @cached_property
     def names(self) -> Names:
-        """Short names and the IRIs behind them."""
-        return self.reading.names
+        """Short names and the IRIs behind them; where the scene can't be read, of all that its files speak of."""
+        try:
+            return self.reading.names
+        except KnowledgeError:
+            quads = self.knowledge.store
+            return Names(term.value for q in quads for term in q.triple if isinstance(term, ox.NamedNode))
 
     @property
     def objects(self) -> dict[str, str]:
@@ -215,6 +225,7 @@ class Scene:
         """
         from reasoner.embodiment.reading import read_embodiment
 
+        self.knowledge.require_whole()
         if self.knowledge.select("SELECT ?why WHERE { ?ontology :symbolicOnly ?why }"):
             raise KnowledgeError(
                 f"{self.iri} is symbolic only: it states reach without geometry, so physics can't verify it"
@@ -243,7 +254,7 @@ class Scene:
 
     def _forget(self) -> None:
         """Forget what was read before an edit."""
-        for name in ("reading", "embodiment"):
+        for name in ("reading", "names", "embodiment"):
             self.__dict__.pop(name, None)
         self._edited = True
 
@@ -257,47 +268,84 @@ class Scene:
             infer(self.knowledge)
 
     def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
-        """Return the rows of a SPARQL 1.1 SELECT query as a table; the scene's prefixes are known.
+        """Return what a SPARQL 1.1 query answers, as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
 
-        It is answered in a process of its own: see `reasoner.graph.apart`.
+        Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
+        no such name. It is answered in a process of its own: see `reasoner.graph.apart`.
+
+        >>> scene = load("beverage-serving")
+        >>> scene.query("SELECT ?where WHERE { :cup1 k:location ?where }")[0]
+        ('location2',)
+        >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
+        False
 
         Raises
         ------
         KnowledgeError
-            The query isn't SPARQL, asks another endpoint without leave, or has no rows as its answer.
+            The query isn't SPARQL; the message has line and column. Or it asks another endpoint without leave.
         LimitError
             It takes more time, rows or memory than the limits allow.
         """
         from reasoner.graph.apart import ask
+
+        kind, columns, found = ask(self._asked(sparql), sparql, limits)
+        if kind == "truth":
+            return Table(("answer",), ((str(found).lower(),),), truth=found)
+        columns = ["subject", "predicate", "object"] if kind == "triples" else columns
+        rows = tuple(tuple(self._cell(term) for term in row) for row in found)
+        return Table(tuple(columns), rows, tuple(map(tuple, found)))
+
+    def _asked(self, sparql: str) -> KnowledgeGraph:
+        """Return the graph as a query shall see it; what is missing in it is told once."""
         from reasoner.reading.affordance import SITUATION, write_situation
 
         self._settle()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
-        kind, columns, rows = ask(self.knowledge, sparql, limits)
-        if kind != "rows":
-            raise KnowledgeError(NO_ROWS)
-        return Table(tuple(columns), tuple(tuple(self._cell(term) for term in row) for row in rows))
+        for fault in () if self._told else self.knowledge.faults:
+            log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
+        self._told = True
+        return self.knowledge
 
-    def construct(self, sparql: str, path: str | Path, limits: QueryLimits | None = None) -> int:
-        """Write the triples that a CONSTRUCT query gives into a file that imports this scene; return how many they are.
+    @overload
+    def construct(self, sparql: str, path: None = None, limits: QueryLimits | None = None) -> rdflib.Graph: ...
+
+    @overload
+    def construct(self, sparql: str, path: str | Path, limits: QueryLimits | None = None) -> int: ...
+
+    def construct(
+        self, sparql: str, path: str | Path | None = None, limits: QueryLimits | None = None
+    ) -> rdflib.Graph | int:
+        """Return the triples that a CONSTRUCT query gives; or write them into a file that imports this scene, and return how many.
 
         Raises
         ------
         KnowledgeError, LimitError
             As `query`; the query gives no triples but rows.
         """
-        from reasoner.graph.construct import write_construct
+        if path is not None:
+            from reasoner.graph.construct import write_construct
 
-        self._settle()
-        return write_construct(self.knowledge, sparql, Path(path), limits)
+            return write_construct(self._asked(sparql), sparql, Path(path), limits)
+        import rdflib
+
+        return rdflib.Graph().parse(data=self.query(sparql, limits).turtle(self.knowledge.spoken), format="turtle")
 
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
+        from reasoner.graph.apart import standing_alone
         from reasoner.reading.affordance import applicable_query
         from reasoner.reading.quantification import behavior_named
 
-        return applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
+        query = applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
+        return standing_alone(self.knowledge, query)
+
+    def quantifying_query(self, behavior: str) -> str:
+        """Return the SPARQL query that quantifies a behaviour: a row for each way to put individuals in for its parameters."""
+        from reasoner.graph.apart import standing_alone
+        from reasoner.reading.quantification import behavior_named, query_for
+
+        return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))
 
     def affordances(self, of: str | None = None) -> Table:
         """Return what objects afford in the initial situation: object, behaviour, arguments, situation, effect.
@@ -325,7 +373,7 @@ class Scene:
     def _cell(self, term: Any) -> str | None:
         if term is None:
             return None
-        value = str(term.value)
+        value = str(getattr(term, "value", term))
         return self.names.short(value) if type(term).__name__ == "NamedNode" else value
 
     def plan(
@@ -385,6 +433,7 @@ class Scene:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
         if optimal and time_limit is None:
             time_limit = OPTIMAL_SECONDS
+        self.knowledge.require_whole()
         deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
         with self.knowledge.until(deadline):
             how = "optimal" if optimal else mode
@@ -680,7 +729,8 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
     Raises
     ------
     KnowledgeError
-        No such scene; broken syntax; an import that can't be found; an endpoint that is down, or slow, or none.
+        No such scene; broken syntax; an endpoint that is down, or slow, or none. A file whose imports can't be found, or that
+        declares no ontology, can be asked; planning in it says what is missing.
     LimitError
         The deadline came first.
 
@@ -694,9 +744,12 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
         from reasoner.graph.stores import connect
 
         return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
-    graph = load_graph(source, deadline=deadline)
+    graph = load_graph(source, deadline=deadline, tolerant=True)
     with graph.until(deadline or Deadline()):
-        infer(graph)
+        try:
+            infer(graph)
+        except KnowledgeError as error:
+            graph.faults.append(str(error))
     return Scene(graph, {"load": perf_counter() - begin})
 
 

@@ -6,20 +6,38 @@ import csv
 import html
 import io
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     import pandas
     from rich.table import Table as RichTable
 
+STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
+"""Forms of the SPARQL 1.1 recommendations, and what pyoxigraph calls them."""
+
 
 @dataclass(frozen=True)
 class Table(Sequence[tuple[str | None, ...]]):
-    """Rows with named columns; iterate over it, index it, show it, or turn it into a DataFrame."""
+    """Rows with named columns; iterate over it, index it, show it, or turn it into a DataFrame.
+
+    `terms` are the rows as the store answered them, with IRIs and datatypes; `truth` is the answer of an ASK query, which is then
+    also what the table counts as in a condition.
+
+    >>> import confab
+    >>> table = confab.load("beverage-serving").query("SELECT ?b ?level WHERE { ?b c:level ?level } ORDER BY ?level ?b")
+    >>> table[0], table.values()[0]
+    (('B1_MOVE', '1'), ('B1_MOVE', 1))
+    >>> table.iris()[0][0]
+    'https://w3id.org/confab/tabletop#B1_MOVE'
+    """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str | None, ...], ...]
+    terms: tuple[tuple[Any, ...], ...] = ()
+    truth: bool | None = None
 
     def __getitem__(self, index: int) -> tuple[str | None, ...]:  # type: ignore[override]
         """Return one row."""
@@ -29,15 +47,28 @@ class Table(Sequence[tuple[str | None, ...]]):
         """Return the number of rows."""
         return len(self.rows)
 
+    def __bool__(self) -> bool:
+        """Return what an ASK query answered; of other queries, whether there is a row."""
+        return bool(self.rows) if self.truth is None else self.truth
+
     def __iter__(self) -> Iterator[tuple[str | None, ...]]:
         """Yield the rows."""
         return iter(self.rows)
 
+    def values(self) -> list[tuple[Any, ...]]:
+        """Return the rows with numbers, truth values and dates as Python's own."""
+        return [tuple(map(_value, row, terms)) for row, terms in zip(self.rows, self.terms or self.rows, strict=True)]
+
+    def iris(self) -> Table:
+        """Return the table with whole IRIs in place of short names."""
+        rows = tuple(tuple(None if t is None else str(getattr(t, "value", t)) for t in terms) for terms in self.terms)
+        return replace(self, rows=rows) if self.terms else self
+
     def dataframe(self) -> pandas.DataFrame:
-        """Return the rows as a pandas DataFrame (pandas comes with the extra `notebook`)."""
+        """Return the rows as a pandas DataFrame with typed columns (pandas comes with the extra `notebook`)."""
         import pandas
 
-        return pandas.DataFrame(list(self.rows), columns=list(self.columns))
+        return pandas.DataFrame(self.values(), columns=list(self.columns)).convert_dtypes()
 
     def csv(self) -> str:
         """Return the rows as CSV with a header line."""
@@ -50,6 +81,37 @@ class Table(Sequence[tuple[str | None, ...]]):
     def records(self) -> list[dict[str, str | None]]:
         """Return the rows as one mapping each."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
+    def standard(self, form: str) -> bytes:
+        """Return the answer in a form of SPARQL 1.1: ``sparql-json``, ``sparql-xml``, ``sparql-csv`` or ``tsv``."""
+        from pyoxigraph import QueryResultsFormat, QuerySolutions, Store, parse_query_results
+
+        if form not in STANDARD:
+            raise KnowledgeError(f"unknown form '{form}'; wanted {', '.join(STANDARD)}")
+        chosen = getattr(QueryResultsFormat, STANDARD[form])
+        if self.truth is not None:
+            asked = Store().query("ASK {}" if self.truth else "ASK { FILTER(false) }")
+            return asked.serialize(format=chosen) or b""
+        lines = ["\t".join(f"?{name}" for name in self.columns)]
+        lines += ["\t".join("" if t is None else str(t).replace("\t", "\\t") for t in row) for row in self.terms]
+        found = parse_query_results("\n".join(lines) + "\n", format=QueryResultsFormat.TSV)
+        assert isinstance(found, QuerySolutions)
+        return found.serialize(format=chosen) or b""
+
+    def turtle(self, prefixes: dict[str, str] | None = None) -> str:
+        """Return the triples of a CONSTRUCT query as Turtle.
+
+        Raises
+        ------
+        KnowledgeError
+            The query gave rows.
+        """
+        import pyoxigraph as ox
+
+        if self.columns != ("subject", "predicate", "object") or not all(len(row) == 3 for row in self.terms):
+            raise KnowledgeError("Turtle holds triples; wanted a CONSTRUCT query")
+        triples = sorted({ox.Triple(*row) for row in self.terms}, key=str)
+        return (ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"").decode("utf-8")
 
     def __rich__(self) -> RichTable:
         """Return the table for rich."""
@@ -74,3 +136,16 @@ class Table(Sequence[tuple[str | None, ...]]):
         return "\n".join(
             "  ".join((c or "").ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in lines
         )
+
+
+def _value(cell: str | None, term: Any) -> Any:
+    """Return a literal as Python's own value, where its datatype has one; anything else as it is shown."""
+    datatype = getattr(term, "datatype", None)
+    if datatype is None or term.language is not None:
+        return cell
+    from decimal import Decimal
+
+    from rdflib import Literal, URIRef
+
+    value = Literal(term.value, datatype=URIRef(datatype.value)).value
+    return cell if value is None else float(value) if isinstance(value, Decimal) else value

@@ -1,4 +1,4 @@
-"""Queries that people write, answered in a process of their own: what they cost, and how they end, can't harm this one.
+"""Queries that people write, answered in a process of its own: what they cost, and how they end, can't harm this one.
 
 A query can ask for more rows than there are atoms, and one that is nested deeply enough brings the SPARQL parser down. The queries
 of the planner itself are asked of the store directly.
@@ -12,12 +12,16 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from threading import Timer
+from types import TracebackType
+from typing import Any, TypeAlias
 
 import pyoxigraph as ox
 
 from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, Row
 from reasoner.limits import LimitError
+from reasoner.names import nearest
+from reasoner.vocabulary import CORE
 
 PROCESS = Path(__file__).with_name("asked_apart.py")
 SECONDS, ROWS, MEGABYTES = 60.0, 100_000, 2_000
@@ -26,7 +30,18 @@ TEXTS = re.compile(
     re.DOTALL,
 )
 """What may hold any word: texts, IRIs and comments."""
+WORDS = re.compile(
+    rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
+)
+"""Texts, which hold no names, and prefixed names."""
+DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
+LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
+"""More that could stand there than helps anybody."""
+PLACE = re.compile(r"error at (\d+):(\d+): ")
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
+
+Answer: TypeAlias = "tuple[str, list[str], Any]"
+"""What a query gives: ``rows``, ``triples`` or ``truth``; the columns; and which."""
 
 
 @dataclass(frozen=True)
@@ -39,35 +54,186 @@ class QueryLimits:
     service: bool = False
 
 
-def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> tuple[str, list[str], list[Row]]:
-    """Return what a query answers on the union of the graphs: ``rows`` or ``triples``, the columns, and which.
+def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> Answer:
+    """Return what a query answers on the union of the graphs: ``rows``, ``triples`` or ``truth``, the columns, and which.
 
     Raises
     ------
     KnowledgeError
-        It isn't SPARQL 1.1, asks another endpoint without leave, is nested too deeply, or gives neither rows nor triples.
+        It isn't SPARQL 1.1, asks another endpoint without leave, or is nested too deeply.
     LimitError
         It takes more time or memory, or gives more rows, than the limits allow.
     """
     limits = limits or QueryLimits()
+    if graph.remote:
+        return _checked(graph, query, limits, _remotely(graph, allowed(query, limits), limits))
+    with Apart(graph, limits) as apart:
+        return apart.ask(query)
+
+
+class Apart:
+    """A process that answers queries about a graph as it is now, one after the other; it ends with the ``with`` block.
+
+    Parameters
+    ----------
+    graph : KnowledgeGraph
+    limits : QueryLimits
+        Of each query; `megabytes` those of the process.
+    """
+
+    def __init__(self, graph: KnowledgeGraph, limits: QueryLimits) -> None:
+        self.graph, self.limits = graph, limits
+        self._setup = pickle.dumps(
+            {
+                "prefixes": graph.spoken,
+                "graphs": [BASE + name for name in GRAPHS],
+                "quads": graph.store.dump(format=ox.RdfFormat.N_QUADS),
+                "memory": limits.megabytes * 1_000_000,
+                "rows": limits.rows,
+                "service": limits.service,
+            }
+        )
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Apart:
+        """Return it; the process begins with the first query, and anew after one that brought it down."""
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+
+    def ask(self, query: str) -> Answer:
+        """Return what a query answers; errors as of the function `ask`."""
+        self.graph.round_trips += 1
+        found = self._answer(core_names(self.graph, allowed(query, self.limits)))
+        if found[0] == "error":
+            found = self._answer(query)  # as it was written, so that the position is right
+        return _checked(self.graph, query, self.limits, found)
+
+    def _answer(self, query: str) -> Answer:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, str(PROCESS)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            )
+            self._send(self._setup)
+        process, late = self._process, False
+        assert process.stdout is not None
+
+        def end() -> None:
+            nonlocal late
+            late = True
+            process.kill()
+
+        timer = Timer(self.limits.seconds, end)
+        timer.start()
+        try:
+            self._send(pickle.dumps(query))
+            answer: Answer = pickle.load(process.stdout)
+            return answer
+        except (EOFError, pickle.UnpicklingError):
+            raise self._why(late) from None
+        finally:
+            timer.cancel()
+
+    def _send(self, what: bytes) -> None:
+        assert self._process is not None and self._process.stdin is not None
+        try:
+            self._process.stdin.write(what)
+            self._process.stdin.flush()
+        except BrokenPipeError:  # it has ended; why, is asked where its answer is missed
+            pass
+
+    def _why(self, late: bool) -> Exception:
+        """Return what to say of a process that ended without an answer."""
+        assert self._process is not None
+        process, self._process = self._process, None
+        said = process.communicate()[1].decode("utf-8", "replace")
+        if late:
+            return LimitError(
+                f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
+            )
+        if "memory" in said.lower():
+            return LimitError(
+                f"gave up: the query needs more than {self.limits.megabytes:,} MB of memory; ask for less"
+            )
+        if process.returncode < 0:
+            return KnowledgeError(
+                f"the query brings the SPARQL engine down (signal {-process.returncode}); nest it less deeply"
+            )
+        return RuntimeError(f"the process that answers queries failed: {said}")
+
+
+def allowed(query: str, limits: QueryLimits) -> str:
+    """Return a query; raise `KnowledgeError` if it asks other endpoints and may not."""
     if not limits.service and SERVICE.search(TEXTS.sub(" ", query)):
         raise KnowledgeError(
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"
         )
-    kind, columns, found = _remotely(graph, query, limits) if graph.remote else _apart(graph, query, limits)
-    if kind == "too many":
+    return query
+
+
+def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answer) -> Answer:
+    """Return an answer; raise what it says went wrong."""
+    if found[0] == "too many":
         raise LimitError(
             f"gave up: more than {limits.rows:,} rows, or very long ones; add a LIMIT to the query, or allow more (--rows)"
         )
-    if kind == "error":
-        raise KnowledgeError(f"the query is not SPARQL 1.1: {found}")
-    return kind, columns, found
+    if found[0] == "error":
+        raise KnowledgeError(f"the query is not SPARQL 1.1: {_explained(graph, query, found[2])}")
+    return found
 
 
-def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> tuple[str, list[str], Any]:
+def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
+    """Return in one line what is wrong with a query, with what stands there, and an unknown prefix by its name."""
+    error = " ".join(LISTS.sub("unexpected", error).split())
+    known = {*graph.spoken, *DECLARED.findall(query)}
+    used = [m["prefix"] for m in WORDS.finditer(query) if m["text"] is None and m["prefix"] is not None]
+    if unknown := next((prefix for prefix in used if prefix not in known and prefix != "_"), None):
+        hint = "known are " + ", ".join(f"{prefix}:" for prefix in sorted(known))
+        return f"{error}; no prefix '{unknown}:' is known{nearest(unknown, known, hint)}"
+    if place := PLACE.search(error):
+        line, column = int(place[1]), int(place[2])
+        lines = query.split("\n")
+        rest = lines[line - 1][column - 1 :].strip() if line <= len(lines) else ""
+        return f"{error}; there stands '{rest[:20]}'" if rest else f"{error}; there the query ends"
+    return error
+
+
+def core_names(graph: KnowledgeGraph, query: str) -> str:
+    """Return a query in which ``:Behavior`` means the core's where the scene's own ``:`` has no such name."""
+    own = graph.spoken.get("", CORE)
+    if own == CORE or "" in DECLARED.findall(query):
+        return query
+
+    def said(iri: str) -> bool:
+        node = ox.NamedNode(iri)
+        places = (node, None, None), (None, node, None), (None, None, node)
+        return any(next(graph.store.quads_for_pattern(*place), None) for place in places)
+
+    def put(match: re.Match[str]) -> str:
+        name = match["name"]
+        if match["text"] is not None or match["prefix"] is not None or name is None:
+            return match[0]
+        return f"<{CORE}{name}>" if said(CORE + name) and not said(own + name) else match[0]
+
+    return WORDS.sub(put, query)
+
+
+def standing_alone(graph: KnowledgeGraph, query: str) -> str:
+    """Return a query of ours with PREFIX lines for what it uses, so that any endpoint understands it."""
+    used = {m["prefix"] or "" for m in WORDS.finditer(query) if m["text"] is None and "?" not in m[0]}
+    lines = [f"PREFIX {prefix}: <{graph.prefixes[prefix]}>" for prefix in sorted(used) if prefix in graph.prefixes]
+    return "\n".join([*lines, query])
+
+
+def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> Answer:
     answer = graph.query(query)
     if isinstance(answer, ox.QueryBoolean):
-        return "truth", [], []
+        return "truth", [], bool(answer)
     rows: list[Row] = []
     for row in answer:
         rows.append(tuple(row))
@@ -76,35 +242,3 @@ def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> tuple[s
     if isinstance(answer, ox.QueryTriples):
         return "triples", [], rows
     return "rows", [variable.value for variable in answer.variables], rows
-
-
-def _apart(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> tuple[str, list[str], Any]:
-    graph.round_trips += 1
-    asked = {
-        "query": query,
-        "prefixes": graph.prefixes,
-        "graphs": [BASE + name for name in GRAPHS],
-        "quads": graph.store.dump(format=ox.RdfFormat.N_QUADS),
-        "memory": limits.megabytes * 1_000_000,
-        "rows": limits.rows,
-        "service": limits.service,
-    }
-    try:
-        done = subprocess.run(
-            [sys.executable, str(PROCESS)], input=pickle.dumps(asked), capture_output=True, timeout=limits.seconds
-        )
-    except subprocess.TimeoutExpired:
-        raise LimitError(
-            f"gave up after {limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
-        ) from None
-    if done.returncode == 0:
-        answer: tuple[str, list[str], Any] = pickle.loads(done.stdout)
-        return answer
-    said = done.stderr.decode("utf-8", "replace")
-    if "memory" in said.lower():
-        raise LimitError(f"gave up: the query needs more than {limits.megabytes:,} MB of memory; ask for less")
-    if done.returncode < 0:
-        raise KnowledgeError(
-            f"the query brings the SPARQL engine down (signal {-done.returncode}); nest it less deeply"
-        )
-    raise RuntimeError(f"the process that answers queries failed: {said}")

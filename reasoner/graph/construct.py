@@ -24,20 +24,19 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     LimitError
         As `reasoner.graph.apart.ask`.
     """
+    name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     kind, _, answer = ask(graph, query, limits)
     if kind != "triples":
         raise KnowledgeError(
-            "wanted a CONSTRUCT query, whose answer is triples; leave -o out to see the rows of a SELECT"
+            "wanted a CONSTRUCT query, whose answer is triples; a file of another kind takes the rows of a SELECT"
         )
-    found = sorted({ox.Triple(*triple) for triple in answer}, key=str)  # type: ignore[arg-type]
+    found = sorted({ox.Triple(*triple) for triple in answer}, key=str)
     if not found:
         raise KnowledgeError("the query gives no triples, so no file was written")
-    owl, type_ = OWL, ox.NamedNode(RDF + "type")
-    name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     head = [
-        ox.Triple(name, type_, ox.NamedNode(owl + "Ontology")),
-        ox.Triple(name, ox.NamedNode(owl + "imports"), ox.NamedNode(graph.scene)),
+        ox.Triple(name, ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
+        ox.Triple(name, ox.NamedNode(OWL + "imports"), ox.NamedNode(graph.scene)),
     ]
-    text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.prefixes)
+    text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.spoken)
     write_whole(path, text or b"")
     return len(found)

@@ -21,6 +21,7 @@ import pyoxigraph as ox
 import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
+from reasoner.names import nearest
 from reasoner.vocabulary import PREFIXES
 
 BASE = "urn:confab:graph:"
@@ -30,7 +31,7 @@ SCENE = ("asserted", "inferred", "reach")
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
 """What a file has in it that speaks of triples, in one of the three notations."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
-NO_ROWS = "wanted a SELECT query, whose answer is rows; ASK gives none, and CONSTRUCT goes into a file: -o FILE.ttl"
+NO_ROWS = "wanted a SELECT query, whose answer is rows"
 
 Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
 Row = tuple[Term, ...]
@@ -68,7 +69,11 @@ class KnowledgeGraph:
     files : mapping of ontology IRI to file
         What was read into the graph `asserted`, the scene first.
     prefixes : mapping of prefix to namespace
-        Those of SPARQL queries: the files' own, and `PREFIXES`.
+        Those of our own queries: `PREFIXES`, and what the files declare besides.
+    declared : mapping of prefix to namespace
+        What the files declare, the scene's own first; the empty prefix is that of the scene's own file.
+    faults : list of str
+        Why the scene can only be asked and not be planned in, if it was loaded in spite of them.
     remote : Remote, optional
         The store that answers instead of `store`; it is only read.
     round_trips : int
@@ -81,9 +86,21 @@ class KnowledgeGraph:
     store: ox.Store = field(default_factory=ox.Store)
     files: dict[str, Path] = field(default_factory=dict)
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
+    declared: dict[str, str] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
     remote: Remote | None = None
     round_trips: int = 0
     deadline: Deadline = field(default_factory=Deadline)
+
+    @property
+    def spoken(self) -> dict[str, str]:
+        """The prefixes of people's queries: the scene's, as its file declares them, before ours."""
+        return {**self.prefixes, **self.declared}
+
+    def require_whole(self) -> None:
+        """Raise `KnowledgeError` if something is missing that planning would need."""
+        if self.faults:
+            raise KnowledgeError(self.faults[0])
 
     @contextmanager
     def until(self, deadline: Deadline) -> Iterator[None]:
@@ -160,7 +177,9 @@ class KnowledgeGraph:
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
 
-def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline | None = None) -> KnowledgeGraph:
+def load(
+    source: str | Path, store: ox.Store | None = None, deadline: Deadline | None = None, tolerant: bool = False
+) -> KnowledgeGraph:
     """Load a scene with all that it imports, and its reach file if there is one.
 
     Parameters
@@ -171,6 +190,8 @@ def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline |
         An empty store to load into; one in memory if left out.
     deadline : Deadline, optional
         When loading ends, done or not.
+    tolerant : bool
+        Load any file of RDF, and note in `faults` what keeps it from being a scene: imports that aren't found, no ontology.
 
     Raises
     ------
@@ -180,13 +201,24 @@ def load(source: str | Path, store: ox.Store | None = None, deadline: Deadline |
     path = scene_file(source)
     graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
     with graph.until(deadline or Deadline()):
-        _load(graph, path)
+        _load(graph, path, tolerant)
     return graph
 
 
-def _load(graph: KnowledgeGraph, path: Path) -> None:
+def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
+    @contextmanager
+    def forgiven() -> Iterator[None]:
+        try:
+            yield
+        except KnowledgeError as error:
+            if not tolerant:
+                raise
+            graph.faults.append(str(error))
+
     read_into(graph, path, "asserted")
-    graph.scene = _only_ontology(graph, path)
+    graph.scene = path.as_uri()
+    with forgiven():
+        graph.scene = _only_ontology(graph, path)
     waiting = [(graph.scene, path)]
     places: dict[Path, Mapping[str, Path]] = {}
     while waiting:
@@ -194,11 +226,13 @@ def _load(graph: KnowledgeGraph, path: Path) -> None:
         if iri in graph.files:
             continue
         if iri != graph.scene:
-            read_into(graph, file, "asserted")
+            with forgiven():
+                read_into(graph, file, "asserted")
         graph.files[iri] = file
         for imported in _imports(graph, iri):
             if imported not in graph.files:
-                waiting.append((imported, _locate(imported, file, places)))
+                with forgiven():
+                    waiting.append((imported, _locate(imported, file, places)))
     reach = path.with_name(f"{path.stem}.reach.ttl")
     if reach.is_file():
         read_into(graph, reach, "reach")
@@ -212,7 +246,8 @@ def scene_file(source: str | Path) -> Path:
     path = Path(source)
     if path.is_file():
         return path.resolve()
-    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)})")
+    near = nearest(str(source), shipped)
+    raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)}){near}")
 
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
@@ -240,12 +275,15 @@ def readable(file: Path) -> Iterator[tuple[bytes, ox.RdfFormat]]:
 
 
 def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
-    """Read the prefixes at the top of a file into the graph's."""
+    """Read the prefixes at the top of a file into the graph's; the empty one is that of the first file."""
+    first = not graph.declared
     with readable(file) as (content, form):
         parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
         list(islice(parser, 1))
     for prefix, namespace in parser.prefixes.items():
         graph.prefixes.setdefault(prefix, namespace)
+        if prefix or first:
+            graph.declared.setdefault(prefix, namespace)
 
 
 def _only_ontology(graph: KnowledgeGraph, path: Path) -> str:

@@ -1,0 +1,149 @@
+"""Asking a scene: in its file's own prefixes, in every form of SPARQL, whatever file of RDF it is; answers with types and IRIs."""
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+import rdflib
+from typer.testing import CliRunner
+
+import confab
+import ontology
+from confab.authoring import new_domain
+from confab.cli import app
+from reasoner.graph.knowledge import KnowledgeError
+
+CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
+OF_CUP1 = "SELECT ?where WHERE { :cup1 k:location ?where }"
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def run() -> CliRunner:
+    return CliRunner()
+
+
+def test_every_prefix_means_what_the_scenes_file_says(scene: confab.Scene) -> None:
+    assert scene.query(OF_CUP1)[0] == ("location2",)
+    for name in ontology.scenes():
+        other = confab.load(name)
+        (file, *_) = other.knowledge.files.values()
+        declared = {prefix: str(iri) for prefix, iri in rdflib.Graph().parse(file).namespaces()}
+        own = {p: iri for p, iri in declared.items() if f"@prefix {p}:" in " ".join(file.read_text().split())}
+        assert own.items() <= other.knowledge.spoken.items(), name
+
+
+def test_names_of_the_core_need_no_prefix_of_their_own(scene: confab.Scene) -> None:
+    rows = scene.query("SELECT ?b WHERE { ?b a :Behavior ; rdfs:label ?text FILTER(?text != ':cup1') } # :cup1")
+    assert len(rows) == len(scene.problem.domain.behaviors)
+    assert len(scene.query(f"PREFIX : <{CUP1[:-4]}> SELECT ?b WHERE {{ ?b a :Behavior }}")) == 0
+
+
+def test_every_form_of_query_is_answered(scene: confab.Scene) -> None:
+    yes, no = scene.query("ASK { :cup1 a k:Cup }"), scene.query("ASK { :cup1 a k:Bottle }")
+    assert (bool(yes), yes[0], bool(no), no[0]) == (True, ("true",), False, ("false",))
+    built = "CONSTRUCT { ?cup rdfs:seeAlso ?l } WHERE { ?cup a k:Cup ; k:location ?l }"
+    assert scene.query(built)[0] == ("cup1", "seeAlso", "location2")
+    assert (rdflib.URIRef(CUP1), rdflib.RDFS.seeAlso, None) in scene.construct(built)
+    assert len(scene.query("DESCRIBE :cup1")) > 3
+
+
+def test_a_data_frame_has_types(scene: confab.Scene) -> None:
+    query = (
+        "SELECT ?b ?level (?level > 1 AS ?below) (1.5 AS ?x) WHERE { ?b a :Behavior ; :level ?level } ORDER BY ?level"
+    )
+    frame = scene.query(query).dataframe()
+    assert [str(kind) for kind in frame.dtypes[1:]] == ["Int64", "boolean", "Float64"]
+    assert frame.level.max() == 3
+    assert frame.below.sum() > 5
+
+
+def test_answers_have_iris_where_they_are_asked_for(scene: confab.Scene, run: CliRunner, tmp_path: Path) -> None:
+    table = scene.query("SELECT ?o ?n WHERE { ?o a k:Cup ; :index ?n } ORDER BY ?o")
+    assert table.iris()[0] == (CUP1, "3")
+    standard = json.loads(table.standard("sparql-json"))["results"]["bindings"]
+    assert standard[0]["o"] == {"type": "uri", "value": CUP1}
+    assert standard[0]["n"]["datatype"].endswith("#integer")
+    assert b"<uri>" in table.standard("sparql-xml")
+    told = run.invoke(
+        app, ["query", "beverage-serving", "SELECT ?o WHERE { ?o a k:Cup } ORDER BY ?o", "--json", "--iris"]
+    )
+    assert json.loads(told.stdout)[0] == {"o": CUP1}
+    for ending in ("csv", "json", "tsv", "srj", "srx", "txt"):
+        file = tmp_path / f"cups.{ending}"
+        run.invoke(app, ["query", "beverage-serving", "SELECT ?o WHERE { ?o a k:Cup }", "-o", str(file)])
+        assert "cup2" in file.read_text()
+    told = run.invoke(app, ["query", "beverage-serving", "ASK { :cup1 a k:Bottle }"])
+    assert (told.exit_code, told.stdout) == (1, "false\n")
+
+
+def test_texts_of_any_signs_are_answered_as_they_are(scene: confab.Scene) -> None:
+    said = "tab\tline\nquote\" back\\slash 'é€' | <&>"
+    table = scene.query(f"SELECT ({rdflib.Literal(said).n3()} AS ?text) ?nothing WHERE {{}}")
+    assert table[0] == (said, None)
+    assert json.loads(table.standard("sparql-json"))["results"]["bindings"] == [
+        {"text": {"type": "literal", "value": said}}
+    ]
+
+
+@pytest.mark.parametrize("behavior", ["B1_POUR", "B2_PICK", "B3_LIFT"])
+def test_a_shown_query_needs_nothing_of_ours(scene: confab.Scene, behavior: str) -> None:
+    shown = scene.quantifying_query(behavior)
+    theirs = scene.graph.query(shown, initNs={})
+    ours = scene.query(shown)
+    assert [tuple(map(str, row)) for row in theirs if isinstance(row, tuple)] == list(ours.iris())
+    assert scene.query(scene.applicable_query(behavior)).columns
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("SELECT ?o WHERE { ?o k:location ?l", "error at 1:35.*there the query ends"),
+        ("SELECT ?o\nWHERE { ?o k:location }", "error at 2:23.*there stands '}'"),
+        ("SELECT ?o WHERE { ?o kk:location ?l }", "1:.*no prefix 'kk:' is known"),
+        ("SELECT ?o WHERE { ?o a :Behavior } LIMIT x", "error at 1:42"),
+        ("INSERT DATA { :a :b :c }", "not SPARQL 1.1"),
+    ],
+)
+def test_a_faulty_query_is_answered_in_one_line_with_the_place(scene: confab.Scene, query: str, said: str) -> None:
+    with pytest.raises(KnowledgeError, match=said) as caught:
+        scene.query(query)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_any_file_of_rdf_can_be_asked_and_says_what_is_missing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "any.ttl").write_text("@prefix : <http://e.org/a#> .\n:x :y :z .\n")
+    (tmp_path / "robot.ttl").write_text(
+        "@prefix owl: <http://www.w3.org/2002/07/owl#> . <http://e.org/o> a owl:Ontology ; owl:imports <package://x/y.owl> ."
+    )
+    for name, missing in (("any.ttl", "wanted one 'a owl:Ontology'"), ("robot.ttl", "imports <package://x/y.owl>")):
+        scene = confab.load(tmp_path / name)
+        with caplog.at_level(logging.WARNING):
+            assert len(scene.query("SELECT * WHERE { ?s ?p ?o }"))
+        assert missing in caplog.text
+        caplog.clear()
+        assert len(scene.query("SELECT * WHERE { ?s ?p ?o }"))
+        assert caplog.text == ""
+        for call in (scene.plan, scene.execute, lambda s=scene: s.facts, lambda s=scene: s.embodiment):
+            with pytest.raises(KnowledgeError, match=missing):
+                call()
+    assert confab.load(tmp_path / "any.ttl").query("SELECT ?o WHERE { :x :y ?o }")[0] == ("z",)
+
+
+def test_one_missing_value_blocks_no_query(tmp_path: Path) -> None:
+    new_domain("tearoom", tmp_path)
+    file = tmp_path / "tearoom-scene.ttl"
+    text = file.read_text()
+    file.write_text(text.replace("d:isAt", "rdfs:seeAlso", 1))
+    scene = confab.load(file)
+    with pytest.raises(KnowledgeError, match="has no value"):
+        scene.plan()
+    assert len(scene.query("SELECT ?x WHERE { ?x a d:Plate }")) >= 1
