@@ -130,8 +130,10 @@ class Improver:
 
         What these steps leave as it was is left so, too.
         """
-        problem = self.segments.program.problem
-        level = self.segments.program.levels[-2]
+        problem, levels = self.segments.program.problem, self.segments.program.levels
+        if len(levels) < 2:
+            return None  # there is no level above the lowest that could be planned anew
+        level = levels[-2]
         changing = {effect.situation for behavior in problem.domain.at_level(level) for effect in behavior.effects}
         kinds = {situation: problem.domain.situations[situation].range for situation in changing}
         bits = sum(
