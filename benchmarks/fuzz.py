@@ -46,9 +46,9 @@ if TYPE_CHECKING:
     from confab.scene import Result
 
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
-CASES, ROUND, BATCH = 100_000, 1_000, 60
+CASES, ROUND, BATCH = 100_000, 1_000, 100
 SECONDS, MEGABYTES = 30, 4_000
-KEPT, ALIKE = 3, 70
+KEPT, ALIKE = 2, 70
 """So many cases are kept that broke in the same words, by as many signs."""
 FEW_STATES, FEW_STEPS = 300, 60
 """A world of so few states and quantified behaviours is searched to the end, where the answer is that there is no plan."""
@@ -105,6 +105,7 @@ def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep
     try:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         resource.setrlimit(resource.RLIMIT_AS, (MEGABYTES << 20, MEGABYTES << 20))
+        gc.set_threshold(50_000, 20, 20)
         results = _recorded()
         with os.fdopen(writing, "w", encoding="utf-8") as lines:
             for seed in seeds:

@@ -26,6 +26,7 @@ from planner.hierarchical.planner import Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.serialization import closed, refusal
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from planner.validation import validate
 from reasoner.symbols import Problem
 
 SEARCHING = 0.9
@@ -62,7 +63,7 @@ def plan(
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)
-    plan = found if found is not None else best.plan
+    plan = found if found is not None and not validate(problem, found) else best.plan
     status = Status.SOLVED if plan is not None else best.status
     return replace(
         best,
@@ -98,8 +99,13 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
 
 
 def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | None) -> tuple[float, Plan | None]:
-    """Return a lower bound, and a cheaper plan if one was found on the way."""
+    """Return a lower bound, and a cheaper plan if one was found on the way.
+
+    What is at rest in the beginning is wanted to be so in the end. What wasn't may stay as it was as long as nothing touches it:
+    of that the search knows nothing, so that its bound holds but what it finds may be no plan.
+    """
     level = problem.domain.levels[-1]
+    problem = replace(problem, goal=problem.goal_on(level))
     upper = cost(problem, best.plan) if best.plan is not None else math.inf
     try:
         if refusal(closed(problem, level, deadline)) is not None:

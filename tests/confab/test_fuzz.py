@@ -1,26 +1,34 @@
 """What broke once holds, and so does a share of new cases: each answer is a result or one line. All of them: `make fuzz`."""
 
+import os
+import random
+import signal
 from pathlib import Path
 
 import pytest
 
-from benchmarks import fuzz
+from benchmarks import broken_inputs, fuzz
+from planner.plan import Outcome, Reason, Status
+from planner.solve import Request
 
 
 @pytest.fixture(scope="module")
 def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fuzz")
-    fuzz.sources(folder)
+    broken_inputs.sources(folder)
     return folder
 
 
-def test_the_cases_that_broke_once_hold(given: Path) -> None:
-    assert [str(failure) for door, seed in fuzz.known() if (failure := fuzz.run_case(door, seed, given))] == []
+@pytest.mark.parametrize("door", sorted({door for door, *_ in fuzz.known()}))
+def test_the_cases_that_broke_once_hold(given: Path, door: str) -> None:
+    seeds = [seed for where, seed, _ in fuzz.known() if where == door]
+    assert [str(failure) for failure in fuzz.run_batch(door, seeds, given)] == []
 
 
 @pytest.mark.parametrize("door", fuzz.DOORS)
 def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None:
-    assert [str(failure) for seed in range(1_000_000, 1_000_002) if (failure := fuzz.run_case(door, seed, given))] == []
+    share = 1 if door in ("bodies", "urdf") else 2
+    assert [str(failure) for failure in fuzz.run_batch(door, range(1_000_000, 1_000_000 + share), given)] == []
 
 
 @pytest.mark.parametrize(
@@ -38,7 +46,7 @@ def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None
 def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch, replaced: str, what: str) -> None:
     monkeypatch.setattr("confab.cli._load", lambda *_: exec(replaced + "; import sys; sys.exit(0)"))
     monkeypatch.setattr(fuzz, "SECONDS", 1 if "sleep" in replaced else 30)
-    monkeypatch.setitem(fuzz.DOORS, "plan", lambda _, folder: ["plan", str(folder / "scene.ttl"), "--diff", "x"])
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--diff", "x"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None
     assert what in failure.what
@@ -46,7 +54,32 @@ def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch,
 
 def test_a_plan_that_is_none_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planner.validation.validate", lambda *_: ["seeded"])
-    monkeypatch.setitem(fuzz.DOORS, "plan", lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"])
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None
     assert "no plan of what was read: seeded" in failure.what
+
+
+def test_a_false_no_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no(_: Request) -> Outcome:
+        return Outcome(Status.UNSOLVABLE, reason=Reason("seeded"))
+
+    monkeypatch.setattr("confab.scene.solve", no)
+    monkeypatch.setattr("benchmarks.broken_inputs.DOMAINS", ("ferry",))
+    monkeypatch.setattr(fuzz, "DOMAINS", ("ferry",))
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
+    failure = fuzz.run_case("plan", 0, given)
+    assert failure is not None
+    assert "unsolvable was said of what a search of all states solves" in failure.what
+
+
+def test_after_a_crash_the_cases_behind_it_are_run(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def crash(draw: random.Random, folder: Path) -> list[str]:
+        if draw.random() < 0.5:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return ["memory", "show", str(folder / "memory.ttl")]
+
+    monkeypatch.setitem(fuzz.DOORS, "plan", (crash, 1))
+    broke = list(fuzz.run_batch("plan", range(12), given))
+    assert 0 < len(broke) < 12
+    assert {failure.what for failure in broke} == {"killed by signal 9"}

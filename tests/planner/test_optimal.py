@@ -12,6 +12,7 @@ from planner.grounded.state_space import Space, TooLargeError
 from planner.hierarchical import bounds as optimal
 from planner.hierarchical.bounds import a_star, lm_cut
 from planner.plan import Counts, Limits, Reason, Status
+from planner.solve import Request, solve
 from planner.validation import validate
 from worlds.families import family, random_table
 
@@ -59,3 +60,23 @@ def test_when_time_runs_out_there_is_a_plan_and_a_bound_below_it() -> None:
     assert outcome.bound is not None
     assert 0 < outcome.bound <= optimal.cost(problem, outcome.plan)
     assert outcome.seconds < 1.5 * 1.1 + 0.5
+
+
+def test_a_shorter_plan_that_leaves_a_hand_lowered_is_none() -> None:
+    problem = family("served", 2, hands=1)
+    outcome = solve(Request(problem, "optimal"))
+    assert outcome.plan is not None
+    assert outcome.bound == optimal.cost(problem, outcome.plan)
+    shorter = Space(problem, 3).search(10**6)
+    assert shorter.steps is not None
+    assert len(shorter.steps) < outcome.bound, "the world has no such plan; choose another"
+
+
+def test_the_bound_holds_where_something_not_at_rest_need_not_be_touched() -> None:
+    problem = family("served", 2, hands=1)
+    lowered = {s: "location4" for s in problem.initial if s.situation == "HAND_POSITION"}
+    problem = replace(problem, initial={**problem.initial, **lowered})
+    outcome = solve(Request(problem, "optimal"))
+    assert outcome.plan is not None
+    assert outcome.bound is not None
+    assert outcome.bound <= optimal.cost(problem, outcome.plan)
