@@ -201,7 +201,19 @@ def episode_json(episode: Episode) -> dict[str, Any]:
             for failure in episode.failures
         ],
         "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
+        "initial": [_situated(symbol, value, 0.0) for symbol, value in sorted(episode.initial.items())],
+        "course": [_situated(seen.symbol, seen.value, seen.seconds) for seen in episode.course],
         "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
+    }
+
+
+def _situated(symbol: Symbol, value: str | None, seconds: float) -> dict[str, Any]:
+    """Return from when on a symbol had a value."""
+    return {
+        "seconds": round(seconds, 4),
+        "situation": symbol.situation,
+        "arguments": list(symbol.arguments),
+        "value": value,
     }
 
 

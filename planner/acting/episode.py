@@ -120,6 +120,15 @@ class Surprise:
 
 
 @dataclass(frozen=True)
+class Seen:
+    """That a symbol came to have another value, as far as was believed; `None` where it was not to be seen any more."""
+
+    seconds: float
+    symbol: Symbol
+    value: str | None
+
+
+@dataclass(frozen=True)
 class Failure:
     """A primitive that failed: in which situation, how, and what it tells about."""
 
@@ -191,12 +200,14 @@ class Episode:
     events : tuple of Event
         Every primitive that was begun, in order.
     interventions : tuple of (Intervention, float)
-        Those that happened, with the time.
+        Those that happened, with the time when they began to.
     replans : tuple of Replan
     failures : tuple of Failure
         Experience for the memory.
     missed : tuple of Intervention
         Those that never came: the episode was over before.
+    course : tuple of Seen
+        How the situation changed from `initial` to `observed`, in the order of time.
     """
 
     scene: str
@@ -213,3 +224,4 @@ class Episode:
     failures: tuple[Failure, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     missed: tuple[Intervention, ...] = ()
+    course: tuple[Seen, ...] = ()

@@ -26,6 +26,7 @@ from planner.acting.episode import (
     Failure,
     Intervention,
     Replan,
+    Seen,
     Surprise,
     Verdict,
     World,
@@ -203,6 +204,7 @@ class _Run:
     reasons: list[Reason] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     happened: list[tuple[Intervention, float]] = field(default_factory=list)
+    course: list[Seen] = field(default_factory=list)
     replans: list[Replan] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     done: dict[tuple[int, ...], Step] = field(default_factory=dict)
@@ -224,6 +226,7 @@ class _Run:
     def start(self, plan: Plan | None) -> None:
         """Plan, unless there is a plan to begin with."""
         self.initial, self.using = dict(self.belief.initial), compiled(self.belief)
+        self.course.clear()  # what was seen so far is the initial situation
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
         if plan is None:
             self.set_aside_the_impossible(vanished(self.belief))
@@ -276,6 +279,7 @@ class _Run:
             tuple(self.failures),
             {**self.seconds, "simulated": clock},
             tuple(self.waiting),
+            tuple(self.course),
         )
 
     def executed(self) -> Plan:
@@ -341,6 +345,9 @@ class _Run:
             wanted, found = expected.get(symbol, default), belief.get(symbol, default)
             if wanted != found:
                 surprises.append(Surprise(symbol, wanted, found))
+        now, before = self.world.seconds, self.belief.initial
+        changed = (s for s in sorted(before.keys() | belief.keys()) if before.get(s) != belief.get(s))
+        self.course += [Seen(now, symbol, belief.get(symbol)) for symbol in changed]
         self.belief = replace(self.belief, initial=belief)
         return tuple(surprises)
 
@@ -361,9 +368,10 @@ class _Run:
         due += [i for i in self.waiting if i.at is not None and not i.of_world and i.at <= self.world.seconds]
         for intervention in due:
             self.waiting.remove(intervention)
+            now = self.world.seconds
             if intervention.of_world:
                 self.world.disturb(intervention)
-            self.note(intervention)
+            self.note(intervention, now)
         if any(i.of_world for i in due):
             surprises = self.look(dict(self.belief.initial))
             self.doubt("; ".join(map(_told, surprises[:3])), surprises)
@@ -373,11 +381,11 @@ class _Run:
         for intervention in [i for i in self.waiting if i.at is not None and i.of_world]:
             if (intervention.at or 0.0) <= self.world.seconds:
                 self.waiting.remove(intervention)
-                self.note(intervention)
+                self.note(intervention, intervention.at or 0.0)
 
-    def note(self, intervention: Intervention) -> None:
-        """Take note of an intervention, and change the goal if it says so."""
-        self.happened.append((intervention, self.world.seconds))
+    def note(self, intervention: Intervention, seconds: float) -> None:
+        """Take note of an intervention that happened at a time, and change the goal if it says so."""
+        self.happened.append((intervention, seconds))
         goal = dict(self.belief.goal)
         if intervention.change is Change.GOAL:
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
