@@ -266,7 +266,13 @@ def execute(
 @app.command()
 def query(
     scene: SceneName,
-    sparql: Annotated[str | None, typer.Argument(metavar="QUERY", help="SPARQL text, or a .rq file.")] = None,
+    sparql: Annotated[
+        str | None, typer.Argument(metavar="QUERY", help="SPARQL text, a .rq file, or a ready query: where-was-it.")
+    ] = None,
+    episodes: Annotated[
+        list[Path] | None,
+        typer.Option("--episodes", metavar="FILE", help="Ask this saved episode as well; repeatable."),
+    ] = None,
     show: Annotated[str | None, typer.Option(metavar="BEHAVIOR", help="Print the query that quantifies it.")] = None,
     applicable: Annotated[
         bool, typer.Option("--applicable", help="With --show: the query with its preconditions, where it can be done.")
@@ -302,7 +308,7 @@ def query(
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
     if applicable and show is None:
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
-    loaded = _load(scene, iri)
+    loaded = _load(scene, iri).with_episodes(*(episodes or ()))
     if show is not None:
         print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
         return
@@ -680,7 +686,10 @@ def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -
 
 
 def _sparql(given: str) -> str:
-    """Return a query, or what the file of that name holds."""
+    """Return a query, or what the file of that name, or the shipped query of that name, holds."""
+    import ontology
+    from reasoner.names import nearest
+
     if any(sign in given for sign in "{}?\n"):
         return given
     path = Path(given)
@@ -690,6 +699,11 @@ def _sparql(given: str) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     if path.suffix or "/" in given:
         raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
+    ready = {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+    if given in ready:
+        return ready[given].read_text(encoding="utf-8")
+    if given.replace("-", "").isalpha() and " " not in given:
+        raise KnowledgeError(f"no ready query '{given}'{nearest(given, ready)} (ready: {', '.join(ready)})")
     return given
 
 

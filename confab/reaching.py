@@ -10,11 +10,13 @@ import pyoxigraph as ox
 import ontology
 from confab.scene import Scene
 from reasoner.graph.knowledge import BASE, KnowledgeError
-from reasoner.vocabulary import EMBODIMENT
+from reasoner.vocabulary import EMBODIMENT, EPISODES
 
 log = logging.getLogger(__name__)
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
-SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
+SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
+  FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }} }}"""
+"""A file with an episode is about a scene that has its own reach."""
 
 
 def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:

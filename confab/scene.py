@@ -295,6 +295,19 @@ class Scene:
         rows = tuple(tuple(self._cell(term) for term in row) for row in found)
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
 
+    def with_episodes(self, *files: str | Path) -> Scene:
+        """Return the scene with saved episodes in it, so that `query` can ask about all of them.
+
+        Raises
+        ------
+        KnowledgeError
+            A file holds no episode, or two hold one of the same name.
+        """
+        from reasoner.memory.episodes import read_episodes
+
+        read_episodes(self.knowledge, map(Path, files))
+        return self
+
     def _asked(self, sparql: str) -> KnowledgeGraph:
         """Return the graph as a query shall see it; what is missing in it is told once."""
         from reasoner.reading.affordance import SITUATION, write_situation

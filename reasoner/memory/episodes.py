@@ -16,14 +16,14 @@ initial, course       a `Phase` for each value that a situated object had, from 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pyoxigraph as ox
 
 from reasoner.files import as_iri_part, write_whole
-from reasoner.graph.knowledge import BASE, KnowledgeGraph
+from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE
 from reasoner.vocabulary import ARGUMENTS, CORE, EPISODES, OWL, PROV, RDF, XSD
@@ -53,6 +53,30 @@ def assert_episode(graph: KnowledgeGraph, episode: Data, names: Names, name: str
     """Add an episode to the graph `episodes`."""
     target = ox.NamedNode(BASE + "episodes")
     graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples_of(episode, names, name))
+
+
+def read_episodes(graph: KnowledgeGraph, files: Iterable[Path]) -> None:
+    """Read files of episodes into the graph `episodes`, so that one query can ask all of them.
+
+    Raises
+    ------
+    KnowledgeError
+        A file can't be read, or holds no episode; two files hold what has the same name.
+    """
+    known: dict[str, Path] = {}
+    for file in files:
+        one = KnowledgeGraph("")
+        read_into(one, file, "episodes")
+        found = [text(row[0]) for row in one.select(f"SELECT ?e WHERE {{ ?e a <{EPISODES}Episode> }} ORDER BY ?e")]
+        if not found:
+            raise KnowledgeError(f"{file}: holds no episode; 'confab execute SCENE --save FILE' writes one")
+        for iri in found:
+            if iri in known:
+                raise KnowledgeError(
+                    f"{file} and {known[iri]} both hold {iri}; save episodes under names that differ: they are called after their files"
+                )
+            known[iri] = file
+        read_into(graph, file, "episodes")
 
 
 def ontology_of(episode: Data, name: str) -> str:

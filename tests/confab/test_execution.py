@@ -10,9 +10,10 @@ import pytest
 from rich.console import Console
 
 import confab
+import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from planner.acting.episode import Change
+from planner.acting.episode import Change, Intervention
 from planner.acting.executive import Moment
 from planner.acting.symbolic_world import SymbolicWorld
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
@@ -122,6 +123,53 @@ def test_an_episode_is_stored_in_the_terms_of_prov(tmp_path: Path) -> None:
       ?person a <{EPISODES}Intervention> ; <{EPISODES}text> ?text }} ORDER BY ?text"""
     assert [text(row[0]) for row in graph.select(why)] == sorted(FIGURE_8)
     assert not validate([path])
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.25])
+def test_the_change_of_plan_is_told_with_the_interference_whatever_time_the_world_takes(pause: float) -> None:
+    """PyBullet lets a quarter of a second pass until what was moved is at rest; it was then told with the next primitive."""
+    scene = confab.load("beverage-serving")
+
+    class Slow(SymbolicWorld):
+        def disturb(self, intervention: Intervention) -> None:
+            super().disturb(intervention)
+            self.seconds += pause
+
+    episode = execute(scene, scene.problem, None, FIGURE_8, Slow(scene.problem)).json()
+    assert_episode(scene.knowledge, episode, scene.names)
+    rows = scene.query(ready("why-was-the-plan-changed"))
+    assert sorted(str(row[3]) for row in rows) == sorted(FIGURE_8)
+
+
+def ready(name: str) -> str:
+    return (ontology.ROOT / "questions" / "episodes" / f"{name}.rq").read_text()
+
+
+def test_where_things_were_is_asked_of_several_saved_episodes_at_once(tmp_path: Path) -> None:
+    scene = confab.load("beverage-serving")
+    scene.execute().save(tmp_path / "calm.ttl")
+    scene.execute(interventions=FIGURE_8).save(tmp_path / "visit.ttl")
+    both = confab.load("beverage-serving").with_episodes(tmp_path / "calm.ttl", tmp_path / "visit.ttl")
+    rows = both.query(ready("where-was-it").replace("12.0", "12.5"))
+    places = [row[4] for row in rows if row[3] == "LOCATION"]
+    assert places == ["location5", "location8"]
+    course = [row for row in both.query(ready("how-did-it-go-on")) if row[1] == "cup2" and row[2] == "LOCATION"]
+    assert [row[5] for row in course] == ["location1", "in_hand", "location5"] + [
+        "location1", "in_hand", "location5", "location8"]  # fmt: skip
+    assert not both.query(ready("what-failed"))
+    with pytest.raises(KnowledgeError, match="both hold"):
+        both.with_episodes(tmp_path / "calm.ttl", tmp_path / "calm.ttl")
+    with pytest.raises(KnowledgeError, match="holds no episode"):
+        both.with_episodes(ontology.ROOT / "scenes" / "two-cups.ttl")
+
+
+def test_the_course_of_an_episode_leads_from_what_was_to_what_is() -> None:
+    episode = confab.load("beverage-serving").execute(interventions=FIGURE_8).episode
+    state = {**episode.initial}
+    for seen in episode.course:
+        assert seen.value is not None
+        state[seen.symbol] = seen.value
+    assert state == episode.observed
 
 
 def test_an_episode_goes_into_the_scenes_own_graph_of_episodes() -> None:
