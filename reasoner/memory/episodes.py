@@ -73,7 +73,7 @@ def read_episodes(graph: KnowledgeGraph, files: Iterable[Path]) -> None:
         for iri in found:
             if iri in known:
                 raise KnowledgeError(
-                    f"{file} and {known[iri]} both hold {iri}; save episodes under names that differ: they are called after their files"
+                    f"{file} and {known[iri]} both hold {iri}; an episode is called after its file, so give these other names"
                 )
             known[iri] = file
         read_into(graph, file, "episodes")

@@ -154,8 +154,8 @@ def test_where_things_were_is_asked_of_several_saved_episodes_at_once(tmp_path: 
     places = [row[4] for row in rows if row[3] == "LOCATION"]
     assert places == ["location5", "location8"]
     course = [row for row in both.query(ready("how-did-it-go-on")) if row[1] == "cup2" and row[2] == "LOCATION"]
-    assert [row[5] for row in course] == ["location1", "in_hand", "location5"] + [
-        "location1", "in_hand", "location5", "location8"]  # fmt: skip
+    calm, visit = ["location1", "in_hand", "location5"], ["location1", "in_hand", "location5", "location8"]
+    assert [row[5] for row in course] == calm + visit
     assert not both.query(ready("what-failed"))
     with pytest.raises(KnowledgeError, match="both hold"):
         both.with_episodes(tmp_path / "calm.ttl", tmp_path / "calm.ttl")
