@@ -1,8 +1,7 @@
 """Plans with a proof of how far from optimal they can be, at most.
 
 upper   cost of the best plan so far: the fast planner's, made shorter for as long as that helps
-lower   what any plan costs at least: LM-cut of the initial state, the layers that exhaustion has finished, or the least f of A*
-        with LM-cut; all of the lowest level
+lower   what any plan costs at least: the least f of A* on the lowest level, with what each goal costs alone and then with LM-cut
 
 When both meet, the plan is optimal. When a limit comes first, both are returned, and their ratio bounds the loss.
 
@@ -14,25 +13,21 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
-from planner.grounded.grounding import OutOfTimeError, ground
-from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
-from planner.grounded.state_space import Space, TooLargeError
+from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.shortest import Bound, shortest, ways
 from planner.grounded.task import Task
 from planner.hierarchical.planner import Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.serialization import closed, refusal
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from planner.plan import Limits, Outcome, Plan, Reason, Status
 from planner.validation import validate
 from reasoner.symbols import Problem
 
 SEARCHING = 0.9
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
-Heuristic = Callable[[int], float]
-"""A lower bound on the cost from a state to the goal; infinite where there is no way."""
 
 
 def plan(
@@ -47,7 +42,7 @@ def plan(
     ----------
     problem : Problem
     limits : Limits
-        Expansions of A* (and ten times as many states of exhaustion); the time is used up unless optimality is proved before.
+        Expansions of each A*; the time is used up unless optimality is proved before.
     using : Compiled, optional
 
     Returns
@@ -111,78 +106,26 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
         if refusal(closed(problem, level, deadline)) is not None:
             return 0.0, None
         task = ground(problem, level, deadline=deadline)
-    except (GroundingTooLargeError, OutOfTimeError):
+    except (TooLargeError, OutOfTimeError):
         return 0.0, None
     if isinstance(task, Reason):
         return math.inf, None
-    heuristic = lm_cut(task, deadline)
-    lower = heuristic(task.initial)
-    costs = set(task.costs)
-    if lower < upper and len(costs) == 1:
-        half = None if deadline is None else (perf_counter() + deadline) / 2
-        try:
-            found = Space(problem, level).search(limits.expansions * 10, half)
-            if found.steps is not None:
-                total = len(found.steps) * costs.pop()
-                return total, Plan(found.steps) if total < upper else None
-        except TooLargeError as large:
-            lower = max(lower, large.layers * min(costs))
-        except TimeoutError:
-            pass
-    if lower < upper:
-        counts = best.search.get(level) or Counts()
-        bound, operators = a_star(task, heuristic, upper, limits.expansions, deadline, counts)
-        return max(lower, bound), None if operators is None else Plan(task.steps(operators))
+    lower = 0.0
+    half = None if deadline is None else (perf_counter() + deadline) / 2
+    for bound, most, until in (
+        (ways(task), limits.expansions, half),
+        (lm_cut(task, deadline), limits.expansions, deadline),
+    ):
+        found = shortest(task, bound, upper, most, until, best.search.get(level))
+        lower = max(lower, min(found.bound, upper))
+        if found.plan is not None:
+            return found.bound, Plan(task.steps(found.plan))
+        if lower >= upper:
+            break
     return lower, None
 
 
-def a_star(
-    task: Task, heuristic: Heuristic, upper: float, expansions: int, deadline: float | None, counts: Counts
-) -> tuple[float, list[int] | None]:
-    """Return the least f that is left, and the operators of a plan cheaper than `upper` if one was found.
-
-    Without a plan and with f no less than `upper`, a plan of cost `upper` is optimal.
-    """
-    g = {task.initial: 0.0}
-    came_from: dict[int, tuple[int, int]] = {}
-    start = heuristic(task.initial)
-    queue = [(start, start, 0, task.initial)]  # f, h, order of generation, state
-    lower, number = start, 0
-    while queue:
-        f, h, _, state = heapq.heappop(queue)
-        lower = max(lower, min(f, upper))
-        if f >= upper:
-            return upper, None
-        if f > g[state] + h:
-            continue
-        if state & task.goal == task.goal:
-            steps = []
-            while state in came_from:
-                state, operator = came_from[state]
-                steps.append(operator)
-            return f, steps[::-1]
-        if counts.expanded >= expansions or (deadline is not None and perf_counter() > deadline):
-            return lower, None
-        counts.expanded += 1
-        for operator in range(len(task)):
-            after = task.applied(state, operator)
-            if after is None:
-                continue
-            counts.generated += 1
-            new = g[state] + task.costs[operator]
-            if new < g.get(after, math.inf):
-                g[after] = new
-                came_from[after] = state, operator
-                estimate = heuristic(after)
-                number += 1
-                if deadline is not None and perf_counter() > deadline:
-                    return lower, None
-                if new + estimate < upper:
-                    heapq.heappush(queue, (new + estimate, estimate, number, after))
-    return upper, None
-
-
-def lm_cut(task: Task, deadline: float | None = None) -> Heuristic:
+def lm_cut(task: Task, deadline: float | None = None) -> Bound:
     """Return the LM-cut heuristic of a task; after the deadline it returns the cost of the cuts so far, which is a bound, too.
 
     Bits are numbered as in the task, with two more: one that always holds, for operators that need nothing, and one that the

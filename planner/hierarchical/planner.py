@@ -1,4 +1,4 @@
-"""The fast planner: proofs first, then goals in series, then every state, then flat search; what is found is shortened.
+"""The fast planner: proofs first, then goals in series, then flat search; what is found is shortened.
 
 Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
 never that there is no plan.
@@ -9,8 +9,7 @@ stage                   decides                                         module
 static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
 relaxed reachability    that a goal can't be reached                    `planner.grounded.reachability`
-exhaustion              small problems, both ways                       `planner.grounded.state_space`
-flat search             the rest, until a limit comes                   `planner.grounded.best_first`
+flat search             the rest, both ways, until a limit comes        `planner.grounded.best_first`
 ======================  ==============================================  ==============================
 """
 
@@ -23,10 +22,9 @@ from dataclasses import replace
 from time import perf_counter
 
 from planner.grounded.best_first import plan_level
-from planner.grounded.state_space import TooLargeError
 from planner.hierarchical.postoptimization import Improver, length
 from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled, exhaust
+from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
 from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.hierarchical.unsolvability import contested, unattainable
 from planner.levels import levels_left
@@ -41,10 +39,6 @@ DETOURS = 1.25
 """A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
-FIRST_TURN = 2_000
-"""Expansions of flat search before exhaustion has its first turn."""
-STATES_PER_EXPANSION = 20
-"""Exhaustion looks at so many states for each expansion that the limits allow: a state costs it that much less."""
 
 
 def plan(
@@ -134,7 +128,9 @@ def _plan(
     if call.too_large is not None:
         text = f"goals in series found no plan, and {call.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
-    return outcome(*last_resort(call.at_rest_in_the_end(), limits, deadline))
+    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+    flat = plan_level(call.at_rest_in_the_end(), limits=Limits(limits.expansions, left))
+    return outcome(flat.status, flat.plan, flat.reason)
 
 
 def shorten(call: Call, improve: int, leave_levels: bool) -> None:
@@ -173,23 +169,3 @@ def reordered(call: Call) -> list[RefinedStep]:
             if done and length(other.steps) < length(best):
                 best = other.steps
     return best
-
-
-def last_resort(problem: Problem, limits: Limits, deadline: float | None) -> tuple[Status, Plan | None, Reason | None]:
-    """Decide a problem on its lowest level alone: by its states if they are few enough to be counted, and by flat search.
-
-    The two take turns, each first with little: which of them is the right one can't be told beforehand.
-    """
-    for expansions in (min(limits.expansions, FIRST_TURN), limits.expansions):
-        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-        flat = plan_level(problem, limits=Limits(expansions, left))
-        if flat.status is not Status.GAVE_UP or (deadline is not None and perf_counter() > deadline):
-            break
-        try:
-            found = exhaust(problem, deadline, expansions * STATES_PER_EXPANSION)
-        except TooLargeError:
-            continue
-        except LimitError as limit:
-            return Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}")
-        return (Status.SOLVED, found, None) if isinstance(found, Plan) else (Status.UNSOLVABLE, None, found)
-    return flat.status, flat.plan, flat.reason

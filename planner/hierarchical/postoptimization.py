@@ -15,7 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from planner.grounded.state_space import Space, TooLargeError
+from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.shortest import shortest, ways
+from planner.grounded.task import Task
 from planner.hierarchical.inherited_preconditions import binding
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
 from planner.hierarchical.state import Cell, arguments_of, key_of
@@ -29,13 +31,12 @@ REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
 LARGEST = 7
 """So many steps a cluster has at most."""
-OPERATORS, STATES = 400, 5_000
-"""The largest world in which a cluster is planned anew, the states for each cluster allowed."""
-WORK, WHOLE_WORK, PER_OPERATOR = 1_000_000, 1_700_000, 4_000
-"""For each cluster allowed so many pairs of a state and an operator may be looked at in all, in clusters and in a whole plan;
-putting an operator in counts as so many. A million take some 8 ms, so that time is bounded without a look at the clock."""
-WHOLE_BITS, WHOLE_STATES = 48, 20_000
-"""The largest world, in bits of a state if every symbol could take every value, and the most states for a whole plan anew."""
+OPERATORS, MOST_ROWS = 400, 20_000
+"""The largest world in which steps are planned anew, in operators, and in rows of a join on the way to them."""
+STATES, WORK = 4_000, 10_000
+"""So many states are expanded for a cluster or a whole plan, and in all, for each cluster allowed."""
+WHOLE_BITS = 48
+"""The largest world that is planned anew as a whole, in bits of a state if every symbol could take every value."""
 
 
 def length(steps: Sequence[RefinedStep], level: int | None = None) -> int:
@@ -94,7 +95,7 @@ class Improver:
         self.table = self.refiner.table
         self.segments = self.refiner.segments
         self.states = min(STATES * self.clusters_left, 40 * STATES)
-        self.work = WHOLE_WORK * self.clusters_left
+        self.work = WORK * self.clusters_left
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
 
@@ -106,7 +107,6 @@ class Improver:
         self.table.undo(0)
         if anew is not None:
             return anew if worth_it(best, anew) else best
-        self.work = min(self.work, WORK * self.clusters_left)
         for shorten in (self.clusters, self.detours):
             found = shorten(best)
             self.table.undo(0)
@@ -150,7 +150,7 @@ class Improver:
         }
         goal = {s: value for s, value in initial.items() if (s.situation, key_of(s.arguments)) not in targets}
         goal |= {Symbol(s, arguments_of(key)): value for (s, key), value in self.segments.goal.items()}
-        shortest = self._shortest(replace(problem, initial=initial, goal=goal), level, WHOLE_STATES, steps)
+        shortest = self._shortest(replace(problem, initial=initial, goal=goal), level, self.states, steps)
         if not shortest:
             return None if shortest is None else list(steps)
         found = []
@@ -163,20 +163,22 @@ class Improver:
 
     def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
-        space = None
+        problem = replace(problem, domain=self._binding(level))
         try:
-            bound = replace(problem, domain=self._binding(level))
-            space = Space(bound, level, min(OPERATORS, self.work // PER_OPERATOR))
-            self.work -= PER_OPERATOR * len(space.operators)
-            most = min(states, self.work // max(len(space.operators), 1))
-            found = space.search(most, self.segments.deadline, length(old, level) - 1)
-            self.work -= found.states * len(space.operators)
-        except TooLargeError:
-            self.work -= PER_OPERATOR * OPERATORS if space is None else most * len(space.operators)
-            return None
-        except TimeoutError as error:
+            task = ground(problem, level, most=MOST_ROWS, deadline=self.segments.deadline)
+        except OutOfTimeError as error:
             raise LimitError("the time limit") from error
-        return [(step.behavior, step.arguments) for step in found.steps or ()]
+        except TooLargeError:
+            return None
+        if not isinstance(task, Task) or len(task) > OPERATORS:
+            return None
+        task = replace(task, costs=[1.0] * len(task))
+        upper = length(old, level)
+        found = shortest(task, ways(task), upper, min(states, self.work), self.segments.deadline)
+        self.work -= found.states
+        if found.plan is not None:
+            return [task.describe(operator)[:2] for operator in found.plan]
+        return [] if found.bound >= upper else None
 
     def _binding(self, level: int) -> Domain:
         if level not in self.bound:
@@ -343,21 +345,29 @@ class Improver:
         if self.known.get(key) is None and (key in self.known or self.clusters_left <= 0 or self.work <= 0):
             return None
         mark = len(self.table.trail)
-        if any(self.refiner.again(step) is None for step in old):
-            self.table.undo(mark)
+        after = targets = self._changed(old)
+        if len(old) < len(span):
+            after = self._changed(span)
+        if targets is None or after is None:
             return None
-        targets = self.table.since(mark)
-        self.table.undo(mark)
         level = min(max(step[0] for step in old) + 1, self.segments.program.levels[-2])
         new = self._anew(level, key, roles, old, targets)
         if new is not None and length(new) < length(old):
             middle = len(self.table.trail)
             between = (step for position, step in enumerate(span, first) if position not in members)
-            if all(self.refiner.again(step) is not None for step in between):
+            if all(self.refiner.again(step) is not None for step in between) and self.table.since(mark) == after:
                 self.table.undo(middle)
                 return new
         self.table.undo(mark)
         return None
+
+    def _changed(self, steps: Sequence[RefinedStep]) -> dict[Cell, str] | None:
+        """Return what steps change, None if they can't be done; the table is left as it was."""
+        mark = len(self.table.trail)
+        done = all(self.refiner.again(step) is not None for step in steps)
+        changed = self.table.since(mark)
+        self.table.undo(mark)
+        return changed if done else None
 
     def _shape(self, steps: Sequence[RefinedStep]) -> tuple[object, tuple[str, ...]]:
         """Return what steps have in common with others of their shape, and their individuals in the order of its roles."""

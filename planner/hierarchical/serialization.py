@@ -12,16 +12,16 @@ forbidden there, and the segment searched again.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from planner.grounded.grounding import OutOfTimeError, ground
 from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
 from planner.grounded.reachability import Reached
-from planner.grounded.state_space import Space, TooLargeError
+from planner.grounded.shortest import shortest
 from planner.grounded.unreachable import unreachable
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
@@ -33,7 +33,7 @@ from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
 
 EASY, LONGER = Effort(depth=1, expansions=10), Effort(depth=3, expansions=150)
 """For a goal that one step achieves, and for one that a few relevant steps do."""
-FEW_OPERATORS, FEW_STATES = 300, 30_000
+FEW_OPERATORS, FEW_STATES = 300, 6_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
 MOST_TOGETHER = 20_000
 """The largest level, in quantified behaviours, on which all goals are searched at once."""
@@ -52,19 +52,6 @@ class UnsolvableError(Exception):
     def __init__(self, reason: Reason) -> None:
         super().__init__(reason.text)
         self.reason = reason
-
-
-def exhaust(problem: Problem, deadline: float | None, most: int, operators: int = 5_000) -> Plan | Reason:
-    """Return a shortest plan of the lowest level, or why there is none; `TooLargeError` if that takes too much."""
-    level = problem.domain.levels[-1]
-    try:
-        found = Space(problem, level, operators).search(most, deadline)
-    except TimeoutError as error:
-        raise LimitError("the time limit") from error
-    if found.steps is not None:
-        return Plan(found.steps)
-    states = f"all {found.states} states of level {level} that can be reached were looked at"
-    return Reason(f"no state with the goal's facts can be reached; {states}")
 
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
@@ -234,10 +221,7 @@ class Call:
         return replace(self.problem, goal={**rest, **self.problem.goal})
 
     def prove(self) -> None:
-        """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
-
-        Or if the level has so few states that going through all of them costs less than going on.
-        """
+        """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false."""
         if not self.proved:
             self.proved = True
             level, deadline = self.program.levels[-1], self.segments.deadline
@@ -259,10 +243,11 @@ class Call:
             if isinstance(task, Reason):
                 raise UnsolvableError(task)
             if len(task) <= FEW_OPERATORS:
-                with suppress(TooLargeError):
-                    found = exhaust(self.problem, self.segments.deadline, FEW_STATES, FEW_OPERATORS)
-                    if isinstance(found, Reason):
-                        raise UnsolvableError(found)
+                found = shortest(task, most=FEW_STATES, deadline=deadline)
+                if found.plan is None and found.bound == math.inf:
+                    raise UnsolvableError(
+                        Reason(f"all {found.states} states of level {level} that can be reached were looked at")
+                    )
 
     def achieve(self, level: int, cell: Cell, attempt: Attempt) -> bool:
         """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""

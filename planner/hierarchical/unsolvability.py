@@ -1,7 +1,7 @@
 """Proofs that there is no plan, cheapest first, each with its reason in the ontology's terms.
 
 All of them look at the lowest level only: what an upper level can't do proves nothing, since the level below may do it
-otherwise. A proof here is sound and seldom complete; what is left is decided by search to exhaustion.
+otherwise. A proof here is sound and seldom complete; what is left is decided by search.
 """
 
 from __future__ import annotations

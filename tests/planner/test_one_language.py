@@ -4,12 +4,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 
-import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.grounded.grounding import ground as grounded
-from planner.grounded.state_space import Space
 from planner.grounded.task import Task
 from planner.hierarchical.operators import Program
 from planner.hierarchical.state import Table
@@ -78,28 +76,11 @@ def by_task(problem: Problem) -> After:
     return found
 
 
-def by_space(problem: Problem) -> After:
-    space = Space(problem, 1)
-    found = {}
-    start = np.zeros(1, np.uint64)
-    for operator in space.operators:
-        before = space._applicable(operator, start)
-        if len(before):
-            (code,) = (int(code) for code in space._after(operator, before))
-            state = dict(problem.initial)
-            for symbol, values in space.values.items():
-                rank = code >> space.shift[symbol] & ((1 << space.width[symbol]) - 1)
-                state[symbol] = list(values)[rank]
-            found[operator.behavior, operator.arguments] = facts(state)
-    return found
-
-
 EVALUATORS: dict[str, Callable[[Problem], After]] = {
     "validation": by_validation,
     "paper": by_paper,
     "operators": by_operators,
     "task": by_task,
-    "space": by_space,
 }
 """All that read behaviours, but for the naive reading, which they are held against."""
 

@@ -1,0 +1,144 @@
+"""Shortest plans of a grounded task: A* over the bits of its states, with whatever lower bound it is given.
+
+g        cost of the operators from the start to a state
+h        a lower bound on the cost from a state to the goal, infinite where there is no way: `nothing`, which makes this a
+         breadth-first search, `ways` of the single goals, or LM-cut (`planner.hierarchical.bounds`)
+f        g + h, the least of which is expanded next; no plan is cheaper than the least f that is open
+upper    what a plan has to be cheaper than; what can't be is dropped
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TypeAlias
+
+from planner.grounded.novelty import successors
+from planner.grounded.task import Task
+from planner.plan import Counts
+
+Bound: TypeAlias = "Callable[[int], float]"
+
+
+@dataclass(frozen=True)
+class Shortest:
+    """What was found: no plan is cheaper than `bound` or, if that is infinite, there is none cheaper than `upper`.
+
+    `plan` are the operators of a cheapest plan; `states` were reached.
+    """
+
+    bound: float
+    plan: tuple[int, ...] | None
+    states: int
+
+
+def nothing(state: int) -> float:
+    """Return the bound that knows nothing."""
+    return 0.0
+
+
+def shortest(
+    task: Task,
+    bound: Bound = nothing,
+    upper: float = math.inf,
+    most: int = 1_000_000,
+    deadline: float | None = None,
+    counts: Counts | None = None,
+) -> Shortest:
+    """Return a cheapest plan cheaper than `upper`, or why none is returned.
+
+    Parameters
+    ----------
+    task : Task
+    bound : function of a state
+    upper : float
+    most : int
+        Expansions after which only a bound is returned, as when the deadline (of `time.perf_counter`) has passed.
+    deadline : float, optional
+    counts : Counts, optional
+        Grows by what is generated and expanded.
+    """
+    counts = counts or Counts()
+    tree, goal, costs = successors(task), task.goal, task.costs
+    g = {task.initial: 0.0}
+    came_from: dict[int, tuple[int, int]] = {}
+    estimate = bound(task.initial)
+    queue = [(estimate, estimate, 0, task.initial)]  # f, h, order of generation, state
+    lower, number, expanded = estimate, 0, 0
+    while queue:
+        f, h, _, state = heapq.heappop(queue)
+        if f > g[state] + h:
+            continue  # reached by a cheaper way since
+        if f >= upper:
+            break
+        lower = max(lower, f)
+        if state & goal == goal:
+            steps = []
+            while state in came_from:
+                state, operator = came_from[state]
+                steps.append(operator)
+            return Shortest(f, tuple(steps[::-1]), len(g))
+        if expanded >= most or (deadline is not None and perf_counter() > deadline):
+            return Shortest(lower, None, len(g))
+        expanded += 1
+        counts.expanded += 1
+        so_far = g[state]
+        for operator in tree.of(state)[0]:
+            after = task.applied(state, operator)
+            if after is None:
+                continue
+            counts.generated += 1
+            new = so_far + costs[operator]
+            if new < g.get(after, math.inf):
+                g[after] = new
+                came_from[after] = state, operator
+                estimate = bound(after)
+                if new + estimate < upper:
+                    number += 1
+                    heapq.heappush(queue, (new + estimate, estimate, number, after))
+    return Shortest(upper, None, len(g))
+
+
+def ways(task: Task) -> Bound:
+    """Return what it costs to give every goal's symbol its value, each taken alone, in all.
+
+    Every operator counts for one symbol only, so that no plan is cheaper. A goal that isn't a value among several counts
+    for nothing.
+    """
+    of_symbol: dict[object, int] = {}
+    for bit, fact in enumerate(task.facts):
+        of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
+    wanted = [(mask, mask & task.goal) for mask in of_symbol.values() if mask & task.goal and mask.bit_count() > 1]
+    wanted.sort(key=lambda pair: -pair[0].bit_count())
+    setting: list[list[tuple[int, int, set[int]]]] = [[] for _ in wanted]
+    for operator in range(len(task)):
+        needed, changes = task.known(operator)
+        for i, (mask, _) in enumerate(wanted):
+            after = {set_ & mask for _, _, set_ in changes if set_ & mask}
+            if after:
+                setting[i].append((operator, needed & mask, after))
+    counted: set[int] = set()
+    tables: list[tuple[int, dict[int, float]]] = []
+    for (mask, value), moves in zip(wanted, setting, strict=True):
+        away = {value: 0.0}
+        steps = [(before, after, task.costs[o] if o not in counted else 0.0) for o, before, after in moves]
+        counted.update(operator for operator, _, _ in moves)
+        for _ in range(mask.bit_count()):
+            old = dict(away)
+            for before, afters, cost in steps:
+                least = min((away[after] for after in afters if after in away), default=math.inf) + cost
+                for source in (before,) if before else _single(mask):
+                    if least < away.get(source, math.inf):
+                        away[source] = least
+            if old == away:
+                break
+        tables.append((mask, away))
+    return lambda state: sum(away.get(state & mask, math.inf) for mask, away in tables)
+
+
+def _single(mask: int) -> list[int]:
+    """Return the bits of a mask, each as a mask."""
+    return [1 << bit for bit in range(mask.bit_length()) if mask >> bit & 1]
