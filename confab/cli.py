@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import typer
+import click
+from click.exceptions import Exit
 
 from reasoner.graph.knowledge import KnowledgeError
 
@@ -42,103 +43,98 @@ FORMS = {
 """What a query's answer can be written as, by the ending of the file's name."""
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
-CLICK_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
-"""What a wrong call raises; typer has it from click, or from a copy of its own."""
-
-app = typer.Typer(
-    name="confab",
-    help="A robot planner whose knowledge lives in an ontology.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+PATH = click.Path(path_type=Path)
+SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 
 
-def _version(wanted: bool) -> None:
+class InOrder(click.Group):
+    """A group whose help lists its commands as they stand here, the main one first."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return their names."""
+        return list(self.commands)
+
+
+def _version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
     if wanted:
         from confab import __version__
 
         print(f"confab {__version__}")
-        raise typer.Exit
+        raise Exit
 
 
-@app.callback()
-def common(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-) -> None:
+@click.group(name="confab", cls=InOrder, context_settings=SETTINGS)
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Print the version and exit."
+)
+def app() -> None:
     """Plan what a robot does from an ontology, and verify it in physics."""
 
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Shipped name, file, or URL of a SPARQL endpoint.")]
-SceneIri = Annotated[
-    str | None, typer.Option("--scene", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
-]
-Goals = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--goal", metavar="FACT", help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable."
-    ),
-]
-MemoryFile = Annotated[
-    Path | None, typer.Option("--memory", metavar="FILE", help="The only place where memory is read or written.")
-]
-NoMemory = Annotated[bool, typer.Option("--no-memory", help="Plan without memory, in so many words.")]
-Mode = Annotated[str, typer.Option("--mode", metavar="MODE", help="guarded, leading, strict, or paper (A*, eq. 5).")]
-TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        "--time-limit", metavar="S", min=0.0, help="Seconds from the start on after which it gives up (exit 3)."
-    ),
-]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything that is random.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Gui = Annotated[bool, typer.Option("--gui", help="Show the first rollout in a window; needs a screen.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where files are written.")]
+SCENE = click.argument("scene", metavar="SCENE", help="Shipped name, file, or URL of a SPARQL endpoint.")
+SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
+GOALS = click.option(
+    "--goal",
+    multiple=True,
+    metavar="FACT",
+    help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable.",
+)
+MEMORY_FILE = click.option(
+    "--memory", type=PATH, metavar="FILE", help="The only place where memory is read or written."
+)
+NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan without memory, in so many words.")
+MODE = click.option("--mode", default="guarded", metavar="MODE", help="guarded, leading, strict, or paper (A*, eq. 5).")
+TIME_LIMIT = click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0),
+    metavar="S",
+    help="Seconds from the start on after which it gives up (exit 3).",
+)
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+GUI = click.option("--gui", is_flag=True, help="Show the first rollout in a window; needs a screen.")
+OUT = click.option("--out", type=PATH, default=Path("confab-out"), metavar="DIR", help="Where files are written.")
 
 
 @app.command()
+@SCENE
+@GOALS
+@MEMORY_FILE
+@NO_MEMORY
+@MODE
+@TIME_LIMIT
+@click.option("--optimal", is_flag=True, help="Improve until proved optimal or the limit (10 s); tell the bound.")
+@click.option(
+    "--levels",
+    default="free",
+    metavar="free|strict",
+    help="Strict: no steps of a lower level where a level has no plan that can be refined.",
+)
+@click.option(
+    "--from-observed", "observed", type=PATH, metavar="FILE", help="Start from what was seen, not from the scene."
+)
+@click.option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
+@click.option(
+    "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
+)
+@click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
+@SCENE_IRI
+@AS_JSON
 def plan(
-    scene: SceneName,
-    goal: Goals = None,
-    memory: MemoryFile = None,
-    no_memory: NoMemory = False,
-    mode: Mode = "guarded",
-    time_limit: TimeLimit = None,
-    optimal: Annotated[
-        bool, typer.Option("--optimal", help="Improve until proved optimal or the limit (10 s); tell the bound.")
-    ] = False,
-    levels: Annotated[
-        str,
-        typer.Option(
-            "--levels",
-            metavar="free|strict",
-            help="Strict: no steps of a lower level where a level has no plan that can be refined.",
-        ),
-    ] = "free",
-    observed: Annotated[
-        Path | None,
-        typer.Option("--from-observed", metavar="FILE", help="Start from what was seen, not from the scene."),
-    ] = None,
-    diff: Annotated[
-        str | None, typer.Option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
-    ] = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(
-            "--engine",
-            metavar="NAME",
-            help="A planner that unified-planning knows, or none: not even where ours gives up.",
-        ),
-    ] = None,
-    level: Annotated[
-        int | None, typer.Option("--level", metavar="N", help="The level the engine plans; the lowest.")
-    ] = None,
-    iri: SceneIri = None,
-    as_json: AsJson = False,
+    scene: str,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    no_memory: bool,
+    mode: str,
+    time_limit: float | None,
+    optimal: bool,
+    levels: str,
+    observed: Path | None,
+    diff: str | None,
+    engine: str | None,
+    level: int | None,
+    iri: str | None,
+    as_json: bool,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
     from reasoner.limits import Deadline
@@ -150,7 +146,7 @@ def plan(
 
         changed = difference(_load(diff), loaded, mode)
         _print(changed.json() if as_json else str(changed))
-        raise typer.Exit(YES)
+        raise Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
@@ -159,42 +155,52 @@ def plan(
         goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
     )
     _print(result.json() if as_json else result)
-    raise typer.Exit(EXIT[result.outcome.status.value])
+    raise Exit(EXIT[result.outcome.status.value])
 
 
 @app.command()
-def run(
-    scene: SceneName = "beverage-serving",
-    memory: MemoryFile = None,
-    mode: Mode = "guarded",
-    seed: Seed = 0,
-    out: Out = Path("confab-out"),
-    no_video: Annotated[bool, typer.Option("--no-video", help="Don't film: faster.")] = False,
-    gui: Gui = False,
-) -> None:
+@click.argument(
+    "scene",
+    required=False,
+    default="beverage-serving",
+    metavar="[SCENE]",
+    help="Shipped name, file, or URL of a SPARQL endpoint.",
+)
+@MEMORY_FILE
+@MODE
+@SEED
+@OUT
+@click.option("--no-video", is_flag=True, help="Don't film: faster.")
+@GUI
+def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_video: bool, gui: bool) -> None:
     """Validate, plan, verify in physics, learn and report."""
     from confab.running import run as run_all
 
-    raise typer.Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
+    raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
 
 
 @app.command()
+@SCENE
+@click.argument(
+    "plan", type=PATH, metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form."
+)
+@click.option("--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="How often, with seeds S, S+1, …")
+@SEED
+@click.option("--workers", default="1", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option("--video", type=PATH, metavar="OUT.mp4", help="Film the first rollout.")
+@GUI
+@AS_JSON
 def verify(
-    scene: SceneName,
-    plan: Annotated[
-        Path, typer.Argument(metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form.")
-    ],
-    rollouts: Annotated[
-        int, typer.Option("--rollouts", metavar="N", min=1, help="How often, with seeds S, S+1, …")
-    ] = 1,
-    seed: Seed = 0,
-    workers: Annotated[
-        str, typer.Option("--workers", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
-    ] = "1",
-    perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
-    video: Annotated[Path | None, typer.Option("--video", metavar="OUT.mp4", help="Film the first rollout.")] = None,
-    gui: Gui = False,
-    as_json: AsJson = False,
+    scene: str,
+    plan: Path,
+    rollouts: int,
+    seed: int,
+    workers: str,
+    perturb: bool,
+    video: Path | None,
+    gui: bool,
+    as_json: bool,
 ) -> None:
     """Carry a plan out in physics and check every primitive."""
     from confab.physics import counted
@@ -205,31 +211,43 @@ def verify(
             _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
         )
     _print(report.json() if as_json else report)
-    raise typer.Exit(YES if report.verified else NO)
+    raise Exit(YES if report.verified else NO)
 
 
 @app.command()
+@SCENE
+@click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
+@click.option(
+    "--intervene", multiple=True, metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."
+)
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="What to begin with.")
+@GOALS
+@MEMORY_FILE
+@NO_MEMORY
+@MODE
+@SEED
+@click.option("--save", type=PATH, metavar="EPISODE.ttl", help="Write the episode here.")
+@SCENE_IRI
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
+@click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
+@AS_JSON
 def execute(
-    scene: SceneName,
-    world: Annotated[str, typer.Option("--world", help="Where to act: symbolic or pybullet.")] = "symbolic",
-    intervene: Annotated[
-        list[str] | None,
-        typer.Option("--intervene", metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."),
-    ] = None,
-    plan: Annotated[Path | None, typer.Option("--plan", metavar="PLAN.json", help="What to begin with.")] = None,
-    goal: Goals = None,
-    memory: MemoryFile = None,
-    no_memory: NoMemory = False,
-    mode: Mode = "guarded",
-    seed: Seed = 0,
-    save: Annotated[Path | None, typer.Option("--save", metavar="EPISODE.ttl", help="Write the episode here.")] = None,
-    iri: SceneIri = None,
-    perturb: Annotated[bool, typer.Option("--perturb", help="Vary poses, friction, masses and fill.")] = False,
-    both_hands: Annotated[
-        bool, typer.Option("--both-hands", help="In PyBullet: all hands at once, without interventions.")
-    ] = False,
-    learn: Annotated[bool, typer.Option("--learn", help="Learn the episode, failures too, into --memory.")] = False,
-    as_json: AsJson = False,
+    scene: str,
+    world: str,
+    intervene: tuple[str, ...],
+    plan: Path | None,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    no_memory: bool,
+    mode: str,
+    seed: int,
+    save: Path | None,
+    iri: str | None,
+    perturb: bool,
+    both_hands: bool,
+    learn: bool,
+    as_json: bool,
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
     from confab.live import spectator
@@ -260,43 +278,56 @@ def execute(
     if save is not None:
         execution.save(save)
     _print(execution.json() if as_json else execution)
-    raise typer.Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
+    raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
 
 @app.command()
+@SCENE
+@click.argument(
+    "sparql", required=False, metavar="[QUERY]", help="SPARQL text, a .rq file, or a ready query: where-was-it."
+)
+@click.option("--episodes", metavar="FILE", help="Ask this saved episode as well; repeatable.")
+@click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies it.")
+@click.option("--applicable", is_flag=True, help="With --show: the query with its preconditions, where it can be done.")
+@click.option("--affords", metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
+@click.option("--format", "form", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
+@click.option("--iris", is_flag=True, help="Whole IRIs in place of short names.")
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    type=PATH,
+    metavar="FILE",
+    help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology.",
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0),
+    default=60.0,
+    metavar="S",
+    help="Seconds after which the query ends (exit 3).",
+)
+@click.option(
+    "--rows", type=click.IntRange(min=1), default=100000, metavar="N", help="More rows than this end it, too."
+)
+@click.option("--service", is_flag=True, help="Let the query ask other endpoints (SERVICE).")
+@SCENE_IRI
+@AS_JSON
 def query(
-    scene: SceneName,
-    sparql: Annotated[
-        str | None, typer.Argument(metavar="QUERY", help="SPARQL text, a .rq file, or a ready query: where-was-it.")
-    ] = None,
-    episodes: Annotated[
-        list[Path] | None,
-        typer.Option("--episodes", metavar="FILE", help="Ask this saved episode as well; repeatable."),
-    ] = None,
-    show: Annotated[str | None, typer.Option(metavar="BEHAVIOR", help="Print the query that quantifies it.")] = None,
-    applicable: Annotated[
-        bool, typer.Option("--applicable", help="With --show: the query with its preconditions, where it can be done.")
-    ] = False,
-    affords: Annotated[
-        str | None, typer.Option(metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
-    ] = None,
-    form: Annotated[
-        str | None, typer.Option("--format", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
-    ] = None,
-    iris: Annotated[bool, typer.Option("--iris", help="Whole IRIs in place of short names.")] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="FILE", help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology."
-        ),
-    ] = None,
-    time_limit: Annotated[
-        float, typer.Option("--time-limit", metavar="S", min=0.0, help="Seconds after which the query ends (exit 3).")
-    ] = 60.0,
-    rows: Annotated[int, typer.Option("--rows", metavar="N", min=1, help="More rows than this end it, too.")] = 100_000,
-    service: Annotated[bool, typer.Option("--service", help="Let the query ask other endpoints (SERVICE).")] = False,
-    iri: SceneIri = None,
-    as_json: AsJson = False,
+    scene: str,
+    sparql: str | None,
+    episodes: list[Path] | None,
+    show: str | None,
+    applicable: bool,
+    affords: str | None,
+    form: str | None,
+    iris: bool,
+    out: Path | None,
+    time_limit: float,
+    rows: int,
+    service: bool,
+    iri: str | None,
+    as_json: bool,
 ) -> None:
     """Ask a scene in SPARQL, or what its objects afford."""
     from reasoner.graph.apart import QueryLimits
@@ -325,20 +356,15 @@ def query(
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
         raise KnowledgeError(f"unknown format '{form or out}'; {wanted}")
     _rows(table.iris() if iris else table, form, out, loaded.knowledge.spoken)
-    raise typer.Exit(NO if table.truth is False else YES)
+    raise Exit(NO if table.truth is False else YES)
 
 
 @app.command()
-def learn(
-    scenes: Annotated[list[str], typer.Argument(metavar="SCENE…", help="Scenes to gather experience in.")],
-    memory: Annotated[
-        Path, typer.Option("--memory", metavar="FILE", help="Memory file to learn into; made if missing.")
-    ],
-    demonstration: Annotated[
-        Path | None, typer.Option("--plan", metavar="PLAN.json", help="Learn from this plan instead.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
+@click.argument("scenes", nargs=-1, required=True, metavar="SCENE…", help="Scenes to gather experience in.")
+@click.option("--memory", type=PATH, required=True, metavar="FILE", help="Memory file to learn into; made if missing.")
+@click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
+@AS_JSON
+def learn(scenes: tuple[str, ...], memory: Path, demonstration: Path | None, as_json: bool) -> None:
     """Learn how scenes are best solved, or from a demonstration."""
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
@@ -368,19 +394,14 @@ def learn(
             remembered.save(memory)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
     _print(data if as_json else f"{memory}: {remembered!r}")
-    raise typer.Exit(status)
+    raise Exit(status)
 
 
 @app.command()
-def new(
-    domain: Annotated[str, typer.Argument(metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")],
-    folder: Annotated[
-        Path | None, typer.Option("--folder", metavar="DIR", help="Where to write; default: DOMAIN.")
-    ] = None,
-    bodies: Annotated[
-        bool, typer.Option("--bodies", help="With shapes, a table and skills, so that 'confab run' can carry it out.")
-    ] = False,
-) -> None:
+@click.argument("domain", metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")
+@click.option("--folder", type=PATH, metavar="DIR", help="Where to write; default: DOMAIN.")
+@click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
+def new(domain: str, folder: Path | None, bodies: bool) -> None:
     """Begin a domain of your own with a commented skeleton."""
     from confab.authoring import new_domain
 
@@ -391,10 +412,9 @@ def new(
 
 
 @app.command()
-def fetch(
-    url: Annotated[str, typer.Argument(metavar="URL", help="IRI of an ontology that lies on the web.")],
-    folder: Annotated[Path, typer.Option("--into", metavar="DIR", help="Beside the file that imports it.")] = Path(),
-) -> None:
+@click.argument("url", metavar="URL", help="IRI of an ontology that lies on the web.")
+@click.option("--into", "folder", type=PATH, default=Path(), metavar="DIR", help="Beside the file that imports it.")
+def fetch(url: str, folder: Path) -> None:
     """Fetch an ontology that is imported by URL."""
     from reasoner.graph.fetching import fetch as fetch_ontology
 
@@ -405,14 +425,11 @@ def fetch(
 
 
 @app.command()
-def picture(
-    scene: SceneName,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="File to draw into.")],
-    behavior: Annotated[
-        str | None, typer.Option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
-    ] = None,
-    classes: Annotated[bool, typer.Option("--classes", help="Draw the classes of objects instead.")] = False,
-) -> None:
+@SCENE
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FILE.png", help="File to draw into.")
+@click.option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
+@click.option("--classes", is_flag=True, help="Draw the classes of objects instead.")
+def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
     """Draw the table with its places, a behaviour, or the classes."""
     from confab.picturing import draw
     from confab.scene import load
@@ -420,15 +437,15 @@ def picture(
     print(draw(load(scene), out, behavior, classes))
 
 
-memory_app = typer.Typer(help="Look after a memory file.", no_args_is_help=True)
-app.add_typer(memory_app, name="memory")
+@app.group("memory", cls=InOrder)
+def memory_app() -> None:
+    """Look after a memory file."""
 
 
 @memory_app.command()
-def migrate(
-    memory: Annotated[Path, typer.Argument(metavar="MEMORY", help="Memory file; it is replaced as a whole.")],
-    renames: Annotated[list[str], typer.Argument(metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")],
-) -> None:
+@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
+def migrate(memory: Path, renames: tuple[str, ...]) -> None:
     """Rename terms in a memory, so that what was learned of them isn't lost."""
     from confab.authoring import migrate as rename
 
@@ -436,12 +453,11 @@ def migrate(
 
 
 @app.command()
-def validate(
-    files: Annotated[list[str], typer.Argument(metavar="FILE…", help="Ontology files, or names of shipped scenes.")],
-    deep: Annotated[bool, typer.Option("--deep", help="Ask HermiT for contradictions as well; needs Java.")] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Count a warning as an error: exit 1.")] = False,
-    as_json: AsJson = False,
-) -> None:
+@click.argument("files", nargs=-1, required=True, metavar="FILE…", help="Ontology files, or names of shipped scenes.")
+@click.option("--deep", is_flag=True, help="Ask HermiT for contradictions as well; needs Java.")
+@click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
+@AS_JSON
+def validate(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> None:
     """Check ontologies: what is wrong where, why, and what to do."""
     from reasoner.validation.findings import ERROR, WARNING
     from reasoner.validation.validate import validate as check
@@ -456,33 +472,40 @@ def validate(
             from confab.memory import counted
 
             print(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}", file=sys.stderr)
-    raise typer.Exit(NO if errors or (strict and warnings) else YES)
+    raise Exit(NO if errors or (strict and warnings) else YES)
 
 
 @app.command()
+@SCENE
+@click.argument(
+    "which", required=False, metavar="[STEP]", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."
+)
+@click.option(
+    "--not",
+    "instead",
+    metavar="WHAT",
+    help="Why not this: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
+)
+@GOALS
+@MEMORY_FILE
+@click.option(
+    "--step", type=click.IntRange(min=0), default=0, metavar="N", help="Which step of the level, counted from 0."
+)
+@click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
+@click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
+@click.option("--plot", type=PATH, metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
+@AS_JSON
 def explain(
-    scene: SceneName,
-    which: Annotated[
-        str | None,
-        typer.Argument(metavar="STEP", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."),
-    ] = None,
-    instead: Annotated[
-        str | None,
-        typer.Option(
-            "--not",
-            metavar="WHAT",
-            help="Why not this: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
-        ),
-    ] = None,
-    goal: Goals = None,
-    memory: MemoryFile = None,
-    step: Annotated[int, typer.Option(metavar="N", min=0, help="Which step of the level, counted from 0.")] = 0,
-    level: Annotated[int, typer.Option(metavar="L", help="On which level of the plan.")] = 1,
-    against: Annotated[
-        str | None, typer.Option(metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
-    ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")] = None,
-    as_json: AsJson = False,
+    scene: str,
+    which: str | None,
+    instead: str | None,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    step: int,
+    level: int,
+    against: str | None,
+    plot: Path | None,
+    as_json: bool,
 ) -> None:
     """Say why each step is there, why not another one, or why no plan."""
     loaded = _load(scene)
@@ -490,7 +513,7 @@ def explain(
     result = loaded.plan(goal or (), remembered)
     if not result.solved:
         _print(result.json() if as_json else result)
-        raise typer.Exit(EXIT[result.outcome.status.value])
+        raise Exit(EXIT[result.outcome.status.value])
     if level not in result.problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
     if which is None and (step, level) != (0, 1):
@@ -529,11 +552,10 @@ def _by_memory(result: Result, memory: Memory, which: str, against: str | None, 
 
 
 @memory_app.command()
-def show(
-    memory: Annotated[str, typer.Argument(metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")],
-    most: Annotated[int, typer.Option(metavar="N", min=1, help="So many rows.")] = 30,
-    as_json: AsJson = False,
-) -> None:
+@click.argument("memory", metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
+@click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="So many rows.")
+@AS_JSON
+def show(memory: str, most: int, as_json: bool) -> None:
     """Show what a memory has counted, what discriminates first."""
     from confab.memory import Memory
 
@@ -546,13 +568,12 @@ def show(
 
 
 @memory_app.command()
-def merge(
-    memories: Annotated[list[str], typer.Argument(metavar="FILE_OR_URL…", help="Memories to merge.")],
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The merged memory; may be one of them.")],
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Let what they have counted lead; else it runs in strict mode.")
-    ] = False,
-) -> None:
+@click.argument("memories", nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge.")
+@click.option(
+    "-o", "--output", "out", type=PATH, required=True, metavar="FILE", help="The merged memory; may be one of them."
+)
+@click.option("--trust", is_flag=True, help="Let what they have counted lead; else it runs in strict mode.")
+def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
     """Merge memories: the counts of each replica, in any order, once or many times."""
     from confab.memory import Memory, undisturbed
 
@@ -565,32 +586,27 @@ def merge(
 
 
 @memory_app.command("trust")
-def trust_(
-    memory: Annotated[Path, typer.Argument(metavar="MEMORY", help="Memory file; it is replaced as a whole.")],
-    replicas: Annotated[list[str], typer.Argument(metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")],
-) -> None:
+@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
+def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
     """Let what other replicas have counted lead the search, too."""
     from confab.memory import Memory, undisturbed
 
     with undisturbed(memory):
         loaded = Memory.load(memory)
-        loaded.trust(sorted(loaded.experience.episodes) if replicas == ["all"] else replicas)
+        loaded.trust(sorted(loaded.experience.episodes) if replicas == ("all",) else replicas)
         loaded.save(memory)
     _print(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
 
 
 @app.command()
-def generate(
-    family: Annotated[
-        str,
-        typer.Argument(metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable."),
-    ],
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
-    objects: Annotated[int, typer.Option("--objects", metavar="N", help="Objects, half of them cups.")] = 4,
-    hands: Annotated[int, typer.Option("--hands", metavar="H", help="Hands.")] = 2,
-    clutter: Annotated[int, typer.Option("--clutter", metavar="K", help="Irrelevant objects in other rooms.")] = 0,
-    seed: Seed = 0,
-) -> None:
+@click.argument("family", metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable.")
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option("--objects", type=int, default=4, metavar="N", help="Objects, half of them cups.")
+@click.option("--hands", type=int, default=2, metavar="H", help="Hands.")
+@click.option("--clutter", type=int, default=0, metavar="K", help="Irrelevant objects in other rooms.")
+@SEED
+def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
     """Write a scene for trials as an ordinary ontology file."""
     from reasoner.generate import write_scene
 
@@ -599,12 +615,13 @@ def generate(
 
 
 @app.command("import")
-def import_(
-    domain: Annotated[Path, typer.Argument(metavar="DOMAIN.pddl")],
-    problem: Annotated[Path, typer.Argument(metavar="PROBLEM.pddl")],
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE.ttl", help="File to write.")],
-    level: Annotated[int, typer.Option(min=1, help="Level of its behaviours; abstract ones can be added above.")] = 1,
-) -> None:
+@click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
+@click.argument("problem", type=PATH, metavar="PROBLEM.pddl")
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option(
+    "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
+)
+def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
     """Turn a PDDL problem into a scene."""
     from confab.pddl_commands import import_pddl
 
@@ -614,11 +631,10 @@ def import_(
 
 
 @app.command()
-def export(
-    scene: SceneName,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder to write into.")],
-    level: Annotated[int | None, typer.Option(help="Level to export; the lowest if not given.")] = None,
-) -> None:
+@SCENE
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
+@click.option("--level", type=int, help="Level to export; the lowest if not given.")
+def export(scene: str, out: Path, level: int | None) -> None:
     """Write one level of a scene as PDDL, for other planners."""
     from confab.pddl_commands import export_pddl
     from confab.scene import load
@@ -749,7 +765,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         code = app(arguments, prog_name="confab", standalone_mode=False) or YES  # None where a command decides nothing
         sys.stdout.flush()
-    except CLICK_ERROR as error:
+    except click.ClickException as error:
         _end(MISUSE, _usage(error))
     except (KnowledgeError, DomainError) as error:
         _end(MISUSE, str(error))
@@ -759,7 +775,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _end(GAVE_UP, "gave up: there isn't enough memory for this")
     except RecursionError as error:
         _end(GAVE_UP, f"gave up: something is nested too deeply to be worked on; where, is said in {_log(error)}")
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, click.Abort):
         _end(INTERRUPTED, "interrupted; every file is as it was before, or whole")
     except OSError as error:
         try:
