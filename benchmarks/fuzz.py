@@ -119,14 +119,13 @@ def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep
 def _recorded() -> list[Result]:
     """Let every plan of this process be noted in the list that is returned, and nothing be built twice that never changes."""
     import rdflib.plugins.sparql.processor as sparql
-    import typer.main
     from rdflib.plugins.sparql.algebra import translateQuery
     from rdflib.plugins.sparql.parser import parseQuery
 
     from confab.scene import Scene
 
     results: list[Result] = []
-    plan, command = Scene.plan, typer.main.get_command
+    plan = Scene.plan
 
     def noted(scene: Scene, *arguments: Any, **options: Any) -> Result:
         results.append(plan(scene, *arguments, **options))
@@ -143,7 +142,6 @@ def _recorded() -> list[Result]:
         (Scene, "plan", noted),
         (sparql, "parseQuery", str),
         (sparql, "translateQuery", translated_once),
-        (typer.main, "get_command", functools.cache(command)),
     ):
         setattr(place, name, new)
     return results

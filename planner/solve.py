@@ -94,6 +94,10 @@ def solve(request: Request) -> Outcome:
 
 
 def _with_experience(request: Request) -> Outcome:
+    if request.memory is None:
+        from planner.hierarchical.planner import plan as without
+
+        return without(request.problem, limits=request.limits, leave_levels=request.leave_levels)
     from planner.experience.portfolio import plan
 
     return plan(request.problem, request.memory, request.mode, request.limits, leave_levels=request.leave_levels)

@@ -70,7 +70,7 @@ def test_what_is_no_plan_is_said_to_be_none(
 
 def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     gave_up = Outcome(Status.GAVE_UP, reason=Reason("the limit came first"))
-    monkeypatch.setattr("planner.experience.portfolio.plan", lambda *_, **__: gave_up)
+    monkeypatch.setattr("planner.hierarchical.planner.plan", lambda *_, **__: gave_up)
     scene = confab.load(SCENE)
     result = scene.plan()
     assert result.solved and result.json()["engine"] == "any"

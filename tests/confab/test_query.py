@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import rdflib
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import confab
 import ontology
