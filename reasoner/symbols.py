@@ -258,7 +258,7 @@ class Problem:
     def first_level(self, symbol: Symbol) -> int:
         """Return the first level on which a symbol exists: its situation type, and the individuals that it is about."""
         individuals = (self.value_levels.get(argument, 1) for argument in symbol.arguments)
-        return max(self.domain.situations[symbol.situation].level, *individuals)
+        return max((self.domain.situations[symbol.situation].level, *individuals))
 
     def sees(self, level: int, symbol: Symbol, value: str) -> bool:
         """Return whether a level knows both a symbol and the value that it has."""

@@ -59,8 +59,14 @@ def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
     Raises
     ------
     ValueError
-        The axes don't meet in a shoulder and a wrist, or neighbouring axes aren't at right angles; the message says which.
+        The robot has no such joint or tip; the axes don't meet in a shoulder and a wrist, or neighbouring axes aren't at right
+        angles. The message says which.
     """
+    if missing := [
+        *(f"joint '{name}'" for name in joints if name not in model.joints),
+        *([] if tip in model.frames else [f"link '{tip}'"]),
+    ]:
+        raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; mend the name")
     chain = [model.joints[name] for name in joints]
     if len(chain) != 7:
         raise ValueError(

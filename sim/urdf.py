@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+MOST_LINKS, MOST_SPHERES = 500, 10_000
+"""So many links may hang on one another, and so many spheres cover one shape: more is a mistake."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -93,23 +95,28 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
     frames: dict[str, tuple[Array, Array]] = {}
     parents: dict[str, Joint] = {}
 
-    def place(link: str) -> tuple[Array, Array]:
+    def place(link: str, below: tuple[str, ...] = ()) -> tuple[Array, Array]:
         """Return the link's frame, placing its ancestors first."""
+        if link in below or len(below) > MOST_LINKS:
+            raise ValueError(f"link '{link}' hangs on itself, or on more than {MOST_LINKS} others")
         if link not in frames:
             element = elements.get(link)
             if element is None:
                 frames[link] = (rotation(0.0, 0.0, yaw), np.array(position, dtype=float))
             else:
                 parent = _end(element, "parent")
-                turn, origin = place(parent)
+                turn, origin = place(parent, (*below, link))
                 local, shift = _origin(element)
                 frames[link] = (turn @ local, origin + turn @ shift)
                 parents[link] = _joint(element, parent, link, *frames[link])
         return frames[link]
 
-    for link in links:
-        place(link)
-    spheres = {name: _cover(link, *frames[name]) for name, link in links.items()}
+    try:
+        for link in links:
+            place(link)
+        spheres = {name: _cover(link, *frames[name]) for name, link in links.items()}
+    except ValueError as problem:
+        raise ValueError(f"the robot's URDF {path} can't be used: {problem}") from problem
     return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents)
 
 
@@ -120,7 +127,17 @@ def _end(joint: ET.Element, which: str) -> str:
 
 
 def _numbers(text: str | None, default: str = "0 0 0") -> Array:
-    return np.array([float(word) for word in (text or default).split()])
+    numbers = np.array([float(word) for word in (text or default).split()])
+    if len(numbers) != 3 or not np.isfinite(numbers).all():
+        raise ValueError(f"'{text}' where three numbers belong")
+    return numbers
+
+
+def _number(element: ET.Element | None, name: str, default: float) -> float:
+    number = float(default if element is None else element.get(name, default))
+    if not math.isfinite(number):
+        raise ValueError(f"'{name}' is {number} where a number belongs")
+    return number
 
 
 def _origin(element: ET.Element) -> tuple[Array, Array]:
@@ -133,18 +150,19 @@ def _origin(element: ET.Element) -> tuple[Array, Array]:
 def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Array) -> Joint:
     axis, limit = element.find("axis"), element.find("limit")
     direction = _numbers(None if axis is None else axis.get("xyz"), "1 0 0")
-    bounds = limit.attrib if limit is not None else {}
-    endless = element.get("type") == "continuous"
+    endless, length = element.get("type") == "continuous", float(np.linalg.norm(direction))
+    if not length:
+        raise ValueError(f"joint '{element.get('name')}' has an axis without direction")
     return Joint(
         element.get("name", ""),
         element.get("type", "fixed"),
         parent,
         child,
         origin,
-        turn @ (direction / np.linalg.norm(direction)),
-        -math.pi if endless else float(bounds.get("lower", 0.0)),
-        math.pi if endless else float(bounds.get("upper", 0.0)),
-        float(bounds.get("velocity", 1.0)),
+        turn @ (direction / length),
+        -math.pi if endless else _number(limit, "lower", 0.0),
+        math.pi if endless else _number(limit, "upper", 0.0),
+        _number(limit, "velocity", 1.0),
     )
 
 
@@ -157,6 +175,10 @@ def _cover(link: ET.Element, turn: Array, origin: Array) -> Spheres:
         if geometry is None or not len(geometry):
             continue
         points, radius = _primitive(geometry[0])
+        if len(points) > MOST_SPHERES:
+            raise ValueError(
+                f"link '{link.get('name')}' takes more than {MOST_SPHERES} spheres to cover; give thicker shapes"
+            )
         centers.append(origin + (points @ local.T + shift) @ turn.T)
         radii.append(np.full(len(points), radius))
     return Spheres(np.concatenate(centers), np.concatenate(radii))
@@ -165,9 +187,9 @@ def _cover(link: ET.Element, turn: Array, origin: Array) -> Spheres:
 def _primitive(shape: ET.Element) -> tuple[Array, float]:
     """Return sphere centres in the shape's frame and their radius."""
     if shape.tag == "sphere":
-        return np.zeros((1, 3)), float(shape.get("radius", 0.0))
+        return np.zeros((1, 3)), _number(shape, "radius", 0.0)
     if shape.tag in ("cylinder", "capsule"):
-        radius, length = float(shape.get("radius", 0.0)), float(shape.get("length", 0.0))
+        radius, length = _number(shape, "radius", 0.0), _number(shape, "length", 0.0)
         half = length / 2 if shape.tag == "capsule" else max(length / 2 - radius / 2, 0.0)
         return np.array([[0.0, 0.0, z] for z in _spread(half, radius)]), radius
     if shape.tag == "box":
@@ -182,4 +204,8 @@ def _primitive(shape: ET.Element) -> tuple[Array, float]:
 
 def _spread(half: float, radius: float) -> Array:
     """Return positions from -half to half no further apart than the radius."""
-    return np.linspace(-half, half, 1 + math.ceil(2 * half / radius)) if half > 0 else np.zeros(1)
+    if half <= 0:
+        return np.zeros(1)
+    if radius * MOST_SPHERES <= 2 * half:
+        raise ValueError(f"a shape {2 * half:g} m long and {radius:g} m thick; give a thicker one")
+    return np.linspace(-half, half, 1 + math.ceil(2 * half / radius))

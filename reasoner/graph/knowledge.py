@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -255,10 +256,24 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     graph.deadline.check(f"reading {file}")
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
-        graph.store.load(input=content, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
+        timed = _Timed(content, graph.deadline, f"reading {file}")
+        graph.store.load(input=timed, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
         if any(sign in content for sign in TRIPLE_TERMS) and graph.query(HAS_TRIPLE_TERM, [name]):
             raise KnowledgeError(f"{file}: speaks of triples (RDF 1.2), which OWL doesn't know; take them out")
         read_prefixes(graph, file)
+
+
+class _Timed(BytesIO):
+    """What a parser reads piece by piece, so that it can be stopped at a deadline."""
+
+    def __init__(self, content: bytes, deadline: Deadline, doing: str) -> None:
+        super().__init__(content)
+        self.deadline, self.doing = deadline, doing
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return the next bytes, or raise `LimitError`."""
+        self.deadline.check(self.doing)
+        return super().read(size)
 
 
 @contextmanager

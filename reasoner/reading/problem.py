@@ -760,6 +760,9 @@ def _facts(
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+        many, wanted = len(symbol.arguments), len(domain.situations[symbol.situation].arguments)
+        if many != wanted:
+            raise KnowledgeError(f"{symbol}: a fact about {many} individuals; {symbol.situation} is about {wanted}")
     return {name: frozenset(pairs) for name, pairs in sorted(relations.items())}, stated
 
 
@@ -779,6 +782,12 @@ def _initial(
             initial[symbol] = values[0]
     true = [s for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE]
     initial |= dict.fromkeys(sorted(true), TRUE)
+    for symbol, value in initial.items():
+        for name in (*symbol.arguments, value):
+            if name not in names and name not in (TRUE, FALSE):
+                raise KnowledgeError(
+                    f"{symbol} is {value}, but {name} isn't declared as an individual; declare it, or mend the name"
+                )
     return initial
 
 

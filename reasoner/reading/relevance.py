@@ -341,7 +341,9 @@ class _Search:
         for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
             if not isinstance(o, ox.NamedNode) and text(p) in links and text(s) not in nodes:
                 link((s, p, o))  # says what is wrong with it
-            if isinstance(s, ox.NamedNode) and not isinstance(o, ox.BlankNode):
+            if isinstance(s, ox.NamedNode) and (
+                isinstance(o, ox.NamedNode) or (isinstance(o, ox.Literal) and text(p) != TYPE)
+            ):
                 rows.append((s.value, text(p), text(o)))
         self.triples.update(dict.fromkeys(rows))
         kinds = self._below(classes)

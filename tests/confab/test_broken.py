@@ -271,6 +271,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ("-scene", "c:value :table", 'c:value "table"', "a text, where an individual belongs"),
         ("-scene", "c:index 1", 'c:index "one"', ":index is 'one'; wanted a whole number"),
         ("-scene", "c:situationType d:PLACE ; ", "", "wanted one :situationType, found 0"),
+        ("-scene", "d:isAt :table", "d:isAt :tabel", "tabel isn't declared as an individual; declare it"),
         ("-scene", "d:isAt :table", "d:isAt <<( :a :b :c )>>", "speaks of triples"),
         ("", "c:level 1", "c:level 1.5", ":level is '1.5'; wanted a whole number from 1"),
         ("", "c:level 1", "c:level 0", ":level is '0'"),
@@ -543,3 +544,12 @@ def test_a_deadline_ends_with_the_call_that_it_was_given_to(tearoom: Path) -> No
     assert scene.plan(time_limit=60.0).solved
     with pytest.raises(LimitError):
         confab.load(tearoom, deadline=Deadline.after(0.0))
+
+
+def test_a_fact_about_nobody_is_refused(tmp_path: Path, ask: Ask) -> None:
+    scene = tmp_path / "ferry.ttl"
+    scene.write_text((Path(__file__).parents[2] / "docs" / "examples" / "ferry" / "ferry.ttl").read_text())
+    change(scene, "c:situationType :MOORED ; c:about :west .", "c:situationType :MOORED .")
+    code, _, err = ask("plan", scene)
+    assert code == MISUSE
+    assert "a fact about 0 individuals; MOORED is about 1" in err

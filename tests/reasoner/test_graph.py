@@ -6,6 +6,7 @@ import pytest
 
 import ontology
 from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.limits import Deadline, LimitError
 
 HEADER = """@prefix owl: <http://www.w3.org/2002/07/owl#> .
 <https://example.org/mine> a owl:Ontology ; owl:imports <{}> .
@@ -59,3 +60,19 @@ def test_a_query_that_is_no_sparql_is_a_clear_error() -> None:
         graph.select("SELEKT ?x")
     with pytest.raises(KnowledgeError, match="SELECT"):
         graph.select("ASK { ?a ?b ?c }")
+
+
+def test_a_file_is_read_no_further_when_the_deadline_has_come(tmp_path: Path) -> None:
+    file = tmp_path / "large.ttl"
+    file.write_text("<urn:s> a <http://www.w3.org/2002/07/owl#Ontology> .\n" + "<urn:a> <urn:b> <urn:c> .\n" * 100_000)
+    checked: list[str] = []
+
+    class Soon(Deadline):
+        def check(self, doing: str) -> None:
+            checked.append(doing)
+            if len(checked) > 20:
+                raise LimitError("over")
+
+    with pytest.raises(LimitError):
+        load(file, deadline=Soon())
+    assert checked[-1] == f"reading {file}"

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +74,24 @@ def test_an_arm_whose_axes_do_not_meet_is_refused(tmp_path: Path) -> None:
 def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"missing\.urdf"):
         read_urdf(str(tmp_path / "missing.urdf"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('xyz="0 0 1"', 'xyz="0 0 0"', "an axis without direction"),
+        ('xyz="0 0 1"', 'xyz="0 1"', "'0 1' where three numbers belong"),
+        ('lower="', 'lower="nan" was="', "'lower' is nan"),
+        ('radius="', 'radius="1e-9" was="', "give a thicker one"),
+        ('<link name="left_tool"', '<link name="left_tol"', "no link 'left_tool', which the arm"),
+        ('<joint name="left_elbow"', '<joint name="left_elbo"', "no joint 'left_elbow', which the arm"),
+        ("</robot>", '<joint name="o"><parent link="base"/><child link="base"/></joint></robot>', "hangs on itself"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused_in_words(tmp_path: Path, old: str, new: str, said: str) -> None:
+    text = Path(URDF).read_text()
+    assert old in text
+    file = tmp_path / "broken.urdf"
+    file.write_text(text.replace(old, new))
+    with pytest.raises(ValueError, match=re.escape(said)):
+        read_arm(read_urdf(str(file)), [f"left_{joint}" for joint in JOINTS], "left_tool")
