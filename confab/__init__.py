@@ -20,6 +20,7 @@
 
 from __future__ import annotations
 
+import sys as _sys
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 if _TYPE_CHECKING:
@@ -58,3 +59,9 @@ def __getattr__(name: str) -> object:
 def __dir__() -> list[str]:
     """Return the public names, which is what the Tab key offers."""
     return [*__all__, "__doc__", "__version__"]
+
+
+if "IPython" in _sys.modules:  # a notebook also shows the values of rooms that know no HTML
+    from confab.report.notebook import register as _register
+
+    _register()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from collections.abc import Callable, Iterable
@@ -293,10 +292,16 @@ class Execution:
         """Return the summary."""
         return self.summary()
 
-    def _repr_html_(self) -> str:
-        from confab.show import plan_html
+    def report(self, path: str | Path) -> Path:
+        """Write what happened as one HTML page, and return where."""
+        from confab.report.page import report_html, write_report
 
-        return f"<p>{html.escape(self.summary())}</p>{plan_html(self.episode.done, self.notes())}"
+        return write_report(path, report_html(self.scene, execution=self))
+
+    def _repr_html_(self) -> str:
+        from confab.report.notebook import of_execution
+
+        return of_execution(self)
 
 
 def planner_of(mode: str, memory: Links | None = None) -> Planner | None:

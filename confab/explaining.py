@@ -70,6 +70,11 @@ class Explanation:
         """Return the explanation for rich."""
         return str(self)
 
+    def _repr_html_(self) -> str:
+        from confab.report.pieces import explanation
+
+        return explanation(self)
+
     def __str__(self) -> str:
         """Return the explanation in a few lines."""
         if not self.other:

@@ -8,14 +8,14 @@ situation type's property ("cup 1 is at location 7"). What has no label keeps it
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from planner.levels import said
 from planner.plan import Step
 from reasoner.graph.knowledge import KnowledgeGraph, text
 from reasoner.names import Names
-from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem
+from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""
@@ -48,6 +48,14 @@ class Labels:
         words = [*([self.name(about)] if about else []), verb, *map(self.name, (*rest, *value))]
         return ("not: " if boolean and fact.value == FALSE else "") + _joined(words)
 
+    def about(self, symbol: Symbol) -> str:
+        """Return the beginning of a sentence that a value of a symbol ends: "cup 1 is at"."""
+        names = [self.name(name) for name in symbol.arguments]
+        verb = self.verbs.get(symbol.situation)
+        if verb is None or not names:
+            return " · ".join([*names, self.name(symbol.situation)])
+        return _joined([names[0], verb, *names[1:]])
+
     def condition(self, condition: Condition) -> str:
         """Return a condition as a sentence."""
         return said(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.name(what))
@@ -67,14 +75,10 @@ class Labels:
         changed = {term for effect in behavior.effects for term in (*effect.arguments, effect.value)}
         roles = [p.name for p in behavior.parameters]
         roles += [v.name for v in behavior.variables if v.name in changed]
-        mentioned = {
-            role: re.compile(rf"\b(?:the |an? )?{re.escape(role.lstrip('?'))}\b", re.IGNORECASE)
-            for role in terms
-            if re.search(rf"\b{re.escape(role.lstrip('?'))}\b", label, re.IGNORECASE)
-        }
+        mentioned = {role: pattern for role in terms if (pattern := _mention(role, label, terms)) is not None}
         marks = {f"\0{number}\0": self.name(terms[role]) for number, role in enumerate(mentioned)}
         for mark, pattern in zip(marks, mentioned.values(), strict=True):
-            label = pattern.sub(mark, label, count=1)
+            label = pattern.sub(rf"\g<1>{mark}", label, count=1)
         for mark, name in marks.items():
             label = label.replace(mark, name)
         rest = dict.fromkeys(self.name(terms[role]) for role in roles if role in terms and role not in mentioned)
@@ -82,6 +86,19 @@ class Labels:
 
 
 PLACING = {"at", "in", "on", "under", "to"}
+WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind", "beside"}
+"""Words that stand before what a role is filled with, where the role itself is called so."""
+
+
+def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
+    """Return what in a label stands for a role, or None; of a role called "onto" it is what stands behind that word."""
+    name = role.lstrip("?")
+    if name.lower() in WAYS:
+        others = "|".join(re.escape(term.lstrip("?")) for term in terms)
+        pattern = re.compile(rf"\b({re.escape(name)} )(?:the |an? )?(?!(?:{others})\b)\w+\b", re.IGNORECASE)
+    else:
+        pattern = re.compile(rf"\b()(?:the |an? )?{re.escape(name)}\b", re.IGNORECASE)
+    return pattern if pattern.search(label) else None
 
 
 def _joined(parts: Sequence[str]) -> str:

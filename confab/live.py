@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -76,13 +75,14 @@ class View:
         return Group(*parts)
 
     def _repr_html_(self) -> str:
-        from confab.show import plan_html
+        from confab.report.markup import styled, tag
+        from confab.report.pieces import tree
 
-        happened = "".join(f"<li>{html.escape(line)}</li>" for line in self.log[-LOG:])
-        plan = plan_html(self.moment.plan, self.notes()) if self.moment is not None else ""
         expected = self.moment.expected if self.moment is not None else ()
-        shall = f" → <i>{html.escape('; '.join(map(str, expected)))}</i>" if expected else ""
-        return f"<p>{html.escape(self.headline())}{shall}</p><ul>{happened}</ul>{plan}"
+        shall = [" → ", tag("i", "; ".join(map(str, expected)))] if expected else None
+        happened = tag("ul", [tag("li", line) for line in self.log[-LOG:]])
+        plan = tree(self.moment.plan, None, self.notes()) if self.moment is not None else None
+        return styled(tag("p", self.headline(), shall), happened, plan)
 
 
 @contextmanager

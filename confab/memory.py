@@ -28,6 +28,8 @@ from reasoner.memory.links_file import links_text, load_links, memory_lines, mem
 from reasoner.names import Names
 
 if TYPE_CHECKING:
+    from rich.console import Group
+
     from confab.scene import Scene
     from planner.acting.episode import Episode
     from planner.experience.portfolio import Memory as Advisor
@@ -289,8 +291,23 @@ class Memory:
         by = counted(len(self.experience.episodes), "replica")
         return f"Memory({learned}, {counted(len(self.experience), 'counter')} of {lived} by {by}, in {self.scene})"
 
+    def said(self) -> str:
+        """Return how much was learned, as a sentence."""
+        lived = counted(sum(self.experience.episodes.values()), "episode")
+        links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
+        counters = counted(len(self.experience), "counter")
+        return f"{lived} so far, {counters} of what was chosen and what wasn't; of the paper's memory {links}."
+
+    def __rich__(self) -> Group:
+        """Return what was learned for rich, what tells chosen from passed over first."""
+        from rich.console import Group
+
+        return Group(self.said(), self.counts(20).__rich__())
+
     def _repr_html_(self) -> str:
-        return f"<p>{self!r}</p>" + self.counts(20)._repr_html_() + self.table(20)._repr_html_()
+        from confab.report.notebook import of_memory
+
+        return of_memory(self)
 
 
 def counted(number: int, noun: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,8 @@ class Report:
     """What physics said about a plan: one or more rollouts, and the film of the first.
 
     A rollout is good if every primitive did what it promises and the goal's facts were seen in the end. `trusted` are the
-    situation types that the plan changes and nothing perceives: that part of it is taken on trust.
+    situation types that the plan changes and nothing perceives: that part of it is taken on trust. `scene` is where the plan is
+    carried out.
     """
 
     plan: Plan
@@ -39,6 +40,7 @@ class Report:
     rollouts: tuple[Rollout, ...]
     video: Path | None = None
     trusted: tuple[str, ...] = ()
+    scene: Scene | None = field(default=None, repr=False, compare=False)
 
     @property
     def verified(self) -> bool:
@@ -49,6 +51,18 @@ class Report:
     def good(self) -> int:
         """How many rollouts are good."""
         return sum(rollout.ok and not self.missed(rollout) for rollout in self.rollouts)
+
+    @property
+    def shown(self) -> Rollout:
+        """The first rollout that isn't good, else the first."""
+        return next((r for r in self.rollouts if not r.ok or self.missed(r)), self.rollouts[0])
+
+    @property
+    def film_speed(self) -> float:
+        """How much faster than the simulated time the film runs."""
+        from sim.film import SPEED
+
+        return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
         """Return the facts of the goal of which something else was seen in the end; what nothing perceives isn't judged."""
@@ -73,12 +87,11 @@ class Report:
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return what the first rollout that failed, else the first, says of each step, by the step's path."""
-        shown = next((r for r in self.rollouts if not r.ok), self.rollouts[0])
-        return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in shown.steps}
+        return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in self.shown.steps}
 
     def summary(self) -> str:
         """Return one line that says how it went."""
-        first = next((r for r in self.rollouts if not r.ok or self.missed(r)), self.rollouts[0])
+        first = self.shown
         several = f"; {self.rate()}" if len(self.rollouts) > 1 else ""
         if first.failure is not None:
             step = first.failure.step
@@ -114,10 +127,9 @@ class Report:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        from confab.show import plan_html
+        from confab.report.notebook import of_report
 
-        film = f"<video src='{self.video}' controls width='640'></video>" if self.video else ""
-        return f"<p>{self.summary()}</p>{film}{plan_html(self.plan, self.notes())}"
+        return of_report(self)
 
 
 def verify(
@@ -190,7 +202,7 @@ def verify(
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
     wanted = scene.problem.goal if goal is None else goal
-    return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected))
+    return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene)
 
 
 def on_trust(scene: Scene, expected: Sequence[State]) -> tuple[str, ...]:

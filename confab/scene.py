@@ -578,6 +578,11 @@ class Scene:
         problem = self.problem
         return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
 
+    def _repr_html_(self) -> str:
+        from confab.report.notebook import of_scene
+
+        return of_scene(self)
+
 
 @dataclass
 class Result:
@@ -718,10 +723,16 @@ class Result:
         steps = self.outcome.plan.steps if self.outcome.plan else ()
         return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps)])
 
-    def _repr_html_(self) -> str:
-        from confab.show import plan_html, summary
+    def report(self, path: str | Path) -> Path:
+        """Write the plan, with its reasons, as one HTML page, and return where."""
+        from confab.report.page import report_html, write_report
 
-        return f"<p>{summary(self.outcome)}</p>" + (plan_html(self.plan) if self.solved else "")
+        return write_report(path, report_html(self.scene, self))
+
+    def _repr_html_(self) -> str:
+        from confab.report.notebook import of_result
+
+        return of_result(self)
 
 
 def _sentence(facts: Iterable[Fact]) -> str:

@@ -1,8 +1,7 @@
-"""How plans look to people: a tree in a terminal, a tree in a notebook."""
+"""How plans look to people in a terminal; what notebooks and pages show is `confab.report`."""
 
 from __future__ import annotations
 
-import html
 import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -63,6 +62,11 @@ def _label(step: Step, notes: Notes) -> Text:
     return label
 
 
+def lengths(plan: Plan) -> str:
+    """Return how many steps a plan has on each level, e.g. ``4 / 10 / 32``."""
+    return " / ".join(map(str, plan.length.values())) or "no"
+
+
 def summary(outcome: Outcome) -> str:
     """Return how a planning call ended: one line, and one more for each level given up and each rule broken by that."""
     expanded = sum(counts.expanded for counts in outcome.search.values())
@@ -71,30 +75,15 @@ def summary(outcome: Outcome) -> str:
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
     bound = "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
     counts = outcome.plan.length
-    lengths = " / ".join(map(str, counts.values())) or "no"
     on = " per level" if not counts or min(counts) == 1 else f" on levels {' / '.join(map(str, counts))}"
     effort = f"{expanded} expansions in all"
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
     breaks = [broken.text for left in outcome.left for broken in left.broken]
     by = f" by {outcome.engine}" if outcome.engine else ""
-    lines = [f"solved{by}: {lengths} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"]
+    lines = [
+        f"solved{by}: {lengths(outcome.plan)} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
+    ]
     lines += outcome.given_up
     lines += [f"the plan breaks what only a level above asks: {text}" for text in breaks]
     return "\n".join(lines)
-
-
-def plan_html(plan: Plan, notes: Notes | None = None) -> str:
-    """Return the plan as nested lists that fold."""
-
-    def item(step: Step) -> str:
-        note = html.escape((notes or {}).get(step.path, ""))
-        label = (
-            f"<code>{step.id}</code> <b>{html.escape(step.behavior)}</b> {html.escape(' '.join(step.arguments))} {note}"
-        )
-        if not step.steps:
-            return f"<li>{label}</li>"
-        below = "".join(map(item, step.steps))
-        return f"<li><details{' open' if len(step.path) == 1 else ''}><summary>{label}</summary><ul>{below}</ul></details></li>"
-
-    return f"<ul class='plan'>{''.join(map(item, plan.steps))}</ul>"

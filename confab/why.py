@@ -65,6 +65,11 @@ class Because:
         """Return it for rich."""
         return str(self)
 
+    def _repr_html_(self) -> str:
+        from confab.report.pieces import because
+
+        return because(self)
+
 
 @dataclass(frozen=True)
 class WhyNot:
@@ -105,6 +110,11 @@ class WhyNot:
         """Return it for rich."""
         return str(self)
 
+    def _repr_html_(self) -> str:
+        from confab.report.pieces import why_not
+
+        return why_not(self)
+
 
 @dataclass(frozen=True)
 class Account:
@@ -143,6 +153,11 @@ class Account:
                 Text.assemble((f"{step.number} ", "dim"), step.what, why)
             )
         return tree
+
+    def _repr_html_(self) -> str:
+        from confab.report.pieces import account
+
+        return account(self)
 
 
 # ------------------------------------------------------------------------------------------------------------------ why

@@ -25,6 +25,9 @@ SIZES = (17, 15, 13, 11)
 BAR = 46
 """Pixels at the bottom that hold caption and plan strip."""
 
+SPEED = 2.5
+"""How much faster than the simulated time a film runs."""
+
 DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
 
 
@@ -56,7 +59,7 @@ class Film:
         titles: Mapping[tuple[int, ...], str] | None = None,
         camera: Camera | None = None,
         frames: int = 12,
-        speed: float = 2.5,
+        speed: float = SPEED,
         stills: str | Path | None = None,
         width: int = 960,
         height: int = 544,

@@ -18,8 +18,9 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "experience": {"hierarchical", "paper"},
     "acting": {"hierarchical"},
 }
-OPEN_CYCLES = [  # what still imports each other: a scene and what can be done with it
-    {"confab.execution", "confab.memory", "confab.physics", "confab.picturing", "confab.reaching", "confab.scene"},
+OPEN_CYCLES = [  # what still imports each other: a scene and what can be done with it, and how both are shown
+    {"confab.execution", "confab.memory", "confab.physics", "confab.picturing", "confab.reaching", "confab.scene"}
+    | {"confab.explaining", "confab.why", "confab.report.notebook", "confab.report.page", "confab.report.pieces"},
 ]
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 

@@ -1,0 +1,195 @@
+"""A map from above, with what moved: of a table where places have coordinates, else of the places that static relations connect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import cos, sin
+from typing import TYPE_CHECKING
+
+from confab.report.course import Course
+from confab.report.markup import Markup, tag
+from reasoner.embodiment.values import Embodiment
+from reasoner.symbols import Problem
+
+if TYPE_CHECKING:
+    from confab.labels import Labels
+
+Spots = Mapping[str, tuple[float, float]]
+MOST_SPOTS = 60
+"""Places of a map; with more nothing could be read."""
+MOST_NAMES = 2
+"""So many things at one place have their names on the map."""
+STRETCH = 1.7
+"""A page is wider than high, and names are, too."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where places are, in units of which x goes right and y goes down; boxes by their corners, ways between places, a robot."""
+
+    spots: Spots
+    boxes: tuple[tuple[tuple[float, float], ...], ...] = ()
+    ways: tuple[tuple[str, str], ...] = ()
+    robots: tuple[tuple[float, float], ...] = ()
+
+
+def ground_of(problem: Problem, embodiment: Embodiment | None) -> Ground | None:
+    """Return what to draw things on, or None if nothing says where anything is."""
+    if embodiment is not None and embodiment.places:
+        return _table(embodiment)
+    return _graph(problem)
+
+
+def _table(embodiment: Embodiment) -> Ground | None:
+    """Return a table as the robot sees it: what is on its left is on the left, and it stands below."""
+    if len(embodiment.places) > MOST_SPOTS:
+        return None
+
+    def seen(x: float, y: float) -> tuple[float, float]:
+        return -y, -x
+
+    boxes = []
+    for fixture in embodiment.fixtures:
+        half = [(dx * fixture.size[0] / 2, dy * fixture.size[1] / 2) for dx, dy in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+        turned = [
+            (x * cos(fixture.yaw) - y * sin(fixture.yaw), x * sin(fixture.yaw) + y * cos(fixture.yaw)) for x, y in half
+        ]
+        boxes.append(tuple(seen(fixture.position[0] + x, fixture.position[1] + y) for x, y in turned))
+    return Ground(
+        {place.name: seen(*place.position[:2]) for place in embodiment.places.values()},
+        tuple(boxes),
+        robots=tuple(seen(*robot.position[:2]) for robot in embodiment.robots),
+    )
+
+
+def _graph(problem: Problem) -> Ground | None:
+    """Return the values of a situation type that a static relation connects, laid out so that what is connected is near."""
+    import networkx
+
+    situations = {symbol.situation for symbol in problem.initial}
+    values = {v for name in situations for v in problem.classes.get(problem.domain.situations[name].range, ())}
+    graph: networkx.Graph[str] = networkx.Graph()
+    for _, rows in sorted(problem.relations.items()):
+        graph.add_edges_from(sorted(row for row in rows if len(row) == 2 and row[0] != row[1]))
+    parts = [part for part in networkx.connected_components(graph) if len(part & values) > 1]
+    shown = max(parts, key=lambda part: (len(part & values), min(part)), default=set())
+    if len(shown) < 3 or len(shown) > MOST_SPOTS:
+        return None
+    graph = networkx.Graph(sorted((min(pair), max(pair)) for pair in graph.subgraph(shown).edges))
+    places = networkx.kamada_kawai_layout(graph)
+    spots = {name: (STRETCH * float(x), float(y)) for name, (x, y) in places.items()}
+    return Ground(spots, ways=tuple(sorted((min(pair), max(pair)) for pair in graph.edges)))
+
+
+def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> Markup:
+    """Return a picture of where things stood before, and where they stand after."""
+    moves = _moves(ground, course)
+    xs, ys = zip(*[*ground.spots.values(), *(corner for box in ground.boxes for corner in box)], strict=True)
+    wide, high = max(max(xs) - min(xs), 1e-9), max(max(ys) - min(ys), 1e-9)
+    crowd = min(2.2, max(1.0, len(ground.spots) / 12))
+    scale = 440 * crowd / max(wide, 1.6 * high)
+
+    def at(point: tuple[float, float]) -> tuple[float, float]:
+        return 52 + (point[0] - min(xs)) * scale, 50 + (point[1] - min(ys)) * scale
+
+    spots = {name: at(point) for name, point in ground.spots.items()}
+    size = _size(spots)
+    width = 104 + wide * scale
+    height = 100 + high * scale + (46 if ground.robots else 0)
+
+    def name(of: str) -> str:
+        return labels.name(of) if labels else of
+
+    drawn: list[Markup] = [
+        tag("path", d="M" + " L".join(f"{x:.1f} {y:.1f}" for x, y in map(at, box)) + " Z", class_="table")
+        for box in ground.boxes
+    ]
+    for a, b in ground.ways:
+        (x1, y1), (x2, y2) = spots[a], spots[b]
+        drawn.append(tag("line", x1=f"{x1:.1f}", y1=f"{y1:.1f}", x2=f"{x2:.1f}", y2=f"{y2:.1f}", class_="way"))
+    for spot, (x, y) in spots.items():
+        drawn.append(tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=f"{size:.1f}", class_="spot"))
+        drawn.append(_text(x, y + size + 12, name(spot), "place"))
+    together: dict[str, list[str]] = {}
+    for number, (thing, before, after) in enumerate(moves):
+        color, (x, y) = f"v{number % 8}", spots[after]
+        way = f"{name(before)} → {name(after)}" if before != after else name(after)
+        if before != after:
+            drawn += _arrow(spots[before], spots[after], size, color)
+        x += 5 * len(together.setdefault(after, []))
+        together[after].append(name(thing))
+        dot = {"cx": f"{x:.1f}", "cy": f"{y:.1f}", "r": f"{size * 0.66:.1f}"}
+        drawn.append(tag("circle", tag("title", f"{name(thing)}: {way}"), class_=f"thing {color}", **dot))
+    for after, things in together.items():
+        more = [f"+ {len(things) - MOST_NAMES} more"] if len(things) > MOST_NAMES else []
+        for up, words in enumerate([*more, *things[:MOST_NAMES]]):
+            drawn.append(_text(spots[after][0], spots[after][1] - size - 4 - 13 * up, words, "thing"))
+    base = at((0.0, max(ys)))[1]
+    for x, y in map(at, ground.robots):
+        drawn.append(_text(x, min(max(y, base + 24), height - 30), "robot (its left is left)", "place"))
+    said = "; ".join(
+        f"{name(thing)} from {name(before)} to {name(after)}" for thing, before, after in moves if before != after
+    )
+    svg = tag(
+        "svg", drawn, viewBox=f"0 0 {width:.0f} {height:.0f}", role="img", aria_label=f"Map: {said or 'nothing moved'}"
+    )
+    legend = "dashed: before; filled: after" if said else "nothing changed its place"
+    return tag("figure", svg, tag("figcaption", legend), class_="map")
+
+
+def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str]]:
+    """Return what stands on the map, with its first and its last place there.
+
+    A thing stands where a situated object of it says that begins on the map and has no value of rest: what a hand passes
+    on its way is no place of it. If several do, that counts which is longest on the map.
+    """
+    situations = course.problem.domain.situations
+    found: dict[str, tuple[float, str, str]] = {}
+    for symbol, phases in sorted(course.phases.items()):
+        places = [phase for phase in phases if phase.value in ground.spots]
+        if len(symbol.arguments) != 1 or not places or phases[0].value not in ground.spots:
+            continue
+        if situations[symbol.situation].rest is not None:
+            continue
+        (thing,) = symbol.arguments
+        long = sum(phase.end - phase.begin for phase in places)
+        if thing not in found or long > found[thing][0]:
+            found[thing] = long, places[0].value, places[-1].value
+    return [(thing, before, after) for thing, (_, before, after) in sorted(found.items())]
+
+
+def _size(spots: Spots) -> float:
+    """Return the radius of a place, so that neighbours don't touch."""
+    points = list(spots.values())
+    apart = min(
+        (abs(complex(*a) - complex(*b)) for i, a in enumerate(points) for b in points[:i] if a != b), default=80.0
+    )
+    return min(15.0, max(4.0, 0.3 * apart))
+
+
+def _text(x: float, y: float, words: str, kind: str) -> Markup:
+    return tag("text", words, x=f"{x:.1f}", y=f"{y:.1f}", class_=kind)
+
+
+def _arrow(start: tuple[float, float], end: tuple[float, float], size: float, color: str) -> Sequence[Markup]:
+    """Return a dashed ring where something stood, and a bent arrow from there to where it stands."""
+    (x1, y1), (x2, y2) = start, end
+    length = max(abs(complex(x2 - x1, y2 - y1)), 1e-9)
+    ux, uy = (x2 - x1) / length, (y2 - y1) / length
+    bend = min(0.18 * length, 40.0)
+    mx, my = (x1 + x2) / 2 - uy * bend, (y1 + y2) / 2 + ux * bend
+    away = abs(complex(x2 - mx, y2 - my)) or 1.0
+    vx, vy = (x2 - mx) / away, (y2 - my) / away  # the direction in which the arrow arrives
+    tx, ty = x2 - vx * size * 1.15, y2 - vy * size * 1.15
+    head = [(tx, ty), (tx - vx * 10 - vy * 5, ty - vy * 10 + vx * 5), (tx - vx * 10 + vy * 5, ty - vy * 10 - vx * 5)]
+    tip = " L".join(f"{x:.1f} {y:.1f}" for x, y in head)
+    return [
+        tag("circle", cx=f"{x1:.1f}", cy=f"{y1:.1f}", r=f"{size * 0.66:.1f}", class_=f"before {color}"),
+        tag(
+            "path",
+            d=f"M{x1:.1f} {y1:.1f} Q{mx:.1f} {my:.1f} {tx - vx * 8:.1f} {ty - vy * 8:.1f}",
+            class_=f"move {color}",
+        ),
+        tag("path", d=f"M{tip} Z", class_=f"tip {color}"),
+    ]

@@ -1,0 +1,310 @@
+"""The report of a run as one HTML page that needs nothing beside itself: no network, no file."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING
+
+import ontology
+from confab.report.course import Course, of_episode, of_plan, of_rollout
+from confab.report.maps import ground_of, place_map
+from confab.report.markup import Markup, asset, joined, tag
+from confab.report.pieces import Tile, anchor, number, table, tiles, timeline, tree
+from confab.show import lengths
+from planner.causal_links import purposes
+from planner.plan import Outcome, Status
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import local_name
+from reasoner.symbols import Fact, Problem
+from sim.verdict import CODES
+
+if TYPE_CHECKING:
+    from confab.execution import Execution
+    from confab.labels import Labels
+    from confab.memory import Memory
+    from confab.physics import Report
+    from confab.scene import Result, Scene
+    from reasoner.embodiment.values import Embodiment
+
+LARGEST_FILM = 40_000_000
+"""Bytes of a film that is put into the page; a larger one is linked."""
+MOST_STEPS = 4000
+"""Steps of a plan whose reasons are worked out for the page."""
+
+
+def report_html(
+    scene: Scene,
+    result: Result | None = None,
+    report: Report | None = None,
+    execution: Execution | None = None,
+    learned: Memory | None = None,
+    again: str = "",
+) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    scene : Scene
+    result : Result, optional
+        What came of planning, maybe that there is no plan.
+    report : Report, optional
+        What physics said of the plan.
+    execution : Execution, optional
+        What came of carrying the task out; the page then tells that and not the plan.
+    learned : Memory, optional
+        What is known after the run.
+    again : str, optional
+        The command that does the same; guessed if left out.
+    """
+    from confab.labels import labels_of
+
+    problem = result.problem if result is not None else scene.problem
+    labels = labels_of(scene.knowledge, scene.names, problem)
+    course = _course(problem, result, report, execution)
+    outcome = result.outcome if result is not None else None
+    title = labels.words.get(scene.iri) or local_name(scene.iri)
+    speed = report.film_speed if report is not None and report.video is not None else None
+    parts: list[object] = [
+        tag("header", tag("h1", title), tag("p", scene.iri, class_="iri")),
+        tiles(_tiles(problem, course, outcome, report, execution)),
+        _alarm(course, labels, outcome, report, execution),
+        _scene(course, labels, embodiment_of(scene), report),
+    ]
+    if course is not None:
+        parts += [tag("h2", "Who did what when, and what that changed"), timeline(course, labels, speed)]
+        parts += [tag("h2", "The plan, and why"), _plan(course, labels, report, execution)]
+    parts += [_wanted(course, problem, labels), _learned(learned)]
+    parts += [tag("h2", "Again"), tag("pre", again or _again(scene, report, execution)), *_small_print(outcome)]
+    return Template(asset("page.html")).substitute(
+        title=joined(title), style=asset("style.css"), body=joined(parts), script=asset("script.js")
+    )
+
+
+def _course(
+    problem: Problem, result: Result | None, report: Report | None, execution: Execution | None
+) -> Course | None:
+    if execution is not None:
+        return of_episode(problem, execution.episode)
+    if report is not None:
+        return of_rollout(problem, report.plan, report.shown)
+    if result is not None and result.outcome.plan is not None:
+        return of_plan(problem, result.outcome.plan)
+    return None
+
+
+def embodiment_of(scene: Scene) -> Embodiment | None:
+    """Return the scene's bodies; None where it has none, or none that are whole."""
+    from reasoner.embodiment.reading import EmbodimentError
+
+    try:
+        return scene.embodiment
+    except (KnowledgeError, EmbodimentError):
+        return None
+
+
+# ------------------------------------------------------------------------------------------------------------ the parts
+
+
+def _tiles(
+    problem: Problem, course: Course | None, outcome: Outcome | None, report: Report | None, execution: Execution | None
+) -> list[Tile]:
+    found: list[Tile] = []
+    if execution is not None:
+        good = execution.reached
+        found.append(("verdict", f"{'✓' if good else '✗'} {execution.episode.status.value}", "good" if good else "bad"))
+    elif report is not None:
+        good = report.verified
+        found.append(("verdict", "✓ verified in physics" if good else "✗ failed in physics", "good" if good else "bad"))
+    elif outcome is not None and outcome.plan is not None:
+        found.append(("verdict", "✓ a plan, checked", "good"))
+    elif outcome is not None:
+        found.append(("verdict", f"✗ {outcome.status.value}", "bad"))
+    if course is not None:
+        steps = len(course.plan.primitives)
+        done = sum(bar.ok is not False for bar in course.bars)
+        found.append(("primitives", f"{steps}" if done >= steps else f"{done} of {steps}", ""))
+        found.append(("plan", f"{lengths(course.plan)} steps", ""))
+        if course.unit == "s":
+            found.append(("simulated", f"{course.end:.1f} s", ""))
+    if report is not None:
+        shown = report.shown
+        if shown.poured:
+            found.append(("poured", ", ".join(f"{share:.0%}" for share in shown.poured), ""))
+        if len(report.rollouts) > 1:
+            found.append(("rollouts verified", f"{report.good} of {len(report.rollouts)}", ""))
+        found.append(("physics", f"{shown.cpu_seconds:.1f} CPU s", ""))
+    if execution is not None:
+        episode = execution.episode
+        found += [
+            (what, str(many), "")
+            for what, many in (
+                ("interventions", len(episode.interventions)),
+                ("changes of plan", len(episode.replans)),
+                ("failures", len(episode.failures)),
+            )
+            if many
+        ]
+    if outcome is not None:
+        expanded = sum(counts.expanded for counts in outcome.search.values())
+        found.append(("search", f"{expanded:,} expansions", ""))
+        found.append(("planning", f"{outcome.seconds * 1000:.0f} ms", ""))
+        if outcome.plan is not None:
+            cost = sum(problem.domain.behaviors[step.behavior].cost for step in outcome.plan.primitives)
+            if cost != len(outcome.plan.primitives):
+                found.append(("cost", number(cost), ""))
+    return found
+
+
+def _alarm(
+    course: Course | None, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Execution | None
+) -> Markup | None:
+    """Return what went wrong, with its numbers; None if nothing did."""
+    if execution is not None and execution.reached:
+        return None
+    failed = course.failed if course is not None else None
+    if failed is not None and course is not None:
+        where = tag("a", labels.step(failed.step), href=f"#{anchor(failed.step.path)}")
+        above = [
+            labels.step(step)
+            for step in course.plan.walk()
+            if step.steps and failed.step.path[: len(step.path)] == step.path
+        ]
+        pairs = [
+            tag("div", tag("dt", name.replace("_", " ")), tag("dd", number(value)))
+            for name, value in failed.measured.items()
+        ]
+        meaning = CODES.get(failed.code or "", "")
+        return tag(
+            "section",
+            tag("h2", "✗ Failed: ", where),
+            tag("p", f"after {failed.begin:.1f} {course.unit}", f", in “{' › '.join(above)}”" if above else None),
+            tag("p", tag("b", failed.code or ""), f": {meaning}" if meaning else None),
+            tag("p", failed.note),
+            tag("dl", pairs) if pairs else None,
+            _reasons_of(execution),
+            class_="alarm",
+        )  # fmt: skip
+    if report is not None and not report.verified:
+        missed = [
+            f"{labels.fact(fact)}; seen: {labels.name(report.shown.state[fact.symbol])}"
+            for fact in report.missed(report.shown)
+        ]
+        others = None if missed else tag("p", report.summary())
+        return tag(
+            "section",
+            tag("h2", "✗ The goal isn't reached"),
+            tag("ul", [tag("li", each) for each in missed]),
+            others,
+            class_="alarm",
+        )
+    if execution is not None:
+        return tag("section", tag("h2", f"✗ {execution.episode.status.value}"), _reasons_of(execution), class_="alarm")
+    if outcome is not None and outcome.status is not Status.SOLVED:
+        why = outcome.reason.text if outcome.reason else ""
+        return tag("section", tag("h2", f"✗ No plan: {outcome.status.value}"), tag("p", why), class_="alarm")
+    return None
+
+
+def _reasons_of(execution: Execution | None) -> Markup | None:
+    reasons = execution.episode.reasons if execution is not None else ()
+    return tag("ul", [tag("li", reason.text) for reason in reasons]) if reasons else None
+
+
+def _scene(
+    course: Course | None, labels: Labels, embodiment: Embodiment | None, report: Report | None
+) -> Markup | None:
+    """Return the film beside the map, or what there is of both."""
+    film = _film(report)
+    ground = ground_of(course.problem, embodiment) if course is not None else None
+    drawn = place_map(ground, course, labels) if ground is not None and course is not None else None
+    if film is None and drawn is None:
+        return None
+    return tag("section", film, drawn, class_="scene" if film is not None and drawn is not None else "scene single")
+
+
+def _film(report: Report | None) -> Markup | None:
+    if report is None or report.video is None or not report.video.is_file():
+        return None
+    kind = "image/gif" if report.video.suffix == ".gif" else "video/mp4"
+    source = report.video.name
+    if report.video.stat().st_size <= LARGEST_FILM:
+        source = f"data:{kind};base64,{b64encode(report.video.read_bytes()).decode()}"
+    shown = (
+        tag("img", src=source, alt="film of the run")
+        if kind == "image/gif"
+        else tag("video", src=source, controls=True, muted=True, playsinline=True)
+    )
+    return tag(
+        "figure",
+        shown,
+        tag("figcaption", f"{report.film_speed:g} × as fast as simulated, seed {report.rollouts[0].seed}"),
+        class_="film",
+    )
+
+
+def _plan(course: Course, labels: Labels, report: Report | None, execution: Execution | None) -> Markup:
+    steps = sum(1 for _ in course.plan.walk())
+    notes = execution.notes() if execution is not None else report.notes() if report is not None else {}
+    calm = execution is None or not (execution.episode.interventions or execution.episode.failures)
+    needed = purposes(course.problem, course.plan) if steps <= MOST_STEPS and calm else None
+    return tree(course.plan, labels, notes, needed, course)
+
+
+def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup | None:
+    """Return what was wanted, and what was so in the end."""
+    goal = course.problem.goal if course is not None else problem.goal
+    if not goal:
+        return None
+    rows: list[list[object]] = []
+    for symbol, value in sorted(goal.items()):
+        row: list[object] = [labels.fact(Fact(symbol, value)), labels.name(problem.initial.get(symbol, "false"))]
+        if course is not None:
+            met = course.met(symbol)
+            end = labels.name(course.final.get(symbol, "false"))
+            row.append(tag("span", f"{'✓' if met else '✗'} {end}", class_="ok" if met else "bad"))
+        rows.append(row)
+    columns = ["wanted", "before", *(["in the end"] if course is not None else [])]
+    return joined(tag("h2", "What was wanted"), table(columns, rows))
+
+
+def _learned(memory: Memory | None) -> Markup | None:
+    if memory is None:
+        return None
+    counts = memory.counts(8)
+    return joined(
+        tag("h2", "What was learned"),
+        tag("p", memory.said()),
+        table(list(counts.columns), list(counts)) if len(counts) else None,
+    )
+
+
+def _again(scene: Scene, report: Report | None, execution: Execution | None) -> str:
+    path = scene.knowledge.path
+    name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
+    if execution is not None:
+        people = "".join(f" --intervene '{i.text}'" for i, _ in execution.episode.interventions)
+        return f"confab execute {name}{people}"
+    seed = f" --seed {report.rollouts[0].seed}" if report is not None and report.rollouts[0].seed else ""
+    return f"confab run {name}{seed}" if report is not None else f"confab run {name}"
+
+
+def _small_print(outcome: Outcome | None) -> list[Markup]:
+    """Return which levels were given up, and what that breaks."""
+    said = [tag("p", text, class_="note") for text in (outcome.given_up if outcome is not None else ())]
+    for left in outcome.left if outcome is not None else ():
+        for broken in left.broken:
+            said.append(tag("p", f"the plan breaks what only a level above asks: {broken.text}", class_="note"))
+    return said
+
+
+def write_report(path: str | Path, page: str) -> Path:
+    """Write a page whole or not at all, and return where."""
+    from reasoner.files import write_whole
+
+    write_whole(Path(path), page)
+    return Path(path)
+
+
+__all__ = ["report_html", "write_report"]
