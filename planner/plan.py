@@ -159,6 +159,14 @@ class Limits:
     seconds: float | None = None
 
 
+class TooLargeError(Exception):
+    """What would be grounded is larger than allowed; the message says how large."""
+
+
+class OutOfTimeError(Exception):
+    """The deadline came before grounding was done."""
+
+
 def changed(before: State, after: State) -> list[Fact]:
     """Return the facts of `after` that `before` doesn't have, in order."""
     return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)

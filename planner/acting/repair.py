@@ -20,10 +20,10 @@ from time import perf_counter
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled
-from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Effort, LimitError
 from planner.hierarchical.unsolvability import unattainable
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
+from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)

@@ -12,9 +12,9 @@ from typing import TypeAlias
 
 from planner.experience.features import Schema, View
 from planner.hierarchical.operators import Program
-from planner.hierarchical.state import Cell, Table, key_of
 from planner.hierarchical.subplans import Segments
 from planner.paper.learning import LearningError
+from planner.transitions import Cell, Table, key_of
 from reasoner.memory.counts import Candidate, Decision
 from reasoner.symbols import FALSE, Problem
 

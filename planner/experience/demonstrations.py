@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from planner.experience.choice_points import BROAD, Field, Ground, single_level
 from planner.hierarchical import planner as fast
 from planner.hierarchical.operators import Program
-from planner.hierarchical.state import Cell
+from planner.transitions import Cell
 from reasoner.symbols import Problem
 
 MOST = 1000  # expansions in search of a shortest plan

@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from planner.experience.choice_points import BROAD, Field, Ground
 from planner.experience.scoring import Judge
-from planner.hierarchical.state import Cell, Key, arguments_of
+from planner.transitions import Cell, Key, arguments_of
 from reasoner.symbols import FALSE
 
 WEIGHT = 2  # open goals that one discrepancy weighs

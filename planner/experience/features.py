@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import TypeAlias, cast
 
 from planner.hierarchical.operators import Program, named
-from planner.hierarchical.state import Cell, Key, Table
 from planner.language import walk
+from planner.transitions import Cell, Key, Table
 from reasoner.memory.counts import Candidate, Conclusion, Pattern
 from reasoner.symbols import (
     FALSE,

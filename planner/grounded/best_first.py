@@ -19,14 +19,14 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 
-from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate
 from planner.grounded.hff_numba import automatic
 from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, successors
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
 from planner.grounded.unreachable import blocked
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status
+from planner.plan import Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from reasoner.symbols import Problem, State
 
 BOOST = 1000  # turns that the preferred operators get on a new best h

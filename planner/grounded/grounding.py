@@ -21,8 +21,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.grounded.joins import Ints, Table, TooLargeError
-from planner.grounded.reachability import Flags, Formulas, Literals, OutOfTimeError, Reached
+from planner.grounded.joins import Ints, Table
+from planner.grounded.reachability import Flags, Formulas, Literals, Reached
 from planner.grounded.schemas import Schema
 from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
@@ -38,8 +38,6 @@ from reasoner.symbols import (
 )
 
 MOST_ROWS = 20_000_000  # of one join: about 1 GB
-
-__all__ = ["OutOfTimeError", "TooLargeError", "ground"]
 
 
 def ground(

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.plan import TooLargeError
+
 Ints = NDArray[np.int64]
-
-
-class TooLargeError(Exception):
-    """A join would have more rows than allowed; the message says how many."""
 
 
 class Table:

@@ -11,9 +11,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.joins import Ints, Table, TooLargeError, pack
+from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
 from planner.language import mentions
+from planner.plan import OutOfTimeError, TooLargeError
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -36,10 +37,6 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 CONDITIONS_PER_ROW = 20
 """Conditions that may be worked out with individuals put in, for each row that a join may have: nested groups multiply."""
-
-
-class OutOfTimeError(Exception):
-    """The deadline came before grounding was done."""
 
 
 class Reached:

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.grounded.joins import TooLargeError
 from planner.grounded.reachability import Reached
 from planner.grounded.schemas import Atom, Schema
 from planner.grounded.task import Task
-from planner.plan import Reason
+from planner.plan import Reason, TooLargeError
 from reasoner.symbols import TRUE, Fact, Symbol
 
 DEPTH = 6

@@ -16,13 +16,13 @@ import math
 from dataclasses import replace
 from time import perf_counter
 
-from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.grounding import ground
 from planner.grounded.shortest import Bound, shortest, ways
 from planner.grounded.task import Task
 from planner.hierarchical.planner import Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.serialization import closed, refusal
-from planner.plan import Limits, Outcome, Plan, Reason, Status
+from planner.plan import Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from planner.validation import validate
 from reasoner.symbols import Problem
 

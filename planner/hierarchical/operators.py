@@ -1,11 +1,9 @@
 """Behaviours compiled to Python source, once per problem: what each does, and how each could bring a value about.
 
-For every behaviour there is one function ``forward(arguments)``, and for every effect of it one ``achieve(key …, value)``:
+Beside its function ``forward`` (`planner.transitions`) a behaviour has for every effect one ``achieve(key …, value)``. It yields
+each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
 
-forward   the bindings and the changes, or None if the behaviour isn't applicable now
-achieve   each binding with which the effect would give that symbol that value, with the preconditions that are unmet now
-
-A condition becomes a Python expression. What enumerates an unbound parameter is, in this order of preference: a static
+What enumerates an unbound parameter is, in this order of preference: a static
 relation to what is bound; the inverse of a situation type that nothing can change there; a class. What the state alone
 determines comes last and is *soft*: a static relation that fails on a value which can change is something to want, not a
 dead end.
@@ -13,24 +11,29 @@ dead end.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import prod
-from types import CodeType
 from typing import TypeAlias
 
-from planner.hierarchical.state import Alike, Change, Key, Table, representatives
-from planner.language import DomainError, mentions, needs, nothing_determines, terms, walk
+from planner.hierarchical.symmetry import Alike, representatives
+from planner.language import mentions, terms, walk
+from planner.transitions import (
+    Forward,
+    Key,
+    Table,
+    Writer,
+    identifier,
+    ready_condition,
+    tuple_written,
+    written,
+)
 from reasoner.symbols import (
-    FALSE,
-    TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
     Condition,
-    EqualityCondition,
     Problem,
     RelationCondition,
     ValueCondition,
@@ -38,7 +41,6 @@ from reasoner.symbols import (
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"
-Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
 """Yields arguments, positions of unmet conditions, and (if any is unmet) the binding in which they are."""
 
@@ -85,25 +87,25 @@ class Program:
         self.members = {kind: frozenset(members) for kind, members in problem.classes.items()}
         self.levels = problem.domain.levels
         self.achievers: dict[tuple[int, str], list[Achiever]] = {}
-        self.thorough = False
-        self.variables: dict[str, tuple[str, ...]] = {}
         self.named = named(problem)
         self.alike = Alike(problem, self.named)
-        self._globals: dict[str, object] = {"prefer": prefer, "pick": self._picker}
-        self._fan: dict[str, float] = {}
-        self.source = "\n".join(self._module())
-        exec(_code(self.source), self._globals)
+        self.writer = Writer(problem)
+        self.variables = self.writer.variables
+        self.writer.constants |= {"prefer": prefer, "pick": self._picked}
+        self._bind = self.writer.function(self._lines(), "forward, achieve", ", focus, few")
 
-    def bind(self, table: Table, focus: Mapping[str, None]) -> Bound:
-        """Return the functions over a table; of many that could be enumerated, those in `focus` are preferred."""
-        forward, achieve = self._globals["bind"](table.now, table.who, focus)  # type: ignore[operator]
-        return Bound(forward, achieve)
+    def bind(self, table: Table, focus: Mapping[str, None], few: int = FEW) -> Bound:
+        """Return the functions over a table; of many that could be enumerated, those in `focus` are preferred.
 
-    def _picker(
-        self, candidates: tuple[str, ...], focus: Mapping[str, None], who: Mapping[str, Mapping[Key, None]]
+        Of more than a `few` alike one stands for all.
+        """
+        return Bound(*self._bind(table.now, table.who, focus, few))
+
+    def _picked(
+        self, candidates: tuple[str, ...], focus: Mapping[str, None], who: Mapping[str, Mapping[Key, None]], few: int
     ) -> Sequence[str]:
         found = [term for term in focus if term in candidates] if focus else []
-        if found or len(candidates) <= FEW or self.thorough:
+        if found or len(candidates) <= few:
             return found or candidates
         return representatives(self.alike.groups(candidates), who, {})
 
@@ -128,46 +130,17 @@ class Program:
 
     # ---------------------------------------------------------------------------------------------------------- source
 
-    def _module(self) -> Iterator[str]:
-        yield "def bind(now, who, focus):"
-        for situation in sorted(self.domain.situations):
-            yield f"    {_name('now', situation)} = now[{situation!r}]; {_name('who', situation)} = who[{situation!r}]"
-        yield "    forward, achieve = {}, {}"
+    def _lines(self) -> Iterator[str]:
+        yield "forward, achieve = {}, {}"
         for behavior in self.domain.behaviors.values():
-            yield from ("    " + line for line in self._forward(behavior))
+            yield from self.writer.forward(behavior)
             for number in range(len(behavior.effects)):
-                yield from ("    " + line for line in self._achieve(behavior, number))
-        yield "    return forward, achieve"
-
-    def _forward(self, behavior: Behavior) -> Iterator[str]:
-        kinds = behavior.kinds
-        parameters = [p.name for p in behavior.parameters]
-        bound = set(parameters)
-        tests = [self._member(p.name, p.kind) for p in behavior.parameters]
-        tests += self.conjunction(behavior.preconditions, bound, kinds, behavior.name)
-        variables = sorted(v.name for v in behavior.variables if v.name in bound)
-        self.variables[behavior.name] = tuple(name[1:] for name in variables)
-        yield f"def {_name('forward', behavior.name)}({', '.join(map(_term, parameters))}):"
-        yield f"    if not ({' and '.join(tests) or 'True'}): return None"
-        yield "    changes = []"
-        for effect in behavior.effects:
-            inner = set(bound)
-            when = self.conjunction(effect.when, inner, kinds, behavior.name)
-            free = {t for t in (*effect.arguments, effect.value) if t.startswith("?")} - inner
-            if free:
-                raise DomainError(
-                    f"{behavior.name}: nothing determines {', '.join(sorted(free))}, which an effect names"
-                )
-            when += self._exists(effect.situation, effect.arguments, kinds)
-            change = f"changes.append(({effect.situation!r}, {_key(effect.arguments)}, {_term(effect.value)}))"
-            yield f"    if {' and '.join(when)}: {change}" if when else f"    {change}"
-        yield f"    return {_tuple(map(_term, variables))}, changes"
-        yield f"forward[{behavior.name!r}] = {_name('forward', behavior.name)}"
+                yield from self._achieve(behavior, number)
 
     def _achieve(self, behavior: Behavior, number: int) -> Iterator[str]:
         effect = behavior.effects[number]
         kinds = behavior.kinds
-        name = f"{_name('achieve', behavior.name)}_{number}"
+        name = f"{identifier('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
         hard: set[str] = set()
         tests: list[str] = []
@@ -175,10 +148,10 @@ class Program:
         for term, given in zip((*effect.arguments, effect.value), inputs, strict=True):
             if term.startswith("?") and term not in hard:
                 hard.add(term)
-                lines.append(f"{_term(term)} = {given}")
-                tests.append(self._member(term, kinds[term]))
+                lines.append(f"{written(term)} = {given}")
+                tests.append(self.writer.member(term, kinds[term]))
             else:
-                tests.append(f"{given} == {_term(term)}")
+                tests.append(f"{given} == {written(term)}")
         waiting = [*effect.when, *behavior.preconditions]
         free = [p.name for p in behavior.parameters if p.name not in hard]
         depth = 0
@@ -191,7 +164,7 @@ class Program:
             ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentions(c) - hard]
             for condition in ready:
                 waiting.remove(condition)
-                tests.append(self.expression(condition, hard, kinds, behavior.name))
+                tests.append(self.writer.expression(condition, hard, kinds, behavior.name))
             generator = self._generator(waiting, hard, kinds, behavior, free)
             if tests:
                 emit(f"if {' and '.join(tests)}:")
@@ -199,18 +172,18 @@ class Program:
             if generator is None:
                 break
             term, text = generator
-            emit(f"for {_term(term)} in {text}:")
+            emit(f"for {written(term)} in {text}:")
             depth += 1
             hard.add(term)
             free = [p for p in free if p != term]
-            tests.append(self._member(term, kinds[term]))
+            tests.append(self.writer.member(term, kinds[term]))
         # Soft: what the state determines, and tests on it.
         emit("unmet = ()")
         bound = set(hard)
         soft: list[Condition] = []
         determined: dict[str, tuple[str, tuple[str, ...]]] = {}
         while waiting:
-            condition = _ready(waiting, bound, behavior.name)
+            condition = ready_condition(waiting, bound, behavior.name)
             waiting.remove(condition)
             if (
                 isinstance(condition, ValueCondition)
@@ -220,14 +193,14 @@ class Program:
                 # A binding is made whether or not it is of the right class, for the tests that follow.
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
-                emit(f"{_term(condition.value)} = {self._look(condition)}")
-                test = self._member(condition.value, kinds[condition.value])
+                emit(f"{written(condition.value)} = {self.writer.look(condition)}")
+                test = self.writer.member(condition.value, kinds[condition.value])
             else:
-                test = self.expression(condition, bound, kinds, behavior.name)
+                test = self.writer.expression(condition, bound, kinds, behavior.name)
             emit(f"if not ({test}): unmet += ({len(soft)},)")
             soft.append(condition)
-        names = ", ".join(f"{term!r}: {_term(term)}" for term in sorted(bound))
-        arguments = _tuple(_term(p.name) for p in behavior.parameters)
+        names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
+        arguments = tuple_written(written(p.name) for p in behavior.parameters)
         emit(f"yield {arguments}, unmet, {{{names}}} if unmet else None")
         yield f"def {name}({', '.join(inputs)}):"
         yield from ("    " + line for line in lines)
@@ -250,16 +223,16 @@ class Program:
                 case RelationCondition(relation, arguments, False):
                     unbound = {a for a in arguments if a.startswith("?")} - hard
                     if len(unbound) == 1 and arguments.count(term := unbound.pop()) == 1 and term in free:
-                        text = self._pick(self._adjacent(relation, arguments, term), term, behavior)
-                        found.append((self._adjacency(relation, arguments, term), term, text))
+                        text, fan = self.writer.adjacent(relation, arguments, term)
+                        found.append((fan, term, self._pick(text, term, behavior)))
                 case ValueCondition(situation, (term,), value, False) if term.startswith("?") and term not in hard:
-                    constant = self._listed(situation, value) and (not value.startswith("?") or value in hard)
+                    constant = self.writer.listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):
-                        who = f"{_name('who', situation)}.get({_term(value)}, ())"
+                        who = f"{identifier('who', situation)}.get({written(value)}, ())"
                         found.append((4.0, term, f"prefer({who}, focus)"))
         for term in free:
-            members = self._constant(("members", kinds[term]), self.problem.classes.get(kinds[term], ()))
-            found.append((len(self._kind(kinds[term])) + 1.0, term, self._pick(members, term, behavior)))
+            members = self.writer.constant(("members", kinds[term]), self.problem.classes.get(kinds[term], ()))
+            found.append((len(self.problem.members(kinds[term])) + 1.0, term, self._pick(members, term, behavior)))
         if not found:
             return None
         _, term, text = min(found, key=lambda entry: entry[0])
@@ -267,8 +240,8 @@ class Program:
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
         """Return an iterable expression for those candidates that are in focus, else one of each sort that is free."""
-        taken = next((_name("who", e.situation) for e in behavior.effects if e.value == term), "{}")
-        return f"pick({candidates}, focus, {taken})"
+        taken = next((identifier("who", e.situation) for e in behavior.effects if e.value == term), "{}")
+        return f"pick({candidates}, focus, {taken}, few)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
         """Whether nothing that this level does can change the truth of a condition."""
@@ -299,123 +272,12 @@ class Program:
         """Return the individuals that a term of a behaviour can stand for."""
         if not term.startswith("?"):
             return frozenset((term,))
-        found = self._kind(kinds[term])
+        found = self.problem.members(kinds[term])
         for condition in behavior.preconditions:
             if isinstance(condition, ClassCondition) and condition.term == term:
-                kind = self._kind(condition.kind)
+                kind = self.problem.members(condition.kind)
                 found = found - kind if condition.negated else found & kind
         return found
-
-    # ----------------------------------------------------------------------------------------------------- expressions
-
-    def conjunction(
-        self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
-    ) -> list[str]:
-        """Return the conditions as expressions, in an order that binds before it uses; `bound` grows."""
-        waiting, found = list(conditions), []
-        while waiting:
-            ready = _ready(waiting, bound, where)
-            waiting.remove(ready)
-            found.append(self.expression(ready, bound, kinds, where))
-        return found
-
-    def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
-        """Return a condition as a Python expression; a variable that it determines is assigned in it."""
-        match condition:
-            case ValueCondition(situation, arguments, value, negated):
-                look = self._look(condition)
-                if value.startswith("?") and value not in bound:
-                    bound.add(value)
-                    return f"({_term(value)} := {look}) in {self._constant(('kind', kinds[value]), self._kind(kinds[value]))}"
-                test = " and ".join([f"{look} == {_term(value)}", *self._exists(situation, arguments, kinds)])
-                return f"not ({test})" if negated else test
-            case RelationCondition(relation, arguments, negated):
-                tuples = self._constant(("relation", relation), self.problem.relations.get(relation, frozenset()))
-                return f"({_tuple(map(_term, arguments))} {'not in' if negated else 'in'} {tuples})"
-            case ClassCondition(term, kind, negated):
-                return (
-                    f"{_term(term)} {'not in' if negated else 'in'} {self._constant(('kind', kind), self._kind(kind))}"
-                )
-            case EqualityCondition(left, right, negated):
-                return f"{_term(left)} {'!=' if negated else '=='} {_term(right)}"
-            case Witness(_, _, _, negated):
-                return ("not " if negated else "") + self._witness(condition, bound, kinds, where)
-            case AnyOf(alternatives, negated):
-                groups = [" and ".join(self.conjunction(g, set(bound), kinds, where)) or "True" for g in alternatives]
-                return ("not " if negated else "") + "(" + " or ".join(f"({g})" for g in groups) + ")"
-
-    def _witness(self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
-        term, kind = condition.variable, condition.kind
-        inner = {**kinds, term: kind}
-        candidates = self.problem.classes.get(kind, ())
-        best: tuple[float, Condition | None, str] = (
-            len(candidates),
-            None,
-            self._constant(("members", kind), candidates),
-        )
-        for c in condition.conditions:
-            match c:
-                case ValueCondition(situation, (only,), value, False) if only == term and value != term:
-                    if self._listed(situation, value) and (value in bound or not value.startswith("?")):
-                        best = min(best, (1.0, c, f"{_name('who', situation)}.get({_term(value)}, ())"), key=_cost)
-                case RelationCondition(relation, arguments, False) if arguments.count(term) == 1:
-                    if not {a for a in arguments if a.startswith("?")} - bound - {term}:
-                        text = self._adjacent(relation, arguments, term)
-                        best = min(best, (self._adjacency(relation, arguments, term), c, text), key=_cost)
-        _, consumed, source = best
-        rest = [c for c in condition.conditions if c is not consumed]
-        tests = self.conjunction(rest, bound | {term}, inner, where)
-        if consumed is not None and not (
-            isinstance(consumed, ValueCondition)
-            and self._kind(self.domain.situations[consumed.situation].arguments[0]) <= self._kind(kind)
-        ):
-            tests.insert(0, self._member(term, kind))
-        if not tests:
-            return f"bool({source})"
-        return f"any(({' and '.join(tests)}) for {_term(term)} in {source})"
-
-    def _listed(self, situation: str, value: str) -> bool:
-        """Whether the table lists who has a value: what is false isn't listed, and a variable could be that."""
-        return value == TRUE or not self.domain.situations[situation].boolean
-
-    def _look(self, condition: ValueCondition) -> str:
-        default = f", {FALSE!r}" if self.domain.situations[condition.situation].boolean else ""
-        return f"{_name('now', condition.situation)}.get({_key(condition.arguments)}{default})"
-
-    def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
-        """Return tests that the symbol exists, where the terms' classes don't already say so."""
-        return [
-            self._member(term, wanted)
-            for term, wanted in zip(arguments, self.domain.situations[situation].arguments, strict=True)
-            if not (term.startswith("?") and self._kind(kinds[term]) <= self._kind(wanted))
-        ]
-
-    def _member(self, term: str, kind: str) -> str:
-        return f"{_term(term)} in {self._constant(('kind', kind), self._kind(kind))}"
-
-    def _kind(self, kind: str) -> frozenset[str]:
-        return self.members.get(kind, frozenset())
-
-    def _adjacent(self, relation: str, arguments: Sequence[str], term: str) -> str:
-        position = list(arguments).index(term)
-        table: dict[tuple[str, ...], list[str]] = {}
-        name = _name("adjacent", relation) + f"_{position}"
-        if name not in self._globals:
-            for row in sorted(self.problem.relations.get(relation, ())):
-                table.setdefault(row[:position] + row[position + 1 :], []).append(row[position])
-            self._globals[name] = {others: tuple(found) for others, found in table.items()}
-            self._fan[name] = sum(map(len, table.values())) / max(len(table), 1)
-        others = [*arguments[:position], *arguments[position + 1 :]]
-        return f"{name}.get({_tuple(map(_term, others))}, ())"
-
-    def _adjacency(self, relation: str, arguments: Sequence[str], term: str) -> float:
-        self._adjacent(relation, arguments, term)
-        return self._fan[_name("adjacent", relation) + f"_{list(arguments).index(term)}"]
-
-    def _constant(self, what: tuple[str, str], value: object) -> str:
-        name = _name(*what)
-        self._globals[name] = value
-        return name
 
 
 def prefer(candidates: Sequence[str] | Mapping[Key, None], focus: Mapping[str, None]) -> Sequence[str]:
@@ -440,41 +302,3 @@ def named(problem: Problem) -> list[str]:
     for situation in problem.domain.situations.values():
         found.update(dict.fromkeys(value for value in (situation.rest, situation.default) if value is not None))
     return sorted(term for term in found if not term.startswith("?"))
-
-
-def _cost(entry: tuple[float, object, str]) -> float:
-    return entry[0]
-
-
-_COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}
-
-
-def _ready(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
-    """Return the cheapest condition to test of those whose variables are bound."""
-    ready = [condition for condition in waiting if not needs(condition) - bound]
-    if not ready:
-        raise nothing_determines(where, waiting, bound)
-    return min(ready, key=lambda condition: _COST[type(condition)])
-
-
-def _name(prefix: str, name: str) -> str:
-    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
-    clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
-    return f"{prefix}_{clean}"
-
-
-def _term(term: str) -> str:
-    return _name("v", term[1:]) if term.startswith("?") else repr(term)
-
-
-def _tuple(items: Iterator[str] | Sequence[str] | map[str]) -> str:
-    return "(" + "".join(f"{item}, " for item in items) + ")"
-
-
-def _key(arguments: Sequence[str]) -> str:
-    return _term(arguments[0]) if len(arguments) == 1 else _tuple(map(_term, arguments))
-
-
-@lru_cache(maxsize=32)
-def _code(source: str) -> CodeType:
-    return compile(source, "<compiled behaviours>", "exec")

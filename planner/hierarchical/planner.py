@@ -21,7 +21,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.grounded.best_first import plan_level
 from planner.hierarchical.postoptimization import Improver, length
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
@@ -128,6 +127,8 @@ def _plan(
     if call.too_large is not None:
         text = f"goals in series found no plan, and {call.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
+    from planner.grounded.best_first import plan_level
+
     left = None if deadline is None else max(deadline - perf_counter(), 0.0)
     flat = plan_level(call.at_rest_in_the_end(), limits=Limits(limits.expansions, left))
     return outcome(flat.status, flat.plan, flat.reason)

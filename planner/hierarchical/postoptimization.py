@@ -15,14 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
-from planner.grounded.shortest import shortest, ways
-from planner.grounded.task import Task
 from planner.hierarchical.inherited_preconditions import binding
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
-from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Ground, LimitError
 from planner.hierarchical.subproblem import FEW, problem_of
+from planner.plan import OutOfTimeError, Reason, TooLargeError
+from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import Domain, Problem, Symbol, ValueCondition
 
 PER_PRIMITIVE = 3
@@ -163,6 +161,9 @@ class Improver:
 
     def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
+        from planner.grounded.grounding import ground
+        from planner.grounded.shortest import shortest, ways
+
         problem = replace(problem, domain=self._binding(level))
         try:
             task = ground(problem, level, most=MOST_ROWS, deadline=self.segments.deadline)
@@ -170,7 +171,7 @@ class Improver:
             raise LimitError("the time limit") from error
         except TooLargeError:
             return None
-        if not isinstance(task, Task) or len(task) > OPERATORS:
+        if isinstance(task, Reason) or len(task) > OPERATORS:
             return None
         task = replace(task, costs=[1.0] * len(task))
         upper = length(old, level)

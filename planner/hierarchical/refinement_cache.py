@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from itertools import islice, product
 from typing import NamedTuple
 
-from planner.hierarchical.state import Cell, Change, key_of
 from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
+from planner.transitions import Cell, Change, key_of
 from reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4, expansions=60)

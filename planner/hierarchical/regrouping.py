@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
+from planner.grounded.grounding import ground
 from planner.grounded.novelty import successors
 from planner.grounded.task import Task
-from planner.plan import Plan, Step, renumbered
+from planner.plan import OutOfTimeError, Plan, Step, TooLargeError, renumbered
 from planner.validation import successor
 from reasoner.symbols import FALSE, Problem, State
 

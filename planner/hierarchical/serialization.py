@@ -16,20 +16,18 @@ import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from planner.grounded.grounding import OutOfTimeError, ground
-from planner.grounded.grounding import TooLargeError as GroundingTooLargeError
-from planner.grounded.reachability import Reached
-from planner.grounded.shortest import shortest
-from planner.grounded.unreachable import unreachable
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
-from planner.hierarchical.state import Cell, Table, arguments_of, key_of
 from planner.hierarchical.subplans import Effort, LimitError, Segments
 from planner.hierarchical.subproblem import Width
-from planner.plan import Outcome, Plan, Reason, Status, Step
+from planner.plan import Outcome, OutOfTimeError, Plan, Reason, Status, Step, TooLargeError
+from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
+
+if TYPE_CHECKING:
+    from planner.grounded.reachability import Reached
 
 EASY, LONGER = Effort(depth=1, expansions=10), Effort(depth=3, expansions=150)
 """For a goal that one step achieves, and for one that a few relevant steps do."""
@@ -56,7 +54,9 @@ class UnsolvableError(Exception):
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
     """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
-    reached = Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
+    from planner.grounded import reachability
+
+    reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
     reached.close()
     return reached
 
@@ -222,6 +222,10 @@ class Call:
 
     def prove(self) -> None:
         """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false."""
+        from planner.grounded.grounding import ground
+        from planner.grounded.shortest import shortest
+        from planner.grounded.unreachable import unreachable
+
         if not self.proved:
             self.proved = True
             level, deadline = self.program.levels[-1], self.segments.deadline
@@ -235,7 +239,7 @@ class Call:
                 if self.too_large is not None:
                     return
                 task = ground(self.problem, level, deadline=deadline)
-            except GroundingTooLargeError as error:
+            except TooLargeError as error:
                 self.too_large = Reason(f"level {level} is too large to be grounded: {error}")
                 return
             except OutOfTimeError as error:

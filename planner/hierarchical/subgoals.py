@@ -6,21 +6,20 @@ thousand free places count as one; the values that goals name are proposed besid
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from planner.hierarchical.operators import FEW, Achiever, Program
-from planner.hierarchical.state import Cell, Key, Table, arguments_of, key_of, representatives
-from planner.language import mentions, walk
+from planner.hierarchical.symmetry import representatives
+from planner.language import mentions, needs, walk
+from planner.transitions import Cell, Key, Table, key_of, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
-    ClassCondition,
     Condition,
     EqualityCondition,
-    RelationCondition,
     ValueCondition,
     Witness,
 )
@@ -53,6 +52,7 @@ class Wants:
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str, int], list[str]] = {}
+        self._tests: dict[tuple[int, tuple[str, ...], bool], Callable[..., Any]] = {}
         self._age = -1
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
@@ -103,7 +103,7 @@ class Wants:
                         yield situation, key, values
             case Witness(variable, kind, conditions, negated):
                 if negated:
-                    for individual in self._satisfying(condition, env):
+                    for individual in self._satisfying(achiever, condition, env):
                         inner = {**env, variable: individual}
                         for c in conditions:
                             if isinstance(c, ValueCondition):
@@ -111,14 +111,14 @@ class Wants:
                 else:
                     for individual in self.one_of_each(kind):
                         inner = {**env, variable: individual}
-                        if all(self.holds(c, inner) for c in conditions if not _fluent(c)):
+                        if all(self.holds(achiever, c, inner) for c in conditions if not _fluent(c)):
                             for c in conditions:
-                                if _fluent(c) and not self.holds(c, inner):
+                                if _fluent(c) and not self.holds(achiever, c, inner):
                                     yield from self.of(achiever, c, inner, level)
             case AnyOf(alternatives, negated):
                 for group in alternatives:
                     for c in group:
-                        if isinstance(c, ValueCondition) and self.holds(c, env) is negated:
+                        if isinstance(c, ValueCondition) and self.holds(achiever, c, env) is negated:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
         yield from self._redetermined(achiever, condition, env)
 
@@ -135,7 +135,7 @@ class Wants:
                 values = tuple(
                     value
                     for value in self.candidates(situation, key, achiever.kinds[term])
-                    if value != env[term] and self._would_hold(condition, env, term, value)
+                    if value != env[term] and self._would_hold(achiever, condition, env, term, value)
                 )
                 if values:
                     yield situation, key, values
@@ -162,20 +162,20 @@ class Wants:
             found = self._negations[id(condition)] = opposite, condition
         return found[0]
 
-    def _would_hold(self, condition: Condition, env: Env, term: str, value: str) -> bool:
+    def _would_hold(self, achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
         """Whether a condition would hold with another value for a variable.
 
         What is static is asked once, unless it compares individuals once for all that no static fact tells apart.
         """
         static, compares, others, _ = self._about(condition)
         if not static:
-            return self.holds(condition, {**env, term: value})
+            return self.holds(achiever, condition, {**env, term: value})
         sort = {} if compares else self.program.alike.sort
         bound = [value if other == term else env.get(other) for other in others]
         key = id(condition), *[None if who is None else sort.get(who, who) for who in bound]
         known = self._known.get(key)
         if known is None:
-            known = self._known[key] = self.holds(condition, {**env, term: value})
+            known = self._known[key] = self.holds(achiever, condition, {**env, term: value})
         return known
 
     def candidates(self, situation: str, key: Key, kind: str) -> tuple[str, ...]:
@@ -213,57 +213,35 @@ class Wants:
         found = tuple(env.get(a, a) for a in arguments)
         return None if None in found else key_of(found)  # type: ignore[arg-type]
 
-    # ----------------------------------------------------------------------------------------------------- interpreter
+    def holds(self, achiever: Achiever, condition: Condition, env: Env) -> bool:
+        """Whether a condition of an achiever holds now; what neither it nor the environment determines is nothing."""
+        test, names = self._asked(achiever, condition, env, False)
+        return bool(test(*[env.get(name) for name in names]))
 
-    def holds(self, condition: Condition, env: Env) -> bool:
-        """Whether a condition holds now, with all its outer variables bound."""
-        match condition:
-            case ValueCondition(situation, arguments, value, negated):
-                default = FALSE if self._boolean(situation) else None
-                key = self._key(arguments, env)
-                now = None if key is None else self.table.now[situation].get(key, default)
-                return (now is not None and now == env.get(value, value)) is not negated
-            case RelationCondition(relation, arguments, negated):
-                tuples = self.program.problem.relations.get(relation, frozenset())
-                return (tuple(env.get(a, a) for a in arguments) in tuples) is not negated
-            case ClassCondition(term, kind, negated):
-                return (env.get(term, term) in self.program.members.get(kind, ())) is not negated
-            case EqualityCondition(left, right, negated):
-                return (env.get(left, left) == env.get(right, right)) is not negated
-            case Witness(negated=negated):
-                return (next(self._satisfying(condition, env), None) is not None) is not negated
-            case AnyOf(alternatives, negated):
-                return any(self._all(group, env) for group in alternatives) is not negated
+    def _satisfying(self, achiever: Achiever, witness: Witness, env: Env) -> list[str]:
+        """Return the individuals that satisfy all conditions of a witness now."""
+        test, names = self._asked(achiever, witness, env, True)
+        found: list[str] = test(*[env.get(name) for name in names])
+        return found
 
-    def _all(self, conditions: tuple[Condition, ...], env: Env) -> bool:
-        bound = dict(env)
-        for condition in conditions:
-            if (
-                isinstance(condition, ValueCondition)
-                and condition.value.startswith("?")
-                and condition.value not in bound
-            ):
-                key = self._key(condition.arguments, bound)
-                now = None if key is None else self.table.now[condition.situation].get(key)
-                if now is None:
-                    return False
-                bound[condition.value] = now
-            elif not self.holds(condition, bound):
-                return False
-        return True
-
-    def _satisfying(self, witness: Witness, env: Env) -> Iterator[str]:
-        members = self.program.members.get(witness.kind, frozenset())
-        pool: Iterator[str] = iter(self.program.problem.classes.get(witness.kind, ()))
-        for c in witness.conditions:
-            if isinstance(c, ValueCondition) and c.arguments == (witness.variable,) and not c.negated:
-                value = env.get(c.value, c.value)
-                if value is not None and not value.startswith("?") and value != FALSE:
-                    keys = self.table.who[c.situation].get(value, {})
-                    pool = iter([arguments_of(key)[0] for key in keys if arguments_of(key)[0] in members])
-        for individual in pool:
-            if self._all(witness.conditions, {**env, witness.variable: individual}):
-                yield individual
+    def _asked(
+        self, achiever: Achiever, condition: Condition, env: Env, whom: bool
+    ) -> tuple[Callable[..., Any], Sequence[str]]:
+        """Return the function that tells whether a condition holds, or for whom a witness does, and its arguments."""
+        names = tuple(sorted({name for name in self._about(condition)[2] if name in env} | needs(condition)))
+        key = id(condition), names, whom
+        found = self._tests.get(key)
+        if found is None:
+            writer, bound = self.program.writer, set(names)
+            if whom and isinstance(condition, Witness):
+                source, tests = writer.satisfying(condition, bound, achiever.kinds, achiever.behavior)
+                term = written(condition.variable)
+                text = f"[{term} for {term} in {source} if {' and '.join(tests) or 'True'}]"
+            else:
+                text = writer.expression(condition, bound, achiever.kinds, achiever.behavior)
+            function = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
+            found = self._tests[key] = function(self.table.now, self.table.who)
+        return found, names
 
 
 def _fluent(condition: Condition) -> bool:

@@ -21,9 +21,9 @@ from time import perf_counter
 from typing import TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.state import Cell, Change, Key, Table, arguments_of
 from planner.hierarchical.subgoals import Env, Want, Wants
 from planner.plan import Counts
+from planner.transitions import Cell, Change, Key, Table, arguments_of
 from reasoner.symbols import FALSE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"

@@ -6,7 +6,8 @@ frozen     others that have a value of theirs, or that a condition looks for: th
 targets    the symbols that shall get a value; what is kept besides is said by a function, as for `planner.hierarchical.subplans`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
-proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be.
+proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be. The room that grounds
+and searches is imported where a world is looked at: numpy alone takes longer to import than a small task to plan.
 """
 
 from __future__ import annotations
@@ -15,14 +16,12 @@ from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
-from planner.grounded import best_first
-from planner.grounded.grounding import OutOfTimeError, TooLargeError, ground
-from planner.grounded.task import Task
-from planner.hierarchical.state import Cell, arguments_of, key_of
 from planner.hierarchical.subplans import Ground, Keep, Segments
 from planner.language import walk
-from planner.plan import Limits, Reason, Status
+from planner.plan import Limits, OutOfTimeError, Reason, Status, TooLargeError
+from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import (
     FALSE,
     Parameter,
@@ -32,6 +31,9 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+
+if TYPE_CHECKING:
+    from planner.grounded.task import Task
 
 FEW = 4
 """Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
@@ -70,10 +72,12 @@ class World:
                     return
                 width = replace(width, breadth=width.breadth // 2)
                 continue
-            self.task = task if isinstance(task, Task) else None
+            self.task = None if isinstance(task, Reason) else task
             return
 
     def _grounded(self, targets: Mapping[Cell, str], keep: Keep, width: Width) -> Task | Reason:
+        from planner.grounded.grounding import ground
+
         segments, level = self.segments, self.level
         inside = None if width.questions is None else focus(segments, level, targets, width)
         small = problem_of(segments, level, inside, with_frozen(segments, level, inside) if inside else frozenset())
@@ -86,10 +90,12 @@ class World:
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
+        from planner.grounded.best_first import search
+
         if self.task is None:
             return None
         most = self.width.work // max(len(self.task), SMALLEST)
-        found = best_first.search(self.task, Limits(most), self.segments.deadline)
+        found = search(self.task, Limits(most), self.segments.deadline)
         self.segments.spend(self.level, found.counts)
         self.plan = found.plan
         if found.status is not Status.SOLVED:

@@ -6,11 +6,19 @@ otherwise. A proof here is sound and seldom complete; what is left is decided by
 
 from __future__ import annotations
 
-from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.state import Cell, arguments_of
+import sys
+from collections.abc import Mapping
+from typing import TypeAlias
+
+from planner.hierarchical.operators import Achieve, Achiever, Program
 from planner.hierarchical.subplans import Segments
 from planner.plan import Reason
+from planner.transitions import Cell, arguments_of
 from reasoner.symbols import FALSE, Behavior, Fact, RelationCondition, Symbol, ValueCondition, Witness
+
+Achievers: TypeAlias = "Mapping[tuple[str, int], Achieve]"
+Asked: TypeAlias = "dict[tuple[Cell, str], bool]"
+"""For each value of a symbol whether it counts as attainable."""
 
 
 def unattainable(segments: Segments) -> Reason | None:
@@ -21,20 +29,17 @@ def unattainable(segments: Segments) -> Reason | None:
     """
     program = segments.program
     level = program.levels[-1]
-    asked: dict[tuple[Cell, str], bool] = {}
-    program.thorough = True
-    try:
-        for cell, value in segments.goal.items():
-            if segments.table.now[cell[0]].get(cell[1], FALSE) != value and not _attainable(
-                segments, level, cell, value, asked
-            ):
-                return _reason(segments, level, cell, value, asked)
-    finally:
-        program.thorough = False
+    asked: Asked = {}
+    achieve = program.bind(segments.table, {}, few=sys.maxsize).achieve
+    for cell, value in segments.goal.items():
+        if segments.table.now[cell[0]].get(cell[1], FALSE) != value and not _attainable(
+            segments, achieve, level, cell, value, asked
+        ):
+            return _reason(segments, achieve, level, cell, value, asked)
     return None
 
 
-def _attainable(segments: Segments, level: int, cell: Cell, value: str, asked: dict[tuple[Cell, str], bool]) -> bool:
+def _attainable(segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked) -> bool:
     if segments.table.now[cell[0]].get(cell[1], FALSE) == value:
         return True
     known = asked.get((cell, value))
@@ -42,10 +47,9 @@ def _attainable(segments: Segments, level: int, cell: Cell, value: str, asked: d
         return known
     asked[cell, value] = True
     for achiever in segments.program.achievers.get((level, cell[0]), ()):
-        achieve = segments.achieve[achiever.behavior, achiever.effect]
-        for _, unmet, env in achieve(*arguments_of(cell[1]), value):
+        for _, unmet, env in achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
             if all(
-                _attainable(segments, level, *needed, asked)
+                _attainable(segments, achieve, level, *needed, asked)
                 for number in unmet
                 if (needed := _needed(segments, achiever, number, env)) is not None
             ):
@@ -66,7 +70,7 @@ def _needed(segments: Segments, achiever: Achiever, number: int, env: dict[str, 
     return (condition.situation, key), env.get(condition.value) or condition.value
 
 
-def _reason(segments: Segments, level: int, cell: Cell, value: str, asked: dict[tuple[Cell, str], bool]) -> Reason:
+def _reason(segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked) -> Reason:
     """Return a goal with the missing static facts at the end of the chain of what it needs."""
     goal = Fact(Symbol(cell[0], arguments_of(cell[1])), value)
     lacking: dict[str, tuple[str, ...]] = {}
@@ -80,7 +84,7 @@ def _reason(segments: Segments, level: int, cell: Cell, value: str, asked: dict[
         for achiever in program.achievers.get((level, at[0]), ()):
             behavior = program.domain.behaviors[achiever.behavior]
             found = False
-            for _, unmet, env in segments.achieve[achiever.behavior, achiever.effect](*arguments_of(at[1]), wanted):
+            for _, unmet, env in achieve[achiever.behavior, achiever.effect](*arguments_of(at[1]), wanted):
                 found = True
                 for number in unmet:
                     needed = _needed(segments, achiever, number, env)

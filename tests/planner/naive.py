@@ -88,15 +88,15 @@ def holds(problem: Problem, state: Facts, condition: Condition, terms: Terms, ki
             symbol = Symbol(situation, tuple(map(get, arguments)))
             return (symbol in state and state[symbol] == get(value)) is not negated
         case RelationCondition(relation, arguments, negated):
-            return (tuple(map(get, arguments)) in problem.relations[relation]) is not negated
+            return (tuple(map(get, arguments)) in problem.relations.get(relation, ())) is not negated
         case ClassCondition(term, kind, negated):
-            return (get(term) in problem.classes[kind]) is not negated
+            return (get(term) in problem.classes.get(kind, ())) is not negated
         case EqualityCondition(left, right, negated):
             return (get(left) == get(right)) is not negated
         case Witness(variable, kind, inner, negated):
             found = any(
                 all(holds(problem, state, c, trial, kinds) for c in inner)
-                for m in problem.classes[kind]
+                for m in problem.classes.get(kind, ())
                 for trial in bindings(problem, outside(inner), {**kinds, variable: kind}, {**terms, variable: m})
             )
             return found is not negated

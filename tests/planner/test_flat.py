@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 
 from planner.grounded.best_first import plan_level, search
-from planner.grounded.grounding import TooLargeError, ground
+from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
 from planner.grounded.novelty import AT_ONCE, Seen, by_novelty, landmarks, successors
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
-from planner.plan import Counts, Limits, Plan, Reason, Status
+from planner.plan import Counts, Limits, Plan, Reason, Status, TooLargeError
 from planner.validation import validate
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse

@@ -1,22 +1,33 @@
 """One language of conditions and effects: every evaluator says the same of what is applicable and of what comes after."""
 
+import ast
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.grounded.grounding import ground as grounded
 from planner.grounded.task import Task
 from planner.hierarchical.operators import Program
-from planner.hierarchical.state import Table
 from planner.paper.transitions import Model, ground
+from planner.transitions import Table
 from planner.validation import successor
+from reasoner import symbols
+from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from reasoner.reading.affordance import applicable_query, write_situation
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import FALSE, AnyOf, Condition, Fact, Problem, Symbol, Witness
 from tests.planner import naive
+from tests.reasoner.worlds import graph_of, worlds
 from worlds.language import language
 
+ROOT = Path(__file__).resolve().parents[2]
 After = Mapping[tuple[str, tuple[str, ...]], frozenset[Fact]]
 """What holds after each behaviour that is applicable; what is false isn't listed."""
 
@@ -76,6 +87,16 @@ def by_task(problem: Problem) -> After:
     return found
 
 
+def by_sparql(graph: KnowledgeGraph, reading: Reading) -> set[tuple[str, tuple[str, ...]]]:
+    """Return what is applicable, by queries on the graph."""
+    write_situation(graph, reading)
+    return {
+        (behavior.name, tuple(reading.names.short(text(term)) for term in tuple(row)[: len(behavior.parameters)]))
+        for behavior in reading.problem.domain.behaviors.values()
+        for row in graph.select(applicable_query(graph, reading, behavior), SCENE)
+    }
+
+
 EVALUATORS: dict[str, Callable[[Problem], After]] = {
     "validation": by_validation,
     "paper": by_paper,
@@ -98,6 +119,47 @@ def test_every_evaluator_agrees_on_what_is_applicable_and_what_comes_of_it(seed:
             assert {done: after for done, after in found.items() if after != now} == changing, name
         else:
             assert found == truth, name
+
+
+@given(world=worlds())
+@settings(max_examples=max(settings().max_examples // 2, 30))
+def test_queries_on_the_graph_say_so_too(world: str) -> None:
+    with TemporaryDirectory() as folder:
+        graph = graph_of(world, Path(folder))
+    reading = read(graph)
+    truth = by_naive(reading.problem)
+    assert by_sparql(graph, reading) == truth.keys()
+    for name, evaluator in EVALUATORS.items():
+        if evaluator is not by_task:
+            assert evaluator(reading.problem) == truth, name
+
+
+CASES = {
+    "planner/transitions.py": "expression",
+    "planner/grounded/reachability.py": "condition",
+    "reasoner/reading/affordance.py": "positive",
+    "planner/validation.py": "test",
+    "tests/planner/naive.py": "holds",
+}
+"""The function in which each evaluator has a case for every kind of condition."""
+
+
+def forgotten(source: str, function: str, kinds: set[str]) -> set[str]:
+    """Return the kinds of conditions for which a function has no case of its own."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef) and node.name == function:
+            found |= {ast.unparse(p.cls) for p in ast.walk(node) if isinstance(p, ast.MatchClass)}
+    return kinds - found
+
+
+@pytest.mark.parametrize(("path", "function"), CASES.items())
+def test_no_evaluator_forgets_a_kind_of_condition(path: str, function: str) -> None:
+    kinds = set(re.findall(r"\w+", str(vars(symbols)["Condition"])))
+    source = (ROOT / path).read_text(encoding="utf-8")
+    assert len(kinds) >= 6
+    assert forgotten(source, function, kinds) == set()
+    assert forgotten(source, function, {*kinds, "DerivedCondition"}) == {"DerivedCondition"}
 
 
 def test_random_behaviours_are_of_every_kind() -> None:

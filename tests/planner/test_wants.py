@@ -5,7 +5,7 @@ import random
 import pytest
 
 from planner.experience.choice_points import Field
-from planner.hierarchical.operators import Program
+from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Wants
 from reasoner.symbols import Condition, Problem
 from worlds.families import family, random_table
@@ -18,8 +18,8 @@ CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_00
 def ask_anew(wants: Wants, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let nothing be kept of what was asked before."""
 
-    def would_hold(condition: Condition, env: Env, term: str, value: str) -> bool:
-        return wants.holds(condition, {**env, term: value})
+    def would_hold(achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
+        return wants.holds(achiever, condition, {**env, term: value})
 
     monkeypatch.setattr(wants, "_would_hold", would_hold)
 

@@ -1,0 +1,315 @@
+"""One state: a table that is changed in place, and conditions and effects as Python that is generated for it.
+
+now    situation type → key → value. The key is the individual, or the tuple of individuals where a type has several arguments
+who    situation type → value → the keys that have it, in the order in which they came to it; not kept for `FALSE`
+trail  what was overwritten, oldest first; `undo` takes it back to a mark
+age    how often anything was changed, undoing included: what was read off the table at this age still holds
+
+Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world. A condition becomes
+one Python expression over `now` and `who`, a behaviour a function ``forward(arguments)`` that returns the individuals of its
+variables and its changes, or None if it isn't applicable now. A new kind of condition gets its case in `Writer.expression`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from types import CodeType
+from typing import Any, TypeAlias
+
+from planner.language import DomainError, needs, nothing_determines
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    State,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+
+Key: TypeAlias = "str | tuple[str, ...]"
+Cell: TypeAlias = "tuple[str, Key]"
+"""A symbol as the table addresses it: situation type and key."""
+Change: TypeAlias = "tuple[str, Key, str]"
+"""A cell and its value."""
+Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
+"""Returns the individuals of a behaviour's variables, and its changes."""
+
+
+def key_of(arguments: tuple[str, ...]) -> Key:
+    """Return the key of a symbol's arguments."""
+    return arguments[0] if len(arguments) == 1 else arguments
+
+
+def arguments_of(key: Key) -> tuple[str, ...]:
+    """Return the arguments behind a key."""
+    return (key,) if isinstance(key, str) else key
+
+
+class Table:
+    """A state in place.
+
+    Parameters
+    ----------
+    situations : iterable of str
+        Names of all situation types.
+    state : State
+    """
+
+    def __init__(self, situations: Iterable[str], state: State) -> None:
+        self.now: dict[str, dict[Key, str]] = {name: {} for name in situations}
+        self.who: dict[str, dict[str, dict[Key, None]]] = {name: {} for name in self.now}
+        self.trail: list[tuple[str, Key, str]] = []
+        self.age = 0
+        for symbol, value in state.items():
+            key = key_of(symbol.arguments)
+            self.now[symbol.situation][key] = value
+            if value != FALSE:
+                self.who[symbol.situation].setdefault(value, {})[key] = None
+
+    def put(self, situation: str, key: Key, value: str) -> None:
+        """Give a symbol a value, and remember the old one."""
+        self.age += 1
+        cells = self.now[situation]
+        old = cells.get(key, FALSE)
+        cells[key] = value
+        who = self.who[situation]
+        if old != FALSE:
+            del who[old][key]
+        if value != FALSE:
+            keys = who.get(value)
+            if keys is None:
+                who[value] = {key: None}
+            else:
+                keys[key] = None
+        self.trail.append((situation, key, old))
+
+    def undo(self, mark: int) -> None:
+        """Take back all changes since the trail had the length `mark`."""
+        trail = self.trail
+        while len(trail) > mark:
+            situation, key, old = trail.pop()
+            self.put(situation, key, old)
+            trail.pop()
+
+    def since(self, mark: int) -> dict[Cell, str]:
+        """Return the net changes since a mark, with the present values."""
+        before: dict[Cell, str] = {}
+        for situation, key, old in self.trail[mark:]:
+            before.setdefault((situation, key), old)
+        now = self.now
+        return {cell: now[cell[0]][cell[1]] for cell, old in before.items() if now[cell[0]][cell[1]] != old}
+
+    def state(self) -> dict[Symbol, str]:
+        """Return the state as a value for those outside of the search."""
+        return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
+
+
+class Writer:
+    """Writes conditions and behaviours of one problem as Python over the dictionaries of a table.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its initial state and goal aren't looked at.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.constants: dict[str, object] = {}
+        self.variables: dict[str, tuple[str, ...]] = {}
+        self._fan: dict[str, float] = {}
+
+    def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
+        """Return a function of a table's `now` and `who` (and what else is given) that runs lines and returns a result."""
+        body = [f"    {line}" for line in (*lines, f"return {result}")]
+        text = "\n".join(body)
+        tables = {
+            identifier(table, s): f"{table}[{s!r}]" for s in self.problem.domain.situations for table in ("now", "who")
+        }
+        names = [f"    {name} = {table}" for name, table in tables.items() if name in text]
+        exec(_code("\n".join([f"def bind(now, who{given}):", *names, text])), self.constants)
+        return self.constants.pop("bind")  # type: ignore[return-value]
+
+    def forward(self, behavior: Behavior) -> Iterator[str]:
+        """Yield the lines that put the function of a behaviour into `forward`."""
+        kinds = behavior.kinds
+        parameters = [p.name for p in behavior.parameters]
+        bound = set(parameters)
+        tests = [self.member(p.name, p.kind) for p in behavior.parameters]
+        tests += self.conjunction(behavior.preconditions, bound, kinds, behavior.name)
+        variables = sorted(v.name for v in behavior.variables if v.name in bound)
+        self.variables[behavior.name] = tuple(variable[1:] for variable in variables)
+        yield f"def {identifier('forward', behavior.name)}({', '.join(map(written, parameters))}):"
+        yield f"    if not ({' and '.join(tests) or 'True'}): return None"
+        yield "    changes = []"
+        for effect in behavior.effects:
+            inner = set(bound)
+            when = self.conjunction(effect.when, inner, kinds, behavior.name)
+            free = {t for t in (*effect.arguments, effect.value) if t.startswith("?")} - inner
+            if free:
+                raise DomainError(
+                    f"{behavior.name}: nothing determines {', '.join(sorted(free))}, which an effect names"
+                )
+            when += self._exists(effect.situation, effect.arguments, kinds)
+            change = f"changes.append(({effect.situation!r}, {key_written(effect.arguments)}, {written(effect.value)}))"
+            yield f"    if {' and '.join(when)}: {change}" if when else f"    {change}"
+        yield f"    return {tuple_written(map(written, variables))}, changes"
+        yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
+
+    def conjunction(
+        self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
+    ) -> list[str]:
+        """Return the conditions as expressions, in an order that binds before it uses; `bound` grows."""
+        waiting, found = list(conditions), []
+        while waiting:
+            ready = ready_condition(waiting, bound, where)
+            waiting.remove(ready)
+            found.append(self.expression(ready, bound, kinds, where))
+        return found
+
+    def expression(self, condition: Condition, bound: set[str], kinds: Mapping[str, str], where: str) -> str:
+        """Return a condition as a Python expression; a variable that it determines is assigned in it."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                look = self.look(condition)
+                if value.startswith("?") and value not in bound:
+                    bound.add(value)
+                    return f"({written(value)} := {look}) in {self.kind(kinds[value])}"
+                test = " and ".join([f"{look} == {written(value)}", *self._exists(situation, arguments, kinds)])
+                return f"not ({test})" if negated else test
+            case RelationCondition(relation, arguments, negated):
+                tuples = self.constant(("relation", relation), self.problem.relations.get(relation, frozenset()))
+                return f"({tuple_written(map(written, arguments))} {'not in' if negated else 'in'} {tuples})"
+            case ClassCondition(term, kind, negated):
+                return f"{written(term)} {'not in' if negated else 'in'} {self.kind(kind)}"
+            case EqualityCondition(left, right, negated):
+                return f"{written(left)} {'!=' if negated else '=='} {written(right)}"
+            case Witness(variable, _, _, negated):
+                source, tests = self.satisfying(condition, bound, kinds, where)
+                found = (
+                    f"any(({' and '.join(tests)}) for {written(variable)} in {source})" if tests else f"bool({source})"
+                )
+                return f"not {found}" if negated else found
+            case AnyOf(alternatives, negated):
+                groups = [" and ".join(self.conjunction(g, set(bound), kinds, where)) or "True" for g in alternatives]
+                return ("not " if negated else "") + "(" + " or ".join(f"({g})" for g in groups) + ")"
+
+    def satisfying(
+        self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
+    ) -> tuple[str, list[str]]:
+        """Return an iterable expression for the individuals that a witness could be, and tests that remain on each."""
+        term, kind = condition.variable, condition.kind
+        inner = {**kinds, term: kind}
+        candidates = self.problem.classes.get(kind, ())
+        found: list[tuple[float, Condition | None, str]] = [
+            (len(candidates), None, self.constant(("members", kind), candidates))
+        ]
+        for c in condition.conditions:
+            match c:
+                case ValueCondition(situation, (only,), value, False) if only == term and value != term:
+                    if self.listed(situation, value) and (value in bound or not value.startswith("?")):
+                        found.append((1.0, c, f"{identifier('who', situation)}.get({written(value)}, ())"))
+                case RelationCondition(relation, arguments, False) if arguments.count(term) == 1:
+                    if not {a for a in arguments if a.startswith("?")} - bound - {term}:
+                        text, fan = self.adjacent(relation, arguments, term)
+                        found.append((fan, c, text))
+        _, consumed, source = min(found, key=lambda entry: entry[0])
+        rest = [c for c in condition.conditions if c is not consumed]
+        tests = self.conjunction(rest, bound | {term}, inner, where)
+        if consumed is not None and not (
+            isinstance(consumed, ValueCondition)
+            and self.problem.members(self.problem.domain.situations[consumed.situation].arguments[0])
+            <= self.problem.members(kind)
+        ):
+            tests.insert(0, self.member(term, kind))
+        return source, tests
+
+    def listed(self, situation: str, value: str) -> bool:
+        """Whether the table lists who has a value: what is false isn't listed, and a variable could be that."""
+        return value == TRUE or not self.problem.domain.situations[situation].boolean
+
+    def look(self, condition: ValueCondition) -> str:
+        """Return the expression for the value that a condition asks about."""
+        default = f", {FALSE!r}" if self.problem.domain.situations[condition.situation].boolean else ""
+        return f"{identifier('now', condition.situation)}.get({key_written(condition.arguments)}{default})"
+
+    def _exists(self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str]) -> list[str]:
+        """Return tests that the symbol exists, where the terms' classes don't already say so."""
+        return [
+            self.member(term, wanted)
+            for term, wanted in zip(arguments, self.problem.domain.situations[situation].arguments, strict=True)
+            if not (term in kinds and self.problem.members(kinds[term]) <= self.problem.members(wanted))
+        ]
+
+    def member(self, term: str, kind: str) -> str:
+        """Return the test that a term is of a class."""
+        return f"{written(term)} in {self.kind(kind)}"
+
+    def adjacent(self, relation: str, arguments: Sequence[str], term: str) -> tuple[str, float]:
+        """Return an iterable expression for those that stand in a relation to the other arguments, and how many these are."""
+        position = list(arguments).index(term)
+        name = identifier("adjacent", relation) + f"_{position}"
+        if name not in self.constants:
+            table: dict[tuple[str, ...], list[str]] = {}
+            for row in sorted(self.problem.relations.get(relation, ())):
+                table.setdefault(row[:position] + row[position + 1 :], []).append(row[position])
+            self.constants[name] = {others: tuple(found) for others, found in table.items()}
+            self._fan[name] = sum(map(len, table.values())) / max(len(table), 1)
+        others = [*arguments[:position], *arguments[position + 1 :]]
+        return f"{name}.get({tuple_written(map(written, others))}, ())", self._fan[name]
+
+    def kind(self, kind: str) -> str:
+        """Return the name of a class's individuals as a set."""
+        return self.constant(("kind", kind), self.problem.members(kind))
+
+    def constant(self, what: tuple[str, str], value: object) -> str:
+        """Return the name under which a value is known to what is generated."""
+        name = identifier(*what)
+        self.constants[name] = value
+        return name
+
+
+_COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}
+
+
+def ready_condition(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
+    """Return the cheapest condition to test of those whose variables are bound."""
+    ready = [condition for condition in waiting if not needs(condition) - bound]
+    if not ready:
+        raise nothing_determines(where, waiting, bound)
+    return min(ready, key=lambda condition: _COST[type(condition)])
+
+
+def identifier(prefix: str, name: str) -> str:
+    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
+    clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
+    return f"{prefix}_{clean}"
+
+
+def written(term: str) -> str:
+    """Return a term as Python."""
+    return identifier("v", term[1:]) if term.startswith("?") else repr(term)
+
+
+def tuple_written(items: Iterator[str] | Sequence[str] | map[str]) -> str:
+    """Return the tuple of some expressions as Python."""
+    return "(" + "".join(f"{item}, " for item in items) + ")"
+
+
+def key_written(arguments: Sequence[str]) -> str:
+    """Return the key of some terms as Python."""
+    return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
+
+
+@lru_cache(maxsize=256)
+def _code(source: str) -> CodeType:
+    return compile(source, "<compiled behaviours>", "exec")
