@@ -107,7 +107,7 @@ def _plan(
     if impossible:
         return outcome(Status.UNSOLVABLE, reason=impossible)
     try:
-        if call.serialise() or call.anew():
+        if call.serialise() or call.anew(list(dict(call.ladder))):
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
                     shorten(call, improve, leave_levels)

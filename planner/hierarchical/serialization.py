@@ -37,6 +37,8 @@ MOST_TOGETHER = 20_000
 """The largest level, in quantified behaviours, on which all goals are searched at once."""
 ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 100_000)
 """All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
+ANEW = Width(None, 1, 1_500_000)
+"""All goals at once from the beginning, on the most abstract level: the goals reached so far may be in the way for good."""
 Attempt: TypeAlias = "Effort | Width"
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
@@ -112,6 +114,7 @@ class Call:
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
         self.proved = False
+        self.restarted = False
         self.tried: dict[int, int] = {}
         self.too_large: Reason | None = None
         self.ladder: list[tuple[int, Attempt]] = []
@@ -168,6 +171,8 @@ class Call:
                     sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
             if asleep and not self.harder(asleep, before):
                 return False
+            if len(self.kept) == len(self.goal):
+                return True
             wake(mark)
         return True
 
@@ -198,22 +203,31 @@ class Call:
                 if self.achieve(level, cell, attempt):
                     return True
                 self.failed.setdefault(cell, set()).add((level, attempt))
+                if attempt is NEAR and not self.restarted:
+                    self.restarted = True
+                    if self.anew(self.program.levels[:1], ANEW):
+                        return True
         if self.moved:  # something was done since some of these attempts failed
             self.failed.clear()
             self.moved = False
             return self.harder(asleep, before)
         return False
 
-    def anew(self) -> bool:
-        """Achieve all goals at once from the beginning, where taking them in series has led astray; whether that succeeded."""
+    def anew(self, levels: Sequence[int], width: Width = ALL) -> bool:
+        """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was."""
         if not self.steps:
             return False  # nothing has led anywhere
+        steps, given_up, kept, tried = self.steps, self.given_up, self.kept, self.tried
         self.table.undo(0)
-        self.steps.clear()
-        self.given_up.clear()
-        self.tried.clear()
+        self.steps, self.given_up, self.tried = [], [], {}
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
-        return any(self.together(level) for level in dict(self.ladder))
+        if any(self.together(level, width) for level in levels):
+            return True
+        self.table.undo(0)
+        self.steps, self.given_up, self.kept, self.tried = steps, given_up, kept, tried
+        for step in steps:
+            self.refiner.again(step)
+        return False
 
     def at_rest_in_the_end(self) -> Problem:
         """Return the problem with the rest values of what rests in the beginning as goals, for planners that know no levels."""
