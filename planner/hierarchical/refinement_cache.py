@@ -20,7 +20,7 @@ from reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4, expansions=60)
 """For a refinement that a few relevant steps make; a longer one is searched in a small world."""
-NEAR, WIDER, WIDE = Width(40), Width(100, 2, 500_000), Width(300, 8, 1_500_000)
+NEAR, WIDER, WIDE = Width(40, least=100), Width(100, 2, 500_000), Width(300, 8, 1_500_000)
 WHOLE = Width(None, 1, 1_500_000)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000

@@ -48,12 +48,14 @@ class Width:
     """How much of the world is looked at, and how long.
 
     `questions` is the most values that chains towards one target may lead through, `breadth` how many of those that no static fact
-    tells apart are there at least; None takes the whole world. `work` bounds one search, in states times operators.
+    tells apart are there at least; None takes the whole world. `work` bounds one search, in states times operators, but
+    for `least` states that are looked at anyway.
     """
 
     questions: int | None
     breadth: int = 1
     work: int = 200_000
+    least: int = 0
 
 
 class World:
@@ -94,7 +96,7 @@ class World:
 
         if self.task is None:
             return None
-        most = self.width.work // max(len(self.task), SMALLEST)
+        most = max(self.width.work // max(len(self.task), SMALLEST), self.width.least)
         found = search(self.task, Limits(most), self.segments.deadline)
         self.segments.spend(self.level, found.counts)
         self.plan = found.plan
