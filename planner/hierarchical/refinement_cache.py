@@ -83,7 +83,7 @@ class Refiner:
         changed = {effect.situation for b in segments.program.domain.behaviors.values() for effect in b.effects}
         situations = segments.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
-        self.failed: dict[Ground, list[list[tuple[Cell, str]]]] = {}
+        self.failed: dict[tuple[Ground, frozenset[Cell]], list[list[tuple[Cell, str]]]] = {}
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Do a behaviour, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
@@ -159,7 +159,7 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         now = self.table.now
-        for facts in self.failed.get((name, arguments), ()):
+        for facts in self.failed.get(((name, arguments), self.segments.tidy), ()):
             if all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
         self.misses += 1
@@ -170,7 +170,7 @@ class Refiner:
             whole = width.questions is None
             around = problem_of(self.segments, below, None if whole else focus(self.segments, below, targets, width))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
-            self.failed.setdefault((name, arguments), []).append(facts)
+            self.failed.setdefault(((name, arguments), self.segments.tidy), []).append(facts)
             return None
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
         known.sort(key=lambda template: len(template.steps))

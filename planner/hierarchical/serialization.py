@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
@@ -40,6 +40,7 @@ ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 100_000)
 ANEW = Width(None, 1, 1_500_000)
 """All goals at once from the beginning, on the most abstract level: the goals reached so far may be in the way for good."""
 Attempt: TypeAlias = "Effort | Width"
+Done = TypeVar("Done")
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
@@ -114,7 +115,9 @@ class Call:
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
         self.proved = False
-        self.restarted = False
+        self.restarts = 0
+        self.gone_back = False
+        self.wary = False
         self.tried: dict[int, int] = {}
         self.too_large: Reason | None = None
         self.ladder: list[tuple[int, Attempt]] = []
@@ -169,10 +172,11 @@ class Call:
                     mark = len(self.table.trail)
                 else:
                     sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
+            restarts = self.restarts
             if asleep and not self.harder(asleep, before):
                 return False
-            if len(self.kept) == len(self.goal):
-                return True
+            if self.restarts > restarts:
+                return self.serialise()
             wake(mark)
         return True
 
@@ -203,9 +207,10 @@ class Call:
                 if self.achieve(level, cell, attempt):
                     return True
                 self.failed.setdefault(cell, set()).add((level, attempt))
-                if attempt is NEAR and not self.restarted:
-                    self.restarted = True
-                    if self.anew(self.program.levels[:1], ANEW):
+                if attempt is NEAR and not self.gone_back:
+                    self.gone_back = True
+                    if self.retreat() or self.anew(self.program.levels[:1], ANEW):
+                        self.restarts += 1
                         return True
         if self.moved:  # something was done since some of these attempts failed
             self.failed.clear()
@@ -223,11 +228,80 @@ class Call:
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         if any(self.together(level, width) for level in levels):
             return True
-        self.table.undo(0)
+        self.redo(steps)
         self.steps, self.given_up, self.kept, self.tried = steps, given_up, kept, tried
+        return False
+
+    def retreat(self) -> bool:
+        """Go back to where all goals could still be reached, and do the step that led astray so that they can be from there, too.
+
+        A key that lies in the room that it unlocks: no level above sees that. Whether all can be reached from there on; else all
+        is as it was.
+        """
+        if not self.refiner.drifting or not self.steps or self.hopeful():
+            return False
+        steps = self.steps
+        low, high = 0, len(steps)
+        while high - low > 1:
+            middle = (low + high) // 2
+            self.redo(steps[:middle])
+            low, high = (middle, high) if self.hopeful() else (low, middle)
+        self.redo(steps[:low])
+        mark = len(self.table.trail)
+        self.refiner.again(steps[low])
+        step = self.tidily(mark, lambda: self.refiner.do(*steps[low][:3]))
+        if step is None:
+            self.redo(steps)
+            return False
+        self.wary = True
+        self.steps = [*steps[:low], step]
+        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
+        return True
+
+    def hopeful(self) -> bool:
+        """Whether every goal could be reached from here on the lowest level if nothing ever became false."""
+        initial = {**self.problem.initial, **self.table.state()}
+        try:
+            reached = closed(self.problem, self.program.levels[-1], self.segments.deadline, initial)
+        except TooLargeError:
+            return True
+        except OutOfTimeError as error:
+            raise LimitError("the time limit") from error
+        return all(reached.possible(symbol, value) for symbol, value in self.problem.goal.items())
+
+    def tidily(self, mark: int, do: Callable[[], Done | None]) -> Done | None:
+        """Do once more what was done since a mark, so that all goals can be reached; None, and the table as at the mark, if not.
+
+        Of what was left in another state than at the mark, and might be anything, only that is left as it was which has to be.
+        """
+        table = self.table
+        after = table.since(mark)
+        table.undo(mark)
+        free = [cell for cell in after if not self.segments.visible(self.program.levels[0], cell)]
+        needed = set(free)
+        for cell in free:
+            table_mark = len(table.trail)
+            for other, value in after.items():
+                if other == cell or other not in needed:
+                    table.put(*other, value)
+            if self.hopeful():
+                needed.discard(cell)
+            table.undo(table_mark)
+        self.segments.tidy = frozenset(needed)
+        try:
+            done = do()
+        finally:
+            self.segments.tidy = frozenset()
+        if done is None or self.hopeful():
+            return done
+        table.undo(mark)
+        return None
+
+    def redo(self, steps: Sequence[RefinedStep]) -> None:
+        """Do steps from the beginning in place of those done so far."""
+        self.table.undo(0)
         for step in steps:
             self.refiner.again(step)
-        return False
 
     def at_rest_in_the_end(self) -> Problem:
         """Return the problem with the rest values of what rests in the beginning as goals, for planners that know no levels."""
@@ -281,7 +355,10 @@ class Call:
     def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
         """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
         keep = self.segments.keeping(self.kept)
+        mark = len(self.table.trail)
         steps = self.refiner.achieve(level, targets, keep, (), attempt)
+        if steps is not None and self.wary and not self.hopeful():
+            steps = self.tidily(mark, lambda: self.refiner.achieve(level, targets, keep, (), attempt))
         if steps is None:
             return False
         self.steps.extend(steps)

@@ -84,6 +84,8 @@ class Segments:
 
     def __post_init__(self) -> None:
         self.expanded = 0
+        self.tidy: frozenset[Cell] = frozenset()
+        """What refinements leave as it was, though it might be anything in the end."""
         self.focus: dict[str, None] = {}
         bound = self.program.bind(self.table, self.focus)
         self.forward, self.achieve = bound.forward, bound.achieve
@@ -223,7 +225,8 @@ class Segments:
 
     def refining(self, level: int) -> Keep:
         """Return what refining a behaviour of `level` keeps: all that this level knows as it was, the rest at rest."""
-        return lambda cell, first: first if self.visible(level, cell) else self.rest.get(cell[0])
+        tidy, rest = self.tidy, self.rest
+        return lambda cell, first: first if cell in tidy or self.visible(level, cell) else rest.get(cell[0])
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
         """Return what steps towards a goal keep: the goals reached before, the rest at rest."""

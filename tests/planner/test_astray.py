@@ -1,0 +1,76 @@
+"""Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
+
+from planner.hierarchical.planner import plan
+from planner.plan import Status
+from planner.validation import validate
+from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
+from worlds.writing import becomes, behavior, has, lacks, world
+
+
+def slide(items: int) -> Problem:
+    """Return a world in which one rides down a slide with an item, for good, or ties the item to a rope and stays."""
+    names = tuple(f"item{number}" for number in range(items))
+    up, tied = has("ROBOT_AT", "robot", "top"), has("ROPE", "rope", "?i")
+    return world(
+        [
+            SituationType("AT", ("Item",), "Place"),
+            SituationType("ROBOT_AT", ("Robot",), "Place", level=2),
+            SituationType("ROPE", ("Rope",), "ROPE", level=2, rest="loose"),
+        ],
+        [
+            behavior("SEND", 1, "?i:Item", [has("AT", "?i", "top")], [becomes("AT", "?i", "bottom")]),
+            behavior("RIDE", 2, "?i:Item", [up, has("AT", "?i", "top")],
+                     [becomes("AT", "?i", "bottom"), becomes("ROBOT_AT", "robot", "bottom")]),
+            behavior("TIE", 2, "?i:Item", [up, has("ROPE", "rope", "loose")], [becomes("ROPE", "rope", "?i")]),
+            behavior("LOWER", 2, "?i:Item", [up, tied], [becomes("AT", "?i", "bottom"), becomes("ROPE", "rope", "loose")]),
+        ],
+        {"Item": names, "Robot": ("robot",), "Rope": ("rope",), "Place": ("top", "bottom"), "ROPE": ("loose", *names)},
+        {**{f"AT {name}": "top" for name in names}, "ROBOT_AT robot": "top", "ROPE rope": "loose"},
+        {f"AT {name}": "bottom" for name in names},
+    )  # fmt: skip
+
+
+def test_a_refinement_after_which_a_goal_is_out_of_reach_is_made_again_so_that_it_leaves_what_was() -> None:
+    problem = slide(3)
+    outcome = plan(problem)
+    assert outcome.status is Status.SOLVED
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
+    assert outcome.given_up == ()
+    assert [step.behavior for step in outcome.plan.steps] == ["SEND"] * 3
+    assert outcome.plan.length[2] <= 6
+
+
+def test_goals_that_must_come_in_an_order_that_one_alone_does_not_show_are_reached_on_level_1() -> None:
+    """A cell can be marked only while none is plain; plain ones can be stirred, and are never plain again."""
+    none_plain = Witness("?o", "Cell", (lacks("FILL", "?o", "empty"), lacks("FILL", "?o", "stirred")), negated=True)
+    empty, open_ = has("FILL", "?c", "empty"), has("LID", "lid", "open")
+    below = [
+        behavior("POUR", 2, "?c:Cell", [empty, open_], [becomes("FILL", "?c", "plain")]),
+        behavior("WHISK", 2, "?c:Cell", [lacks("FILL", "?c", "empty"), open_], [becomes("FILL", "?c", "stirred")]),
+        behavior("STAMP", 2, "?c:Cell", [has("FILL", "?c", "stirred"), open_], [becomes("MARKED", "?c", TRUE)]),
+        behavior("OPEN", 2, "", [has("LID", "lid", "shut")], [becomes("LID", "lid", "open")]),
+        behavior("SHUT", 2, "", [open_], [becomes("LID", "lid", "shut")]),
+    ]
+    above = [
+        behavior("STIR", 1, "?c:Cell", [lacks("FILL", "?c", "empty")], [becomes("FILL", "?c", "stirred")]),
+        behavior("FILL_UP", 1, "?c:Cell", [empty], [becomes("FILL", "?c", "plain")]),
+        behavior("MARK", 1, "?c:Cell", [has("FILL", "?c", "stirred"), none_plain], [becomes("MARKED", "?c", TRUE)]),
+    ]
+    problem = world(
+        [
+            SituationType("FILL", ("Cell",), "FILL"),
+            SituationType("MARKED", ("Cell",), "Truth", boolean=True),
+            SituationType("LID", ("Lid",), "LID", level=2, rest="shut"),
+        ],
+        [*above, *below],
+        {"Cell": ("cell1", "cell2"), "Lid": ("lid",), "FILL": ("empty", "plain", "stirred"), "LID": ("open", "shut")},
+        {"FILL cell1": "empty", "FILL cell2": "empty", "LID lid": "shut", "MARKED cell1": FALSE, "MARKED cell2": FALSE},
+        {"FILL cell2": "plain", "MARKED cell1": TRUE},
+    )
+    outcome = plan(problem)
+    assert outcome.status is Status.SOLVED
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
+    assert outcome.given_up == ()
+    assert [str(step.behavior) for step in outcome.plan.steps] == ["FILL_UP", "STIR", "MARK", "FILL_UP"]
