@@ -41,6 +41,10 @@ FORMS = {
     ".srx": "sparql-xml",
 }
 """What a query's answer can be written as, by the ending of the file's name."""
+WITHOUT_PHYSICS = (
+    "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
+    "pip install 'confab-planner[physics]' compiles it; all but physics works without"
+)
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
 PATH = click.Path(path_type=Path)
@@ -784,6 +788,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still buffered has nowhere to go
         _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
     except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "pybullet":
+            _end(MISUSE, WITHOUT_PHYSICS)
         what = f"{type(error).__name__}: {error}"
         _end(
             BUG,

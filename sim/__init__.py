@@ -13,14 +13,16 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 
 
 def _import_pybullet_quietly() -> None:
-    """Import PyBullet without the build date that its C code prints to stderr, where progress and errors belong."""
+    """Import PyBullet, if it is there, without the build date that its C code prints to stderr, where errors belong."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)
-        import pybullet  # noqa: F401
+        with suppress(ModuleNotFoundError):  # reach is geometry; what needs physics says so itself
+            import pybullet  # noqa: F401
     finally:
         os.dup2(kept, 2)
         os.close(kept)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from sim.engine import Engine
 from sim.motion import (
     SWIVELS,
-    YAWS,
     Limits,
     Reacher,
     beyond,
@@ -22,34 +21,21 @@ from sim.motion import (
     connect,
     line,
     polyline,
-    poses_at,
     smooth,
     timed,
     turned_near,
 )
 from sim.perception import tilt_of
 from sim.robot import Manipulator
+from sim.stages import MARGIN, Numbers, Stage
 from sim.urdf import Array
 from sim.verdict import SkillError
-
-Numbers = Mapping[str, float]
-
-MARGIN = 0.008
-"""Metres kept off everything."""
 
 CLOSE = 0.002
 """Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
 
 BATCH, ENOUGH = 24, 6
 """Candidates checked for collisions at a time, and how many good ones end the search."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """Poses (n, 6) that all candidates must allow, and what may be touched there."""
-
-    poses: Array
-    ignored: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -277,21 +263,3 @@ def _gaps(reacher: Reacher, stages: Sequence[Stage], postures: Sequence[Array]) 
 def named(*objects: str) -> tuple[str, ...]:
     """Return each object once, in order."""
     return tuple(dict.fromkeys(objects))
-
-
-def fan() -> tuple[Array, Array]:
-    """Return yaws and swivels (n,) of all the ways to be at a point that are considered."""
-    yaw, swivel = np.meshgrid(YAWS, SWIVELS)
-    return yaw.ravel(), swivel.ravel()
-
-
-def grip_stages(grip: Array, numbers: Numbers, ignored: tuple[str, ...] = ()) -> tuple[Stage, Stage, Stage]:
-    """Return the stages of a grasp at point `grip` (3,): around it, before it, and raised above it, for the whole `fan`."""
-    yaw, swivel = fan()
-    heading = np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
-    raised = np.array([0.0, 0.0, numbers["raised"]])
-    return (
-        Stage(poses_at(grip, yaw, 0.0, swivel), ignored),
-        Stage(poses_at(grip - numbers["approach"] * heading, yaw, 0.0, swivel)),
-        Stage(poses_at(grip + raised, yaw, 0.0, swivel), ignored),
-    )

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.attempt import CLOSE, Attempt, Numbers, Stage, fan, named
+from sim.attempt import CLOSE, Attempt, named
 from sim.bodies import height_of
 from sim.engine import Engine
 from sim.motion import poses_at, rotations
 from sim.perception import tilt_of
 from sim.robot import Manipulator
+from sim.stages import Numbers, Stage, fan
 from sim.urdf import Array
 from sim.verdict import SkillError
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
-from sim.attempt import MARGIN, Numbers, grip_stages
 from sim.collision import Surroundings, box, fixed_spheres, read_mover
 from sim.kinematics import read_arm
 from sim.motion import Reacher
+from sim.stages import MARGIN, Numbers, grip_stages
 from sim.urdf import Model, read_urdf
 
 VERSION = "1"

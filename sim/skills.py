@@ -25,11 +25,12 @@ from importlib.metadata import entry_points
 
 import numpy as np
 
-from sim.attempt import Attempt, Numbers, Stage, fan, grip_stages
+from sim.attempt import Attempt
 from sim.engine import Engine
 from sim.motion import pose_of, poses_at, rotations, turned_near
 from sim.perception import tilt_of
 from sim.pouring import reach_over, stand_upright, tilt
+from sim.stages import Numbers, Stage, fan, grip_stages
 from sim.verdict import SkillError
 
 Roles = Mapping[str, str]

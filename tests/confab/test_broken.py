@@ -553,3 +553,36 @@ def test_a_fact_about_nobody_is_refused(tmp_path: Path, ask: Ask) -> None:
     code, _, err = ask("plan", scene)
     assert code == MISUSE
     assert "a fact about 0 individuals; MOORED is about 1" in err
+
+
+def test_without_pybullet_all_but_physics_works_and_that_says_so(tmp_path: Path) -> None:
+    new_domain("pouring", tmp_path / "p", bodies=True)
+    scene, plan = tmp_path / "p" / "pouring-scene.ttl", tmp_path / "plan.json"
+    confab.load(scene).plan().save(plan)
+    code = """
+import io, sys
+from contextlib import redirect_stderr, redirect_stdout
+sys.modules["pybullet"] = None
+from confab.cli import main
+for line in sys.stdin:
+    out, err = io.StringIO(), io.StringIO()
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            main(line.split())
+    except SystemExit as end:
+        print(end.code, " ".join(err.getvalue().split()))
+"""
+    works = [f"plan {scene}", f"execute {scene}", f"validate {scene}", f"picture {scene} --classes -o {tmp_path}/a.svg"]
+    needs = [
+        f"run {scene} --no-video",
+        f"verify {scene} {plan}",
+        f"execute {scene} --world pybullet",
+        f"picture {scene} -o {tmp_path}/t.png",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", code], input="\n".join(works + needs), capture_output=True, text=True, check=True
+    )
+    answers = done.stdout.splitlines()
+    assert [answer[0] for answer in answers] == ["0"] * 4 + ["2"] * 4, done.stdout
+    assert all("this needs physics, and PyBullet isn't installed" in answer for answer in answers[4:])
+    assert scene.with_name("pouring-scene.reach.ttl").is_file()

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from reasoner.embodiment.values import Embodiment
-from sim.attempt import MARGIN
 from sim.collision import Solid, Surroundings, box, read_mover
 from sim.kinematics import read_arm
 from sim.motion import Limits, Reacher, connect, line, polyline, pose_of, smooth, timed
+from sim.stages import MARGIN
 from sim.urdf import read_urdf
 
 from .conftest import Case
