@@ -1,6 +1,7 @@
 # Each target does its own set-up, in .venv, from python3 and make alone.
 #   make demo     the main job: plan, verify in physics, learn, report
-#   make test     every test
+#   make test     every test; one that needs an optional library is skipped, with its reason
+#   make test-all every test, with all that the optional ones need
 #   make check    what a change must pass: lint, format, types, tests
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
@@ -13,12 +14,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps
 
-# Where Python 3.11 may be, then 3.10 (pybullet has wheels for these two), then whatever python3 is.
+# Where Python 3.11 may be, then 3.10 (pybullet has wheels for these two), then whatever python3 is: all but physics works there.
 INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test check bench figures fuzz lock clean
+.PHONY: help demo test test-all check bench figures fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -27,6 +28,9 @@ demo: $(VENV)/installed
 	@$(BIN)/confab run
 
 test: $(VENV)/installed
+	@$(BIN)/python -m pytest -n auto
+
+test-all: $(VENV)/installed-bench
 	@$(BIN)/python -m pytest -n auto
 
 check: $(VENV)/installed
@@ -56,13 +60,13 @@ $(VENV)/bin/python:
 
 $(VENV)/installed: requirements.lock pyproject.toml | $(VENV)/bin/python
 	@$(BIN)/python -c 'import sys; v = "%d.%d" % sys.version_info[:2]; print("Installing Confab into $(VENV) with Python", v, \
-		"(about two minutes, once)." if v in ("3.10", "3.11") else "- pybullet has no wheel for it, so it is compiled (needs a C++ compiler and a long while).")'
+		"(about two minutes, once)." if v in ("3.10", "3.11") else "- without physics, since PyBullet has no wheel for it (docs/promises.md).")'
 	@$(PIP) --require-hashes -r requirements.lock
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
 $(VENV)/installed-bench: requirements-bench.lock $(VENV)/installed
-	@echo "Installing what the benchmarks compare with into $(VENV) (about a minute, once)."
+	@echo "Installing what optional tests need and benchmarks compare with into $(VENV) (about a minute, once)."
 	@$(PIP) --require-hashes -r requirements-bench.lock
 	@touch $@
 

@@ -586,3 +586,25 @@ for line in sys.stdin:
     assert [answer[0] for answer in answers] == ["0"] * 4 + ["2"] * 4, done.stdout
     assert all("this needs physics, and PyBullet isn't installed" in answer for answer in answers[4:])
     assert scene.with_name("pouring-scene.reach.ttl").is_file()
+
+
+def test_the_main_job_opens_no_socket(tmp_path: Path) -> None:
+    code = """
+import sys
+def blocked(event, arguments):
+    if event.startswith("socket.") and event not in ("socket.__new__", "socket.gethostname"):
+        raise PermissionError(f"{event} {arguments}")
+sys.addaudithook(blocked)
+import socket
+try:
+    socket.create_connection(("127.0.0.1", 9))
+except PermissionError:
+    from confab.cli import main
+    main(["run", "one-arm-serving", "--no-video", "--out", sys.argv[1]])
+"""
+    alone = subprocess.run(["unshare", "-rn", "true"], capture_output=True, check=False).returncode == 0
+    command = [*(["unshare", "-rn"] if alone else []), sys.executable, "-c", code, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "report.html").is_file()
+    assert 'src="http' not in (tmp_path / "report.html").read_text()

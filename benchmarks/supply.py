@@ -1,0 +1,46 @@
+"""What others' work this one needs: each package of the lock files with its licence, as it says itself.
+
+    python -m benchmarks.supply
+
+What isn't for this system, or isn't installed, is listed without one. `make lock` pins versions and hashes; `make` installs
+nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from importlib.metadata import PackageNotFoundError, metadata
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LOCKS = {"requirements.lock": "make", "requirements-bench.lock": "make bench, make test-all"}
+PINNED = re.compile(r"^([a-z0-9][a-z0-9._-]*)==(\S+)", re.MULTILINE)
+SHORT = 60
+
+
+def licence(package: str) -> str:
+    """Return the licence that an installed package states, or why there is none to read."""
+    try:
+        said = metadata(package)
+    except PackageNotFoundError:
+        return "(not installed here)"
+    kinds = [c.rsplit(" :: ", 1)[-1] for c in said.get_all("Classifier") or () if c.startswith("License ::")]
+    stated = said.get("License-Expression") or " / ".join(kinds) or (said.get("License") or "").strip().split("\n")[0]
+    return stated[:SHORT] or "(states none)"
+
+
+def main() -> None:
+    """Print a table: licences, how many packages have each, and which."""
+    found: dict[str, set[str]] = {name: {p for p, _ in PINNED.findall((ROOT / name).read_text())} for name in LOCKS}
+    light, all_of = found["requirements.lock"], set().union(*found.values())
+    by_licence: dict[str, list[str]] = defaultdict(list)
+    for package in sorted(all_of):
+        by_licence[licence(package)].append(package if package in light else f"*{package}*")
+    print("| licence | packages | which (*those of `make bench` and `make test-all` alone*) |\n|---|---|---|")
+    for kind, packages in sorted(by_licence.items(), key=lambda row: (-len(row[1]), row[0])):
+        print(f"| {kind} | {len(packages)} | {', '.join(packages)} |")
+
+
+if __name__ == "__main__":
+    main()
