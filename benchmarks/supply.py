@@ -26,7 +26,11 @@ def licence(package: str) -> str:
     except PackageNotFoundError:
         return "(not installed here)"
     kinds = [c.rsplit(" :: ", 1)[-1] for c in said.get_all("Classifier") or () if c.startswith("License ::")]
-    stated = said.get("License-Expression") or " / ".join(kinds) or (said.get("License") or "").strip().split("\n")[0]
+
+    def one(field: str) -> str:
+        return said[field] if field in said else ""
+
+    stated = one("License-Expression") or " / ".join(kinds) or one("License").strip().split("\n")[0]
     return stated[:SHORT] or "(states none)"
 
 
