@@ -28,7 +28,7 @@ def licence(package: str) -> str:
     kinds = [c.rsplit(" :: ", 1)[-1] for c in said.get_all("Classifier") or () if c.startswith("License ::")]
 
     def one(field: str) -> str:
-        return said[field] if field in said else ""
+        return str(said.json.get(field.lower().replace("-", "_"), ""))
 
     stated = one("License-Expression") or " / ".join(kinds) or one("License").strip().split("\n")[0]
     return stated[:SHORT] or "(states none)"
