@@ -12,8 +12,10 @@ cluster  steps close together that change the same symbols, or one of which take
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import TypeAlias
 
 from planner.hierarchical.inherited_preconditions import binding
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
@@ -22,6 +24,9 @@ from planner.hierarchical.subproblem import FEW, problem_of
 from planner.plan import OutOfTimeError, Reason, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import Domain, Problem, Symbol, ValueCondition
+
+Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
+"""What a step changes: the values before and after it."""
 
 PER_PRIMITIVE = 3
 """So many steps of the most abstract level are given up for a primitive less, at most: they say what the primitives are for."""
@@ -72,6 +77,29 @@ def put_aside(steps: Sequence[Concern]) -> bool:
     return False
 
 
+def undone_by(changes: Sequence[Changes]) -> dict[int, int]:
+    """Return for each step that a later one undoes exactly, before anything else touches the same symbols, that one."""
+    latest: dict[Cell, int] = {}
+    found: dict[int, int] = {}
+    for j, (before, after) in enumerate(changes):
+        makers = {latest.get(cell, -1) for cell in before}
+        i = makers.pop() if len(makers) == 1 else -1
+        if i >= 0 and changes[i] == (after, before):
+            found[i] = j
+        latest.update(dict.fromkeys(before, j))
+    return found
+
+
+def net(changes: Sequence[Changes]) -> dict[Cell, str]:
+    """Return what the changes of steps one after the other come to."""
+    first: dict[Cell, str] = {}
+    last: dict[Cell, str] = {}
+    for before, after in changes:
+        first = before | first
+        last |= after
+    return {cell: value for cell, value in last.items() if value != first[cell]}
+
+
 @dataclass
 class Improver:
     """Shortens the plan that a refiner has done; its table must be in the initial state.
@@ -97,29 +125,23 @@ class Improver:
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
 
-    def improve(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Return steps to the same end, no longer than these; the table is left in the initial state."""
+    def improve(self, steps: Sequence[RefinedStep], concerns: Sequence[Concern] = ()) -> list[RefinedStep]:
+        """Return steps to the same end, no longer than these; the table is left in the initial state.
+
+        What they concern is looked for here if it isn't given.
+        """
         best = list(steps)
         self.table.undo(0)
         anew = self.whole(best)
         self.table.undo(0)
         if anew is not None:
             return anew if worth_it(best, anew) else best
-        for shorten in (self.clusters, self.detours):
-            found = shorten(best)
-            self.table.undo(0)
-            if worth_it(best, found):
-                best = found
-        return best
-
-    def promising(self, steps: Sequence[RefinedStep]) -> bool:
-        """Whether steps put something aside, without which they can hardly be shorter; the table is left in the initial state."""
-        if len(self.segments.program.levels) < 2:
-            return False
+        found = self.clusters(concerns or self.concerns(best))
         self.table.undo(0)
-        concerns = self._concerns(steps)
+        best = found if worth_it(best, found) else best
+        found = self.detours(best)
         self.table.undo(0)
-        return concerns is not None and put_aside(concerns)
+        return found if worth_it(best, found) else best
 
     # ------------------------------------------------------------------------------------------------------------ whole
 
@@ -137,7 +159,7 @@ class Improver:
         bits = sum(
             len(problem.classes.get(kind, ())).bit_length() * len(self.table.now[s]) for s, kind in kinds.items()
         )
-        if bits > WHOLE_BITS or any(self.refiner.again(step) is None for step in steps):
+        if bits > WHOLE_BITS or not all(self.refiner.redo(step) for step in steps):
             return None
         targets = self.table.since(0)
         self.table.undo(0)
@@ -189,66 +211,64 @@ class Improver:
     # ---------------------------------------------------------------------------------------------------------- detours
 
     def detours(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Drop pairs of steps that undo each other."""
+        """Drop pairs of steps that undo each other, where what is between can be done without them and ends as with them."""
         parts: list[tuple[RefinedStep, int]] = []  # steps above the lowest level, each with the number of its parent
         for number, step in enumerate(steps):
             parts.extend((part, number) for part in self._parts(step))
-        undone = self._undone([part for part, _ in parts])
+        changes = self._changes([part for part, _ in parts])
         self.table.undo(0)
+        undone = undone_by(changes)
         if not undone:
             return list(steps)
         kept: list[tuple[RefinedStep, int]] = []
+        disturbed: set[int] = set()
         k = 0
         while k < len(parts):
             self.segments.check_time()
             j = undone.get(k)
             mark = len(self.table.trail)
-            if j is not None and all(self.refiner.again(part) is not None for part, _ in parts[k + 1 : j]):
+            done = j is not None and all(self.refiner.again(part) is not None for part, _ in parts[k + 1 : j])
+            if j is not None and done and self.table.since(mark) == net(changes[k : j + 1]):
                 kept.extend(parts[k + 1 : j])
+                disturbed.update(range(parts[k][1], parts[j][1] + 1))
                 k = j + 1
                 continue
             self.table.undo(mark)
-            if self.refiner.again(parts[k][0]) is None:
+            if not self.refiner.redo(parts[k][0]):
                 return list(steps)
             kept.append(parts[k])
             k += 1
         self.table.undo(0)
-        return self._assembled(steps, kept)
+        return self._assembled(steps, kept, disturbed)
 
-    def _undone(self, parts: Sequence[RefinedStep]) -> dict[int, int]:
-        """Return for steps that a later one undoes exactly, before anything else touches the same symbols, that one."""
-        latest: dict[Cell, int] = {}
-        changes: list[tuple[dict[Cell, str], dict[Cell, str]]] = []
-        found: dict[int, int] = {}
-        for j, part in enumerate(parts):
+    def _changes(self, parts: Sequence[RefinedStep]) -> list[Changes]:
+        """Do steps that can be done, and return what each changes."""
+        found = []
+        for part in parts:
             mark = len(self.table.trail)
-            if self.refiner.again(part) is None:
-                return {}
+            self.refiner.redo(part)
             after = self.table.since(mark)
             before: dict[Cell, str] = {}
             for situation, key, old in self.table.trail[mark:]:
                 before.setdefault((situation, key), old)
-            before = {cell: before[cell] for cell in after}
-            changes.append((before, after))
-            makers = {latest.get(cell, -1) for cell in before}
-            i = makers.pop()
-            if not makers and i >= 0 and changes[i] == (after, before):
-                found[i] = j
-            latest.update(dict.fromkeys(before, j))
+            found.append(({cell: before[cell] for cell in after}, after))
         return found
 
-    def _assembled(self, steps: Sequence[RefinedStep], parts: Sequence[tuple[RefinedStep, int]]) -> list[RefinedStep]:
+    def _assembled(
+        self, steps: Sequence[RefinedStep], parts: Sequence[tuple[RefinedStep, int]], disturbed: AbstractSet[int]
+    ) -> list[RefinedStep]:
         """Return parts under their parents again, where all parts of a parent are there and it still does what it says.
 
-        Not inside a stretch of the lower level, which ends where everything is at rest again.
+        Not inside a stretch of the lower level, which ends where everything is at rest again. Parents that aren't disturbed stand
+        where they stood, in the states in which they stood.
         """
         result: list[RefinedStep] = []
         restless: set[Cell] = set()
         rest, table = self.segments.rest, self.table
         for parent, group in groupby(parts, key=lambda entry: entry[1]):
             mine, mark = [part for part, _ in group], len(table.trail)
-            whole = None
-            if not restless and len(mine) == max(len(self._parts(steps[parent])), 1):
+            whole = steps[parent] if parent not in disturbed and self.refiner.redo(steps[parent]) else None
+            if whole is None and not restless and len(mine) == max(len(self._parts(steps[parent])), 1):
                 whole = self.refiner.again(steps[parent])
             again = [whole] if whole is not None else [self.refiner.again(part) for part in mine]
             result.extend(step for step in again if step is not None)
@@ -264,43 +284,46 @@ class Improver:
 
     # --------------------------------------------------------------------------------------------------------- clusters
 
-    def clusters(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Plan each cluster anew, one level further down, and keep what is shorter."""
-        rest = self._concerns(steps)
-        self.table.undo(0)
-        if rest is None:
-            return list(steps)
+    def clusters(self, concerns: Sequence[Concern]) -> list[RefinedStep]:
+        """Plan each cluster of the steps that concern these anew, one level further down, and keep what is shorter."""
+        rest = list(concerns)
+        steps = [concern.step for concern in rest]
         if all(len(self._cluster(rest, position)) == 1 for position in range(len(rest))):
-            return list(steps)
+            return steps
         found: list[RefinedStep] = []
-        position = 0
+        position, disturbed = 0, 0  # up to the second, steps are done in other states than they were
         while position < len(rest):
             self.segments.check_time()
             members = self._cluster(rest, position)
             replaced = self._replace([c.step for c in rest[position : members[-1] + 1]], members, position)
             if replaced is not None:
                 found.extend(replaced)
+                disturbed = max(disturbed, members[-1] + 1)
                 between = [rest[p] for p in range(position, members[-1] + 1) if p not in members]
                 position = members[-1] + 1 - len(between)
                 rest[position : members[-1] + 1] = between
                 continue
-            again = self.refiner.again(rest[position].step)
+            again: RefinedStep | None = rest[position].step
+            if position < disturbed:
+                again = self.refiner.again(rest[position].step)
+            elif not self.refiner.redo(rest[position].step):
+                again = None
             if again is None:
-                return list(steps)
+                return steps
             found.append(again)
             position += 1
         return found
 
-    def _concerns(self, steps: Sequence[RefinedStep]) -> list[Concern] | None:
-        """Do all steps, and return what each concerns; None if one can't be done."""
+    def concerns(self, steps: Sequence[RefinedStep]) -> list[Concern]:
+        """Return what each of the steps that were done concerns; the table is left in the initial state."""
+        self.table.undo(0)
         found = []
         for step in steps:
             self.segments.check_time()
             mark = len(self.table.trail)
-            again = self.refiner.again(step)
-            if again is None:
-                return None
-            found.append(self._concern(again, mark))
+            self.refiner.redo(step)
+            found.append(self._concern(step, mark))
+        self.table.undo(0)
         return found
 
     def _concern(self, step: RefinedStep, mark: int) -> Concern:

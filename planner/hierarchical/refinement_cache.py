@@ -141,6 +141,15 @@ class Refiner:
             return None
         return RefinedStep(level, name, arguments, done[0], tuple(inner))
 
+    def redo(self, step: RefinedStep) -> bool:
+        """Do the primitives of a step that was done in this very state before; whether all could be done."""
+        if step.steps:
+            return all(self.redo(child) for child in step.steps)
+        done = self.segments.forward[step.behavior](*step.arguments)
+        if done is not None:
+            self.segments.apply(done[1])
+        return done is not None
+
     # -------------------------------------------------------------------------------------------------------- refining
 
     def _refine(
