@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from confab.labels import Labels, labels_of
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Fact, State
@@ -193,7 +194,8 @@ def verify(
         seeds = list(range(seed, seed + rollouts))
         finished: list[Rollout] = []
         if video is not None or gui:
-            finished.append(_shown(trial, seeds.pop(0), video, plan, progress, gui))
+            labels = labels_of(scene.knowledge, scene.names, scene.problem)
+            finished.append(_shown(trial, seeds.pop(0), video, plan, progress, gui, labels))
         elif rollouts == 1 and str(workers) == "1":
             finished.append(trial.run(seeds.pop(0), progress=progress))
         if finished and done is not None:
@@ -234,6 +236,7 @@ def _shown(
     plan: Plan,
     progress: Callable[[int, PrimitiveStep], None] | None,
     gui: bool,
+    labels: Labels,
 ) -> Rollout:
     """Return the rollout of a seed that is filmed, or shown on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
@@ -252,9 +255,9 @@ def _shown(
 
     from sim.film import Film
 
-    titles = {step.path: str(step) for step in plan.walk() if step.steps}
+    titles = {step.path: f"{step.id} {labels.step(step)}" for step in plan.walk()}
     video.parent.mkdir(parents=True, exist_ok=True)
-    with Film(video, plan.primitives, titles, stills=video.with_suffix("")) as film:
+    with Film(video, plan.primitives, titles, stills=video.with_suffix(""), names=labels.words) as film:
         watching.append(film)
         return trial.run(seed, watch, progress, gui)
 

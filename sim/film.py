@@ -12,6 +12,7 @@ import imageio.v2 as imageio
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from sim.bodies import outline
 from sim.engine import Engine
 from sim.picture import Camera, hide_vessels, picture, view_of
 from sim.urdf import Array
@@ -24,6 +25,9 @@ SIZES = (17, 15, 13, 11)
 
 BAR = 46
 """Pixels at the bottom that hold caption and plan strip."""
+
+NAMED = 480
+"""From so many pixels of width on there is room for names."""
 
 SPEED = 2.5
 """How much faster than the simulated time a film runs."""
@@ -41,7 +45,7 @@ class Film:
     steps : sequence of Step
         The primitives, for the plan strip.
     titles : mapping of path to text
-        What to write for the steps above the primitives, by their position in the plan's tree.
+        What to write for steps, by their position in the plan's tree; nothing else is written for those above the primitives.
     camera : Camera, optional
         By default one that looks at the table, with pictures of `width` by `height` pixels (divisible by 16).
     frames : int
@@ -50,6 +54,8 @@ class Film:
         How much faster than the simulated time it runs.
     stills : str or Path, optional
         Folder for a PNG per primitive, taken at its end.
+    names : mapping of name to text, optional
+        What people call places and objects; what isn't in it is called by its name.
     """
 
     def __init__(
@@ -63,10 +69,11 @@ class Film:
         stills: str | Path | None = None,
         width: int = 960,
         height: int = 544,
+        names: Mapping[str, str] | None = None,
     ) -> None:
         self.path, self.steps, self.titles = Path(path), steps, titles or {}
         self.camera, self.frames, self.speed = camera, frames, speed
-        self.width, self.height = width, height
+        self.width, self.height, self.names = width, height, names or {}
         self.stills = None if stills is None else Path(stills)
         self._part = self.path.with_name(f".{self.path.stem}.part{self.path.suffix}")
         self._writer: Any = None
@@ -102,8 +109,8 @@ class Film:
 
     def frame(self, world: Engine) -> Array:
         """Return the picture of now, captioned."""
-        self.camera = self.camera or view_of(world.embodiment, self.width, self.height)
-        return self._caption(picture(world, self.camera), world.current)
+        self.camera = self.camera or view_of(world.embodiment, self.width, self.height, BAR)
+        return self._caption(self._named(picture(world, self.camera), world), world.current)
 
     def close(self) -> None:
         """Finish the file, which has its name only from now on."""
@@ -138,6 +145,26 @@ class Film:
             self._writer = imageio.get_writer(self._part, **options)
         self._writer.append_data(image)
 
+    def _named(self, image: Array, world: Engine) -> Array:
+        """Write the names of places below them, and of objects above them."""
+        if self.width < NAMED or self.camera is None:
+            return image
+        canvas = Image.fromarray(image)
+        draw, font = ImageDraw.Draw(canvas, "RGBA"), ImageFont.load_default(12)
+        for place in world.embodiment.places.values():
+            x, y = self.camera.pixel(np.array(place.position))
+            draw.text(
+                (x, y + 8), self.names.get(place.name, place.name), fill=(60, 40, 20, 200), font=font, anchor="mt"
+            )
+        for name, thing in world.bodies.items():
+            turn, base = world.truth(name)
+            x, y = self.camera.pixel(base + turn[:, 2] * float(outline(thing.shape)[0][-1]))
+            words = self.names.get(name, name)
+            half = draw.textlength(words, font=font) / 2 + 4
+            draw.rounded_rectangle((x - half, y - 24, x + half, y - 8), 4, fill=(40, 50, 70, 190))
+            draw.text((x, y - 16), words, fill=(250, 251, 253, 255), font=font, anchor="mm")
+        return np.asarray(canvas)
+
     def _caption(self, image: Array, number: int) -> Array:
         """Write what is done, with the steps above it, and the strip of primitives below the picture."""
         height, width = image.shape[:2]
@@ -147,7 +174,7 @@ class Film:
         if 0 <= number < len(self.steps):
             step = self.steps[number]
             above = [self.titles[step.path[:n]] for n in range(1, len(step.path)) if step.path[:n] in self.titles]
-            own = " ".join((str(step.id), step.behavior, *step.arguments))
+            own = self.titles.get(step.path) or " ".join((str(step.id), step.behavior, *step.arguments))
             _write_row(draw, [*above, own], width, height - BAR + 7)
         self._strip(draw, width, height, number)
         return np.asarray(canvas)

@@ -20,11 +20,21 @@ from numpy.typing import NDArray
 from reasoner.embodiment.values import Embodiment, Shape
 from sim.bodies import outline, wall
 from sim.engine import Engine
-from sim.urdf import Array
+from sim.urdf import Array, read_urdf
+from sim.urdf import rotation as rotated
 
 NEAR, FAR = 0.1, 8.0
 SUN = np.array([0.45, 0.35, 0.82])
 """Direction to the light."""
+
+FIELD = 40.0
+"""Vertical field of view in degrees."""
+
+MARGIN = 22
+"""Pixels that are left free around."""
+
+TALL, LEGS = 0.30, 0.12
+"""How high what stands on a table may be, and how far below the places one has to see, in metres."""
 
 EDGE = 14.0
 """Difference in brightness, of 255, from which on neighbouring pixels lie on an edge."""
@@ -90,18 +100,60 @@ class Camera:
         return (rows, columns) if rows.start < rows.stop and columns.start < columns.stop else None
 
 
-def view_of(embodiment: Embodiment, width: int = 960, height: int = 544) -> Camera:
-    """Return a camera that looks at the middle of the places from the guest's side."""
+def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: int = 0) -> Camera:
+    """Return a camera that looks at robot and table from the guest's side, as near as both are wholly in the picture.
+
+    Parameters
+    ----------
+    embodiment : Embodiment
+    width, height : int
+        Pixels.
+    below : int
+        Pixels at the bottom where something else will be.
+    """
     places = np.array([place.position for place in embodiment.places.values()])
-    middle, extent = places.mean(0), float(np.ptp(places[:, 1])) + 0.5
+    middle = places.mean(0)
     base = np.array(embodiment.robots[0].position) if embodiment.robots else middle - [0.5, 0.0, 0.0]
     away = middle - base
     away[2] = 0.0
     away /= max(float(np.linalg.norm(away)), 1e-9)
     side = np.array([-away[1], away[0], 0.0])
-    eye = middle + away * 0.80 * extent - side * 0.48 * extent + np.array([0.0, 0.0, 0.52 * extent])
-    target = middle - away * 0.16 * extent + np.array([0.0, 0.0, 0.11 * extent])
-    return Camera(_three(eye), _three(target), 40.0, width, height)
+    forward = -0.96 * away + 0.48 * side - 0.41 * np.array([0.0, 0.0, 1.0])
+    look = Camera((0.0, 0.0, 0.0), _three(forward), FIELD, width, height)
+    x, y, z = look.axes @ _seen(embodiment).T
+    wide = (width / 2 - MARGIN) / look.focal
+    up, down = (height / 2 - MARGIN) / look.focal, (height / 2 - MARGIN - below) / look.focal
+    # A point is in the picture if |x - eye| <= wide (z - eye) and so on: the nearest eye for which all are.
+    depth = min(
+        float((x + wide * z).min() - (x - wide * z).max()) / (2 * wide),
+        float((y + down * z).min() - (y - up * z).max()) / (up + down),
+    )
+    eye_x = ((x + wide * z).min() + (x - wide * z).max()) / 2
+    eye_y = ((y + down * z).min() - down * depth + (y - up * z).max() + up * depth) / 2
+    eye = np.array([eye_x, eye_y, depth]) @ look.axes
+    return Camera(_three(eye), _three(eye + look.axes[2]), FIELD, width, height)
+
+
+def _seen(embodiment: Embodiment) -> Array:
+    """Return points (n, 3) that a picture shall show: corners of tables, what stands on places, robots without their arms."""
+    points: list[Array] = []
+    for fixture in embodiment.fixtures:
+        half = np.array(fixture.size) / 2
+        corners = np.array([(dx, dy, dz) for dx in (-1, 1) for dy in (-1, 1) for dz in (-1, 1)]) * half
+        points.append(corners @ rotated(0.0, 0.0, fixture.yaw).T + np.array(fixture.position))
+    for place in embodiment.places.values():
+        x, y, z = place.position
+        points.append(np.array([(x, y, z), (x, y, z + TALL)]))
+    for robot in embodiment.robots:
+        model = read_urdf(robot.urdf, robot.position, robot.yaw)
+        moved = {joint for hand in robot.hands for joint in (*hand.arm, *hand.fingers)}
+        for link, cover in model.spheres.items():
+            if len(cover.radii) and not moved & {joint.name for joint in model.chains.get(link, ())}:
+                for shift in (-1.0, 1.0):
+                    points.append(cover.centers + shift * cover.radii[:, None] * np.array([0.0, 0.0, 1.0]))
+    seen = np.concatenate(points)
+    low = min((place.position[2] for place in embodiment.places.values()), default=0.0) - LEGS
+    return np.maximum(seen, [-np.inf, -np.inf, low])
 
 
 def _three(point: Array) -> tuple[float, float, float]:
