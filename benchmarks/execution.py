@@ -20,6 +20,7 @@ from typing import Any
 import confab
 from confab.execution import execute
 from confab.gantt import save_gantt
+from confab.labels import labels_of
 from confab.scene import Scene
 from planner.acting.episode import Change, End, Episode, Intervention
 from planner.acting.executive import Patience, act
@@ -445,7 +446,8 @@ def both_hands() -> None:
     )
     print(f"| serial | {serial.simulated_seconds:.1f} | 1 | – | {serial.ok} | – |")
     print(f"| both hands | {seconds:.1f} | {ratio:.2f} | {performed.touching:.2f} s | {performed.ok} | {same} |")
-    path = save_gantt(performed.slots, OUT / "gantt.png", serial.simulated_seconds)
+    labels = labels_of(scene.knowledge, scene.names, scene.problem)
+    path = save_gantt(performed.slots, OUT / "gantt.png", serial.simulated_seconds, labels)
     print(f"\nThe Gantt strip: {path}")
 
 

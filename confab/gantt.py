@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from planner.acting.schedule import Slot
@@ -11,16 +12,23 @@ from planner.acting.schedule import Slot
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from confab.labels import Labels
 
-def save_gantt(slots: Sequence[Slot], path: str | Path, serial: float | None = None) -> Path:
-    """Draw a schedule, and the time that one hand after the other would take, into a picture file; return where."""
+TALL, LINES = 21, 2.8
+"""Words stand in their bars: so many signs go into a line, and so many lines into a second."""
+
+
+def save_gantt(
+    slots: Sequence[Slot], path: str | Path, serial: float | None = None, labels: Labels | None = None
+) -> Path:
+    """Draw a schedule, in words, and the time that one hand after the other would take, into a picture file; return where."""
     from confab.picturing import save, words_as_they_are
 
     with words_as_they_are():
-        return save(_gantt(slots, serial), Path(path), dpi=110)
+        return save(_gantt(slots, serial, labels), Path(path), dpi=110)
 
 
-def _gantt(slots: Sequence[Slot], serial: float | None) -> Figure:
+def _gantt(slots: Sequence[Slot], serial: float | None, labels: Labels | None) -> Figure:
     from matplotlib import colormaps
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -28,17 +36,18 @@ def _gantt(slots: Sequence[Slot], serial: float | None) -> Figure:
     workers = sorted({slot.worker for slot in slots})
     behaviors = list(dict.fromkeys(slot.step.behavior for slot in slots))
     colors = colormaps["Pastel1"]
-    figure = Figure(figsize=(15, 1.3 + 0.85 * len(workers)), layout="constrained")
+    figure = Figure(figsize=(15, 1.3 + 1.35 * len(workers)), layout="constrained")
     axes = figure.subplots()
     for slot in slots:
         row, width = workers.index(slot.worker), slot.end - slot.begin
         color = colors(behaviors.index(slot.step.behavior) % 9)
         axes.barh(row, width, left=slot.begin, height=0.8, color=color, edgecolor="#444444", linewidth=0.6)
-        rest = [argument for argument in slot.step.arguments if argument != slot.worker]
-        text = "\n".join((str(slot.step.id), *rest)) if width > 1.0 else str(slot.step.id)
-        axes.text(slot.begin + width / 2, row, text, ha="center", va="center", fontsize=7.5)
+        words = labels.step(slot.step) if labels else " ".join((slot.step.behavior, *slot.step.arguments))
+        lines = fill(f"{slot.step.id} {words}", TALL).splitlines()[: max(1, round(width * LINES))]
+        middle = slot.begin + width / 2
+        axes.text(middle, row, "\n".join(lines), ha="center", va="center", fontsize=7, rotation=90)
     end = max(slot.end for slot in slots)
-    axes.set_yticks(range(len(workers)), workers)
+    axes.set_yticks(range(len(workers)), [labels.name(worker) if labels else worker for worker in workers])
     axes.invert_yaxis()
     axes.set_xlabel("simulated seconds; numbers are the IDs of the primitives")
     title = f"both hands: {end:.1f} s"
@@ -49,9 +58,9 @@ def _gantt(slots: Sequence[Slot], serial: float | None) -> Figure:
     handles = [Patch(color=colors(i % 9)) for i in range(len(behaviors))]
     axes.legend(
         handles,
-        behaviors,
+        [labels.words.get(name, name) if labels else name for name in behaviors],
         loc="upper center",
-        bbox_to_anchor=(0.5, -0.38),
+        bbox_to_anchor=(0.5, -0.2),
         ncol=len(behaviors),
         fontsize=7,
         frameon=False,

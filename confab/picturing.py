@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from io import BytesIO
 from pathlib import Path
@@ -124,8 +125,10 @@ def class_tree(scene: Scene) -> Figure:
     from matplotlib.figure import Figure
 
     below: dict[str, list[str]] = {}
-    for row in scene.knowledge.select(CLASSES):
-        below.setdefault(text(row[1]), []).append(text(row[0]))
+    for above, child in _reduced(
+        [(text(row[1]), text(row[0])) for row in scene.knowledge.select(CLASSES, ["asserted"])]
+    ):
+        below.setdefault(above, []).append(child)
     situations: dict[str, list[str]] = {}
     for row in scene.knowledge.select(SITUATIONS):
         situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
@@ -160,6 +163,17 @@ def class_tree(scene: Scene) -> Figure:
         _box(axes, x, y, fill_lines(words), BLUE if own else GREY, 8)
     axes.set_ylim(rows - 0.5, -0.5)
     return figure
+
+
+def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return pairs of class and subclass without those that follow from others: what a reasoner has written into a file."""
+    import networkx
+
+    graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])
+    if not networkx.is_directed_acyclic_graph(graph):  # classes that are the same as each other
+        return list(pairs)
+    direct = set(networkx.transitive_reduction(graph).edges)
+    return [pair for pair in pairs if pair in direct]
 
 
 def fill_lines(words: str, width: int = 32) -> str:
