@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import imageio.v2 as imageio
 from PIL import Image
@@ -21,8 +22,8 @@ def main() -> None:
         film = Path(folder) / "serving.mp4"
         report = confab.load("beverage-serving").plan().verify(seed=0, video=film)
         assert report.verified, report
-        taken = (frame for i, frame in enumerate(imageio.get_reader(film)) if i % EVERY == 0)
-        frames = [Image.fromarray(frame).resize(SIZE) for frame in taken]
+        reader: Any = imageio.get_reader(film)
+        frames = [Image.fromarray(frame).resize(SIZE) for i, frame in enumerate(reader) if i % EVERY == 0]
     pause = round(1000 * EVERY / 12)
     frames[0].save(TARGET, save_all=True, append_images=frames[1:], duration=pause, loop=0, quality=QUALITY, method=6)
     print(f"{TARGET.name}: {len(frames)} frames, {TARGET.stat().st_size:,} bytes")

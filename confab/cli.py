@@ -122,6 +122,7 @@ OUT = click.option("--out", type=PATH, default=Path("confab-out"), metavar="DIR"
     "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
 )
 @click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write the plan and its reasons as a page.")
 @SCENE_IRI
 @AS_JSON
 def plan(
@@ -137,6 +138,7 @@ def plan(
     diff: str | None,
     engine: str | None,
     level: int | None,
+    report: Path | None,
     iri: str | None,
     as_json: bool,
 ) -> None:
@@ -158,6 +160,8 @@ def plan(
     result = loaded.plan(
         goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
     )
+    if report is not None:
+        result.report(report)
     _print(result.json() if as_json else result)
     raise Exit(EXIT[result.outcome.status.value])
 
@@ -231,6 +235,7 @@ def verify(
 @MODE
 @SEED
 @click.option("--save", type=PATH, metavar="EPISODE.ttl", help="Write the episode here.")
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write what happened as a page.")
 @SCENE_IRI
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
@@ -247,6 +252,7 @@ def execute(
     mode: str,
     seed: int,
     save: Path | None,
+    report: Path | None,
     iri: str | None,
     perturb: bool,
     both_hands: bool,
@@ -281,6 +287,8 @@ def execute(
             newest.save(memory)
     if save is not None:
         execution.save(save)
+    if report is not None:
+        execution.report(report)
     _print(execution.json() if as_json else execution)
     raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
@@ -367,19 +375,39 @@ def query(
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE…", help="Scenes to gather experience in.")
 @click.option("--memory", type=PATH, required=True, metavar="FILE", help="Memory file to learn into; made if missing.")
 @click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
+@click.option("--plot", type=PATH, metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF.")
+@click.option(
+    "--rounds",
+    type=click.IntRange(1),
+    metavar="N",
+    help="How often all scenes are gone through.",
+)
 @AS_JSON
-def learn(scenes: tuple[str, ...], memory: Path, demonstration: Path | None, as_json: bool) -> None:
+def learn(
+    scenes: tuple[str, ...],
+    memory: Path,
+    demonstration: Path | None,
+    plot: Path | None,
+    rounds: int | None,
+    as_json: bool,
+) -> None:
     """Learn how scenes are best solved, or from a demonstration."""
+    from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
 
     remembered: Memory | None = None
-    status = YES
+    status, curve = YES, Curve()
+    if plot is not None:
+        require_drawable(plot)
+    rounds = rounds or (6 if plot is not None and len(scenes) == 1 else 1)
     with undisturbed(memory):
-        for name in scenes:
+        for name in scenes * rounds:
             loaded = _load(name)
             if remembered is None:
                 remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+            if plot is not None:
+                curve.measure(name, loaded, remembered)
             links = remembered.links
             if demonstration:
                 remembered.learn(loaded, read_plan(demonstration, loaded.problem))
@@ -396,6 +424,8 @@ def learn(scenes: tuple[str, ...], memory: Path, demonstration: Path | None, as_
         assert remembered is not None
         if remembered.experience.episodes:
             remembered.save(memory)
+    if plot is not None:
+        curve.save(plot)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
     _print(data if as_json else f"{memory}: {remembered!r}")
     raise Exit(status)

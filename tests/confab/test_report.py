@@ -11,8 +11,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import confab
+from confab.cli import app
 from confab.memory import Memory
 from confab.report import report_html
 from confab.report.course import of_episode, of_plan, of_rollout
@@ -223,3 +225,16 @@ def test_in_a_browser_nothing_runs_over_or_fails_and_a_click_is_followed(
     assert told["faults"] == []
     assert told["cursor"] == "block"
     assert ":" in told["told"]
+
+
+def test_plan_and_execute_write_a_page_and_learning_a_curve(tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    page, curve = tmp_path / "page.html", tmp_path / "curve.svg"
+    assert run(app, ["plan", "beverage-serving", "--report", str(page)]).exit_code == 0
+    assert page.read_text().startswith("<!doctype html>")
+    assert run(app, ["execute", "beverage-serving", "--report", str(page)]).exit_code == 0
+    assert "✓ reached" in page.read_text()
+    learn = ["learn", "beverage-serving", "--memory", str(tmp_path / "m.ttl")]
+    assert run(app, [*learn, "--plot", str(curve), "--rounds", "2"]).exit_code == 0
+    assert "</svg>" in curve.read_text()
+    assert run(app, [*learn, "--plot", str(tmp_path / "curve.txt")]).exit_code != 0

@@ -1,0 +1,85 @@
+"""Learning made visible: how many expansions planning takes as a memory grows, episode by episode, on anyone's scenes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planner.plan import Status
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import LimitError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from confab.memory import Memory
+    from confab.scene import Scene
+
+KINDS = (".png", ".svg", ".pdf")
+MODES = {"guarded": "by default", "paper": "the paper's mode"}
+SECONDS = 20.0
+"""After so long a planning call is left out of the picture."""
+
+
+@dataclass
+class Curve:
+    """Expansions per episode and mode, without memory and with what was learned before that episode; None where it gave up."""
+
+    scenes: list[str] = field(default_factory=list)
+    with_memory: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
+    without: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
+
+    def measure(self, name: str, scene: Scene, memory: Memory) -> None:
+        """Plan in a scene with a memory as it is now, and without any."""
+        seen = self.scenes.index(name) if name in self.scenes else None
+        self.scenes.append(name)
+        for mode in MODES:
+            self.with_memory[mode].append(_expansions(scene, memory, mode))
+            again = _expansions(scene, None, mode) if seen is None else self.without[mode][seen]
+            self.without[mode].append(again)
+
+    def save(self, path: Path) -> Path:
+        """Draw the curves into a file, and return which."""
+        from confab.picturing import save, words_as_they_are
+
+        require_drawable(path)
+        with words_as_they_are():
+            return save(self._figure(), path, dpi=120)
+
+    def _figure(self) -> Figure:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8, 4.2), layout="constrained")
+        axes = figure.subplots()
+        episodes = range(1, len(self.scenes) + 1)
+        for mode, color, marker in zip(MODES, ("#0072b2", "#d55e00"), ("o", "s"), strict=True):
+            for values, style, what in ((self.without, "--", "without memory"), (self.with_memory, "-", "with memory")):
+                shown = [float("nan") if value is None else value for value in values[mode]]
+                if any(value is not None for value in values[mode]):
+                    axes.plot(episodes, shown, style, color=color, marker=marker, ms=5, label=f"{MODES[mode]}, {what}")
+        axes.set_ylim(bottom=0)
+        axes.set_xticks(list(episodes) if len(self.scenes) <= 20 else [])
+        axes.set_xlabel("episode: what was learned before it is known")
+        axes.set_ylabel("expansions")
+        axes.set_title("Expansions of planning as memory grows", fontsize=11)
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
+        return figure
+
+
+def require_drawable(path: Path) -> None:
+    """Raise `KnowledgeError` if there is no such kind of picture."""
+    if path.suffix.lower() not in KINDS:
+        raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {', '.join(KINDS)}")
+
+
+def _expansions(scene: Scene, memory: Memory | None, mode: str) -> int | None:
+    """Return how many expansions planning takes, or None if that isn't known in time."""
+    try:
+        outcome = scene.plan(memory=memory, mode=mode, time_limit=SECONDS, engine="none").outcome
+    except (KnowledgeError, LimitError):
+        return None
+    if outcome.status is not Status.SOLVED:
+        return None
+    return sum(counts.expanded for counts in outcome.search.values())
