@@ -87,7 +87,9 @@ MEMORY_FILE = click.option(
     "--memory", type=PATH, metavar="FILE", help="The only place where memory is read or written."
 )
 NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan without memory, in so many words.")
-MODE = click.option("--mode", default="guarded", metavar="MODE", help="guarded, leading, strict, or paper (A*, eq. 5).")
+MODE = click.option(
+    "--mode", default="guarded", metavar="MODE", help="guarded, leading, strict, optimal, or paper (eq. 5)."
+)
 TIME_LIMIT = click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0),
@@ -107,7 +109,9 @@ OUT = click.option("--out", type=PATH, default=Path("confab-out"), metavar="DIR"
 @NO_MEMORY
 @MODE
 @TIME_LIMIT
-@click.option("--optimal", is_flag=True, help="Improve until proved optimal or the limit (10 s); tell the bound.")
+@click.option(
+    "--optimal", is_flag=True, help="--mode optimal: improve until proved or the limit (10 s); tell the bound."
+)
 @click.option(
     "--levels",
     default="free",

@@ -412,7 +412,7 @@ class Scene:
         mode : str
             ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
             ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
-            it; behaviours are then numbered among the individuals that were recognised.
+            it; behaviours are then numbered among the individuals that were recognised. ``optimal``: as `optimal` says.
         time_limit : float or Deadline, optional
             Seconds after which the call gives up, or when; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
         optimal : bool
@@ -439,8 +439,16 @@ class Scene:
             raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
         if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
             raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
-        if optimal and (mode == "paper" or memory is not None):
-            raise KnowledgeError("the optimal search uses neither memory nor the paper's mode; leave one out")
+        if optimal and mode not in (DEFAULT_MODE, "optimal"):
+            raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {mode}; leave one out")
+        optimal = optimal or mode == "optimal"
+        if optimal and (memory is not None or not leave_levels):
+            what = (
+                "uses no memory"
+                if memory is not None
+                else "compares plans of the lowest level, so it may leave the others"
+            )
+            raise KnowledgeError(f"the optimal search {what}; leave one option out")
         self._settle()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")

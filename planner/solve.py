@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import Limits, Outcome
+from planner.plan import Limits, Outcome, Reason
 from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -118,7 +118,14 @@ def _paper(request: Request) -> Outcome:
         limits=request.limits,
         grounds=request.grounds,
         leave_levels=request.leave_levels,
+        proof=_proof,
     )
+
+
+def _proof(problem: Problem) -> Reason | None:
+    from planner.hierarchical.unsolvability import impossible
+
+    return impossible(problem)
 
 
 Mode: TypeAlias = "Callable[[Request], Outcome]"

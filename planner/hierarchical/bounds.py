@@ -19,15 +19,12 @@ from time import perf_counter
 from planner.grounded.grounding import ground
 from planner.grounded.shortest import Bound, shortest, ways
 from planner.grounded.task import Task
-from planner.hierarchical.planner import Compiled, compiled
+from planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.serialization import closed, refusal
 from planner.plan import Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from planner.validation import validate
 from reasoner.symbols import Problem
-
-SEARCHING = 0.9
-"""Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
 
 def plan(

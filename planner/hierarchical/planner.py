@@ -1,4 +1,4 @@
-"""The fast planner: proofs first, then goals in series, then flat search; what is found is shortened.
+"""The fast planner: goals in series, proofs where these get stuck, then flat search; what is found is shortened.
 
 Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
 never that there is no plan.
@@ -6,8 +6,8 @@ never that there is no plan.
 ======================  ==============================================  ==============================
 stage                   decides                                         module
 ======================  ==============================================  ==============================
-static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
+static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
 relaxed reachability    that a goal can't be reached                    `planner.grounded.reachability`
 flat search             the rest, both ways, until a limit comes        `planner.grounded.best_first`
 ======================  ==============================================  ==============================
@@ -25,7 +25,6 @@ from planner.hierarchical.postoptimization import Improver, length, put_aside
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
 from planner.hierarchical.subplans import LimitError, Watch, nobody
-from planner.hierarchical.unsolvability import contested, unattainable
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status
 from reasoner.symbols import FALSE, Problem
@@ -103,9 +102,6 @@ def _plan(
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         return call.outcome(status, plan, reason, perf_counter() - begin)
 
-    impossible = unattainable(call.segments) or contested(call.segments)
-    if impossible:
-        return outcome(Status.UNSOLVABLE, reason=impossible)
     try:
         if call.serialise() or call.anew(list(dict(call.ladder))):
             if improve:
@@ -164,7 +160,7 @@ def reordered(call: Call) -> list[RefinedStep]:
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.expanded)
-        other.proved = True  # there is a plan
+        other.doubted = other.proved = True  # there is a plan
         other.ladder = [(level, attempt) for level, attempt in other.ladder if level == first]
         with suppress(LimitError):
             done = other.together(first, SOME) if at_once else other.serialise()

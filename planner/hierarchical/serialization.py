@@ -22,6 +22,7 @@ from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
 from planner.hierarchical.subplans import Effort, LimitError, Segments
 from planner.hierarchical.subproblem import Width
+from planner.hierarchical.unsolvability import impossible
 from planner.plan import Outcome, OutOfTimeError, Plan, Reason, Status, Step, TooLargeError
 from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
@@ -114,7 +115,7 @@ class Call:
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
-        self.proved = False
+        self.doubted = self.proved = False
         self.restarts = 0
         self.gone_back = False
         self.wary = False
@@ -192,6 +193,11 @@ class Call:
             if none:  # where goals wait for each other, none waits
                 yield from asleep
 
+        if not self.doubted:
+            self.doubted = True
+            reason = impossible(self.problem, self.program)
+            if reason:
+                raise UnsolvableError(reason)
         for level, attempt in self.ladder:
             if attempt is not LONGER and len(self.goal) - len(self.kept) >= COSTLY:
                 self.segments.watch(None)

@@ -13,12 +13,20 @@ from typing import TypeAlias
 from planner.hierarchical.operators import Achieve, Achiever, Program
 from planner.hierarchical.subplans import Segments
 from planner.plan import Reason
-from planner.transitions import Cell, arguments_of
-from reasoner.symbols import FALSE, Behavior, Fact, RelationCondition, Symbol, ValueCondition, Witness
+from planner.transitions import Cell, Table, arguments_of, key_of
+from reasoner.symbols import FALSE, Behavior, Fact, Problem, RelationCondition, Symbol, ValueCondition, Witness
 
 Achievers: TypeAlias = "Mapping[tuple[str, int], Achieve]"
 Asked: TypeAlias = "dict[tuple[Cell, str], bool]"
 """For each value of a symbol whether it counts as attainable."""
+
+
+def impossible(problem: Problem, program: Program | None = None) -> Reason | None:
+    """Return why a problem has no plan, if that can be shown at once; what was compiled for it before serves again."""
+    goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
+    table = Table(problem.domain.situations, problem.initial)
+    start = Segments(program or Program(problem), table, goal)
+    return unattainable(start) or contested(start)
 
 
 def unattainable(segments: Segments) -> Reason | None:

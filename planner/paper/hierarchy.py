@@ -24,6 +24,11 @@ from reasoner.symbols import GroundBehavior, Problem
 SETTLED, UNSETTLED = "settled", "unsettled"
 """Whether a symbol that wasn't at rest in the beginning is at rest or still untouched: see `Target`."""
 
+DOUBT = 1_000
+"""Expansions after which it is asked once whether there can be a plan at all."""
+Proof: TypeAlias = "Callable[[Problem], Reason | None]"
+"""Says why a problem has no plan, if that can be shown at once."""
+
 Refined: TypeAlias = "tuple[Step, Values] | None"
 """A behaviour with its refinement and the state that it really leads to; None if it has no refinement."""
 
@@ -38,10 +43,24 @@ class Call:
     constants: PaperConstants
     limits: Limits
     deadline: float | None
+    proof: Proof
+    expanded: int = 0
     counts: dict[int, Counts] = field(default_factory=dict)
     known: dict[tuple[Values, GroundBehavior], Refined] = field(default_factory=dict)
     fallbacks: int = 0
     gave_up: bool = False
+
+
+class UnsolvableError(Exception):
+    """A proof that there is no plan came up; the reason is its argument."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
+
+
+def unproved(problem: Problem) -> None:
+    """Show nothing."""
 
 
 def plan(
@@ -51,6 +70,7 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None,
     leave_levels: bool = True,
+    proof: Proof = unproved,
 ) -> Outcome:
     """Plan in the paper's mode: A* with eq. (5) on each level, refined level by level.
 
@@ -66,6 +86,8 @@ def plan(
         As `reasoner.reading.quantification` returns them; quantified here from the problem's classes if left out.
     leave_levels : bool
         Whether the level below is given the goal where a level has no plan that can be refined.
+    proof : Proof
+        Asked once, after `DOUBT` expansions.
 
     Returns
     -------
@@ -73,10 +95,13 @@ def plan(
     """
     begin = perf_counter()
     levels = problem.domain.levels
-    call = _call(problem, levels, links, constants, limits, grounds)
+    call = _call(problem, levels, links, constants, limits, grounds, proof)
     steps = None
     for level in levels:
-        steps = task(call, level)
+        try:
+            steps = task(call, level)
+        except UnsolvableError as error:
+            return Outcome(Status.UNSOLVABLE, None, error.reason, call.counts, 0, perf_counter() - begin)
         if steps is not None or call.gave_up:
             break
         if not leave_levels and level != levels[-1]:
@@ -95,7 +120,7 @@ def flat(
 ) -> Outcome:
     """Search one level alone with the same f, without the hierarchy: what the hierarchy is measured against."""
     begin = perf_counter()
-    call = _call(problem, (level,), links, constants, limits, None)
+    call = _call(problem, (level,), links, constants, limits, None, unproved)
     return _outcome(call, task(call, level), perf_counter() - begin)
 
 
@@ -106,6 +131,7 @@ def _call(
     constants: PaperConstants,
     limits: Limits,
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None,
+    proof: Proof,
 ) -> Call:
     return Call(
         model=Model(problem),
@@ -114,6 +140,7 @@ def _call(
         constants=constants,
         limits=limits,
         deadline=None if limits.seconds is None else perf_counter() + limits.seconds,
+        proof=proof,
         counts={level: Counts() for level in levels},
     )
 
@@ -217,6 +244,9 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
     rank = ranker(call, level)
 
     def successors(state: Values) -> Iterable[Applied]:
+        call.expanded += 1
+        if call.expanded == DOUBT and (reason := call.proof(call.model.problem)):
+            raise UnsolvableError(reason)
         base, marks = state[:size], state[size:]
         for applied in call.model.successors(grounds, base):
             after = applied.after

@@ -1,13 +1,17 @@
 """Planning from what was seen, and planning with a proved bound."""
 
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 import confab
+from confab import cli
 from confab.authoring import new_domain
-from planner.plan import Status
+from planner.plan import Outcome, Plan, Status
+from planner.solve import MODES
 from reasoner.generate import write_scene
+from reasoner.memory.links import Links
 from reasoner.reading.observed import save_observed
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import Symbol
@@ -34,8 +38,38 @@ def test_the_bound_is_no_more_than_the_plan_costs(scene: confab.Scene) -> None:
 
 
 def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> None:
-    with pytest.raises(confab.KnowledgeError, match="neither memory nor the paper's mode"):
+    with pytest.raises(confab.KnowledgeError, match="and not --mode paper"):
         scene.plan(optimal=True, mode="paper")
+    with pytest.raises(confab.KnowledgeError, match="may leave the others"):
+        scene.plan(mode="optimal", leave_levels=False)
+    with pytest.raises(confab.KnowledgeError, match="uses no memory"):
+        scene.plan(mode="optimal", memory=Links())
+
+
+def test_the_mode_and_the_option_of_the_optimal_search_are_one(scene: confab.Scene) -> None:
+    assert scene.plan(mode="optimal", time_limit=1.0).outcome.bound is not None
+
+
+def test_a_plan_that_the_checker_rejects_never_leaves_the_command_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nothing = Outcome(Status.SOLVED, Plan(()))
+    monkeypatch.setitem(cast("dict[str, object]", MODES), "guarded", lambda request: nothing)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["plan", "beverage-serving"])
+    printed = capsys.readouterr()
+    assert ended.value.code == 4
+    assert printed.out == ""
+    assert "returned steps that are no plan" in printed.err
+
+
+def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_path: Path) -> None:
+    write_scene(tmp_path / "table.ttl", "unsolvable")
+    for mode in MODES:
+        outcome = confab.load(tmp_path / "table.ttl").plan(mode=mode).outcome
+        assert outcome.status is Status.UNSOLVABLE, mode
+        assert outcome.reason is not None
+        assert "no Hand canReach" in outcome.reason.text
 
 
 def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:
