@@ -11,17 +11,17 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 import confab
-from reasoner.embodiment.values import Embodiment
+from reasoner.embodiment.values import Embodiment, SkillUse
 from reasoner.symbols import Symbol
 from sim.bodies import outer_radius
 from sim.faults import displaced, lying
-from sim.skills import skill
+from sim.skills import perform
 from sim.staging import Perturbation
 from sim.verdict import SkillError
 from sim.world import World
@@ -81,13 +81,13 @@ def look_at(embodiment: Embodiment, symbols: Sequence[Symbol], seed: int, tally:
         _disturb(world, truth, rng)
         tally.add(world, truth)
         uses = {use.skill: use for use in embodiment.skills.values()}
-        hand, name = _taken(world, truth, rng, uses["reach"].numbers)
+        hand, name = _taken(world, truth, rng, uses["reach"])
         if not name:
             return False
         _set(embodiment, truth, "perceive_hand_position", hand, name)
         tally.add(world, truth)
         for step, roles in (("grasp", {"hand": hand, "object": name}), ("lift", {"hand": hand, "object": name})):
-            skill(step)(world, roles, uses[step].numbers)
+            perform(world, uses[step], roles)
             if step == "grasp":
                 _set(embodiment, truth, "perceive_held", hand, name)
             else:
@@ -142,7 +142,7 @@ def _free(world: World, name: str, spot: np.ndarray[tuple[int, ...], np.dtype[np
     return inside and away > 0.065 and min(gaps) > 2.2 * outer_radius(world.bodies[name].shape)
 
 
-def _taken(world: World, truth: Truth, rng: np.random.Generator, numbers: Mapping[str, float]) -> tuple[str, str]:
+def _taken(world: World, truth: Truth, rng: np.random.Generator, reach: SkillUse) -> tuple[str, str]:
     """Let some hand reach for some object that stands at a place; return both, or empty names if none can."""
     uses = world.embodiment.perceivers
     standing = [
@@ -152,7 +152,7 @@ def _taken(world: World, truth: Truth, rng: np.random.Generator, numbers: Mappin
     for i in rng.permutation(len(pairs)):
         hand, name = pairs[i]
         try:
-            skill("reach")(world, {"hand": hand, "target": name}, numbers)
+            perform(world, reach, {"hand": hand, "target": name})
         except SkillError:
             if not np.allclose(world.hands[hand].posture, world.hands[hand].hand.home):
                 return "", ""  # it has set out, and isn't where anybody could say

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.collision import Mover
 from sim.engine import Engine
 from sim.motion import (
     SWIVELS,
@@ -34,24 +35,36 @@ from sim.verdict import SkillError
 CLOSE = 0.002
 """Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
 
+ROUNDED = 3
+"""Samples over which corners of a path are rounded, on either side, if nothing is near them."""
+
+THIN = 0.01
+"""Metres by which fingers are open around a handle."""
+
 BATCH, ENOUGH = 24, 6
 """Candidates checked for collisions at a time, and how many good ones end the search."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One execution of a skill: the world, the hand, what it holds, and bodies' positions and stray beads before it."""
+    """One execution of a skill: the world, the hand, what it holds, and where bodies and stray beads were before it.
+
+    `before` has by body what carried it (a drawer, say), and where it was in its carrier's frame.
+    """
 
     world: Engine
     hand: Manipulator
     held: str | None
-    before: Mapping[str, Array]
+    before: Mapping[str, tuple[str, Array]]
     stray: int
 
     @classmethod
     def begin(cls, world: Engine, hand: str) -> Attempt:
         """Return an attempt that begins now."""
-        before = {name: world.truth(name)[1] for name in world.bodies}
+        before = {}
+        for name in world.bodies:
+            carrier = world.carried_by(name)
+            before[name] = carrier, _seen_from(world, carrier, name)
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
@@ -75,18 +88,18 @@ class Attempt:
 
     # ------------------------------------------------------------------------------------------------- where to
 
-    def reacher(self, *ignored: str, margin: float = MARGIN, opened: bool = False) -> Reacher:
-        """Return the arm, with what it holds and perhaps `opened` fingers, among its surroundings less the `ignored` things."""
-        mover = self.hand.mover(opened)
+    def reacher(self, *ignored: str, margin: float = MARGIN, opening: float | None = None) -> Reacher:
+        """Return the arm, with what it holds, maybe fingers at another `opening`, among its surroundings less the `ignored`."""
+        mover = self.hand.mover(opening)
         if self.held is not None:
             mover = mover.holding(self.world.load_spheres(self.hand, self.held))
         around = self.world.surroundings(self.hand.hand.name, self.held).without(*ignored)
         return Reacher(mover, around, margin)
 
-    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opened: bool = False) -> list[int]:
+    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None) -> list[int]:
         """Return candidates for which every stage is reachable and free, the most comfortable first.
 
-        With `opened`, the fingers are taken to be open, as they will be when the hand lets go.
+        With an `opening`, the fingers are taken to be open so far, as they will be when the hand lets go.
 
         Raises
         ------
@@ -94,16 +107,16 @@ class Attempt:
             There is none: `unreachable` with the missing metres, or `goal in collision` with what is in the way.
         """
         with self.planning():
-            reacher = self.reacher(opened=opened)
+            reacher = self.reacher(opening=opening)
             left, solved = np.arange(len(stages[0].poses)), list[Array]()
             for stage in stages:
-                q, valid = reacher.solve(stage.poses[left])
+                q, valid = replace(reacher, joint_margin=reacher.joint_margin + stage.slack).solve(stage.poses[left])
                 left, solved = left[valid], [before[valid] for before in (*solved, q)]
                 if not len(left):
                     missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
                     raise SkillError("unreachable", objects, beyond_m=missing)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
-            return [int(left[i]) for i in _free(reacher, stages, solved, order, objects)]
+            return [int(left[i]) for i in _free(reacher, self.hand.mover(THIN), stages, solved, order, objects)]
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
         """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""
@@ -122,13 +135,19 @@ class Attempt:
         limits = self.hand.limits
         return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
 
-    def follow(self, q: Array) -> None:
-        """Drive the arm along sampled postures, from where it is."""
+    def follow(
+        self, q: Array, speed: float = 1.0, enough: Callable[[], bool] | None = None, corners: int = ROUNDED
+    ) -> None:
+        """Drive the arm along sampled postures, from where it is, at a share of its speed, until it is `enough`.
+
+        Corners are rounded over as many samples as `corners` says.
+        """
         with self.planning():
-            q = np.concatenate([self.hand.posture[None], q[1:]])
-            positions, velocities = timed(self.hand.arm, smooth(q), self.limits, self.world.rate)
+            q, limits = np.concatenate([self.hand.posture[None], q[1:]]), self.limits
+            limits = replace(limits, hand_velocity=limits.hand_velocity * speed)
+            positions, velocities = timed(self.hand.arm, smooth(q, corners), limits, self.world.rate)
         try:
-            self.world.follow(self.hand, positions, velocities)
+            self.world.follow(self.hand, positions, velocities, enough)
         except SkillError as failure:
             if self.held is None or self.world.held(self.hand.hand.name) == self.held:
                 raise
@@ -137,35 +156,55 @@ class Attempt:
                 "slip or drop", named(self.held, *stopped.objects), "it was lost on the way", **stopped.measured
             ) from failure
 
-    def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str) -> int:
-        """Move to the first goal pose that a free path leads to; return its position in the sequence."""
+    def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None) -> int:
+        """Move to the first goal pose that a free path leads to, maybe with fingers that go to an `opening`; return which it is."""
         with self.planning():
-            found, reacher = None, self.reacher(*ignored)
+            found, reacher = None, self.reacher(*ignored, opening=opening)
             start = self.hand.pose
-            near = [turned_near(start, goal) for goal in goals]
+            targets = [turned_near(start, goal) for goal in goals]
             for attempts in (0, 150):
-                for i, goal in enumerate(near):
-                    corners = connect(reacher, start, goal, self.world.rng, attempts)
-                    if corners is not None:
-                        found = i, reacher.solve(polyline(corners))[0]
+                for i, goal in enumerate(targets):
+                    turns = connect(reacher, start, goal, self.world.rng, attempts)
+                    if turns is not None:
+                        found = i, reacher.solve(polyline(turns))[0]
                         break
                 if found is not None:
                     break
             if found is None:
-                blame = reacher.blame(line(start, near[0]))
+                blame = reacher.blame(line(start, targets[0]))
                 raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
-        self.follow(found[1])
+            near = replace(reacher, margin=CLOSE)
+            corners = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(found[1], n)).all()), 0)
+        self.follow(found[1], corners=corners)
         return found[0]
 
-    def straight(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
-        """Move along the straight line to a pose; raise if it isn't free."""
+    def straight(
+        self,
+        goal: Array,
+        objects: tuple[str, ...],
+        *ignored: str,
+        speed: float = 1.0,
+        enough: Callable[[], bool] | None = None,
+    ) -> None:
+        """Move along the straight line to a pose, or until it is `enough`; raise if it isn't free."""
+        self.along(line(self.hand.pose, goal), objects, *ignored, speed=speed, enough=enough)
+
+    def along(
+        self,
+        poses: Array,
+        objects: tuple[str, ...],
+        *ignored: str,
+        speed: float = 1.0,
+        enough: Callable[[], bool] | None = None,
+    ) -> None:
+        """Move along sampled poses, or until it is `enough`; raise if they can't be followed."""
         with self.planning():
-            poses, reacher = line(self.hand.pose, goal), self.reacher(*ignored, margin=CLOSE)
+            reacher = self.reacher(*ignored, margin=CLOSE)
             q = reacher.follow(poses)
             if q is None:
                 blame = reacher.blame(poses)
                 raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)
-        self.follow(q)
+        self.follow(q, speed, enough)
 
     def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
         """Go up in a line, the elbow turning as it must."""
@@ -189,11 +228,11 @@ class Attempt:
 
     def check_others(self, numbers: Numbers, *moved: str) -> None:
         """Raise if something other than the `moved` objects and the held one was disturbed or toppled."""
-        for name, position in self.before.items():
+        for name, (carrier, position) in self.before.items():
             if name in (*moved, self.held, *self.world.elsewhere) or name not in self.world.bodies:
                 continue
-            rotation, now = self.world.truth(name)
-            shift = float(np.linalg.norm(now - position))
+            rotation = self.world.truth(name)[0]
+            shift = float(np.linalg.norm(_seen_from(self.world, carrier, name) - position))
             if tilt_of(rotation) > 0.5:
                 raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
             if shift > numbers["disturbance"]:
@@ -221,8 +260,16 @@ class Attempt:
         return {"tip_error_m": error}
 
 
+def _seen_from(world: Engine, carrier: str, body: str) -> Array:
+    """Return where a body is in the frame of what carries it."""
+    turned, origin = world.carrier(carrier)
+    local: Array = (world.truth(body)[1] - origin) @ turned
+    return local
+
+
 def _free(
     reacher: Reacher,
+    closed: Mover,
     stages: Sequence[Stage],
     postures: Sequence[Array],
     order: NDArray[np.intp],
@@ -236,7 +283,7 @@ def _free(
     for start in range(0, len(order), BATCH):
         batch = order[start : start + BATCH]
         clear = np.full(len(batch), np.inf)
-        for name, gap in _gaps(reacher, stages, [q[batch] for q in postures]).items():
+        for name, gap in _gaps(reacher, closed, stages, [q[batch] for q in postures]).items():
             clear = np.minimum(clear, gap)
             blocked[name] += int(np.sum(gap <= reacher.margin))
             best[name] = max(best.get(name, -np.inf), float(gap.max()))
@@ -251,12 +298,15 @@ def _free(
     return chosen
 
 
-def _gaps(reacher: Reacher, stages: Sequence[Stage], postures: Sequence[Array]) -> dict[str, Array]:
+def _gaps(reacher: Reacher, closed: Mover, stages: Sequence[Stage], postures: Sequence[Array]) -> dict[str, Array]:
     """Return how near to each thing the candidates come, at the stage where they come nearest."""
     nearest: dict[str, Array] = {}
     for stage, q in zip(stages, postures, strict=True):
-        for name, gap in reacher.mover.clearances(q, reacher.around.without(*stage.ignored)).items():
-            nearest[name] = np.minimum(gap, nearest.get(name, np.inf))
+        around = reacher.around if stage.around is None else stage.around
+        mover = reacher.mover if not stage.closed else closed
+        for name, gap in mover.clearances(q, around.without(*stage.ignored)).items():
+            spare = MARGIN - CLOSE if stage.near else 0.0
+            nearest[name] = np.minimum(gap + spare, nearest.get(name, np.inf))
     return nearest
 
 

@@ -23,6 +23,9 @@ from sim.urdf import Array
 PLANKS = 12
 """Flat boxes per ring of a vessel's wall."""
 
+STEP = 0.001
+"""Metres up to which a piece of a turned solid's outline is a step, with nothing in it."""
+
 SIDES = 40
 """Corners of a circle to the eye."""
 
@@ -140,6 +143,36 @@ def _revolved(shape: Shape) -> str:
     return "\n".join(lines) + "\n"
 
 
+def make_turned(client: int, shape: Shape, position: Array, orientation: Array) -> int:
+    """Make a solid of revolution, a lid with a knob say: a cylinder per segment of its outline."""
+    lines = []
+    for (low, below), (high, above) in pairwise(shape.profile):
+        if high - low <= STEP:
+            continue
+        where = f'<origin xyz="0 0 {(low + high) / 2:.6f}"/>'
+        form = f'<geometry><cylinder radius="{(below + above) / 2:.6f}" length="{high - low:.6f}"/></geometry>'
+        color = f'<material name="turned"><color rgba="{" ".join(str(part) for part in shape.color)}"/></material>'
+        lines += ["<visual>", where, form, color, "</visual>", "<collision>", where, form, "</collision>"]
+    radius, height = max(r for _, r in shape.profile), shape.profile[-1][0]
+    inertia = shape.mass * (radius**2 / 4 + height**2 / 12)
+    text = TURNED.format(center=center_height(shape), mass=shape.mass, inertia=inertia, solids="\n".join(lines))
+    with tempfile.TemporaryDirectory() as folder:
+        urdf = Path(folder) / "turned.urdf"
+        urdf.write_text(text)
+        body = pybullet.loadURDF(
+            str(urdf), position.tolist(), orientation.tolist(), useMaximalCoordinates=True, physicsClientId=client
+        )
+    return _rub(client, shape, body)
+
+
+TURNED = """<robot name="turned"><link name="turned">
+<inertial><origin xyz="0 0 {center}"/><mass value="{mass}"/>
+<inertia ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial>
+{solids}
+</link></robot>
+"""
+
+
 def make_cylinder(client: int, shape: Shape, position: Array, orientation: Array) -> int:
     """Make a solid cylinder of `radius` and `height`."""
     radius, height = shape.numbers["radius"], shape.numbers["height"]
@@ -204,6 +237,7 @@ def _rub(client: int, shape: Shape, body: int) -> int:
 
 KINDS: Mapping[str, Kind] = {
     "vessel": Kind(make_vessel, vessel_radius, vessel_height),
+    "turned": Kind(make_turned, lambda s: max(radius for _, radius in s.profile), lambda s: s.profile[-1][0]),
     "cylinder": Kind(make_cylinder, lambda s: s.numbers["radius"], lambda s: s.numbers["height"]),
     "box": Kind(
         make_box, lambda s: math.hypot(s.numbers["width"], s.numbers["depth"]) / 2, lambda s: s.numbers["height"]
@@ -221,11 +255,21 @@ def height_of(shape: Shape) -> float:
     return KINDS[shape.kind].height(shape)
 
 
+def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
+    """Yield what motion planning takes a shape for: upright cylinders with their lower and upper ends and radii."""
+    if shape.kind != "turned":
+        yield 0.0, height_of(shape), outer_radius(shape)
+        return
+    for (low, below), (high, above) in pairwise(shape.profile):
+        if high - low > STEP:
+            yield low, high, max(below, above)
+
+
 def outline(shape: Shape) -> tuple[Array, Array]:
     """Return heights and outer radii that describe the shape from the side, for whatever stands upright."""
     if shape.profile:
         heights, radii = np.array(shape.profile).T
-        return heights, radii + wall(shape)
+        return heights, radii + (wall(shape) if shape.kind == "vessel" else 0.0)
     return np.array([0.0, height_of(shape)]), np.full(2, outer_radius(shape))
 
 

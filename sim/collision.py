@@ -18,13 +18,17 @@ from sim.urdf import Array, Model, Spheres
 
 @dataclass(frozen=True)
 class Solid:
-    """A named box (half extents) or cylinder (radius, radius, half height) with its centre and rotation in the world."""
+    """A named box (half extents) or cylinder (radius, radius, half height) with its centre and rotation in the world.
+
+    A `part` tells one solid of a thing from its others.
+    """
 
     name: str
     kind: str
     half: Array
     center: Array
     rotation: Array
+    part: str = ""
 
     def distance(self, points: Array) -> Array:
         """Return the signed distance of points (..., 3) from the surface."""
@@ -53,8 +57,8 @@ class Surroundings:
     owners: tuple[str, ...] = ()
 
     def without(self, *names: str) -> Surroundings:
-        """Return the surroundings less the solids of these names."""
-        return replace(self, solids=tuple(solid for solid in self.solids if solid.name not in names))
+        """Return the surroundings less the solids, or parts, of these names."""
+        return replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
 
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
         """Return the surroundings with more spheres."""
@@ -96,7 +100,8 @@ class Mover:
         for solid in around.solids:
             bottom, top = solid.bounds()
             if np.all(bottom <= high) and np.all(top >= low):
-                found[solid.name] = (solid.distance(centers) - radii).min(1)
+                gap = (solid.distance(centers) - radii).min(1)
+                found[solid.name] = np.minimum(gap, found.get(solid.name, np.inf))
         near = np.all(
             (around.centers + around.radii[:, None] >= low) & (around.centers - around.radii[:, None] <= high), -1
         )

@@ -8,15 +8,16 @@ Rule 3: every random number comes from `Engine.rng`, so the same arguments give 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Embodiment, Shape
-from sim.bodies import center_height, height_of, inner_radius, outer_radius, outline, vessel_height
+from sim.bodies import center_height, cylinders, height_of, inner_radius, outline, vessel_height
 from sim.collision import Solid, Surroundings, box, column
+from sim.mechanisms import Mechanic
 from sim.robot import Manipulator
 from sim.urdf import Array, Spheres
 from sim.verdict import SkillError
@@ -26,6 +27,9 @@ RATE = 240.0
 
 LAG = 0.08
 """Radians that a joint may stay behind its command."""
+
+BESIDE = 0.05
+"""Metres from a place up to which a body is at it; and below a place from which on it is no longer at it."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class Engine:
         self.bodies: dict[str, Thing] = {}
         self.hands: dict[str, Manipulator] = {}
         self.standing: dict[str, Spheres] = {}
+        self.mechanics: list[Mechanic] = []
+        self.links: dict[str, Mechanic] = {}  # by the names of their links
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
@@ -104,9 +110,12 @@ class Engine:
         """Simulate a number of steps with the motors' targets as they are."""
         begin, rendering = time.process_time(), self.clock.rendering
         hands = [hand for hand in self.hands.values() if hand.closing]
+        latching = [mechanic for mechanic in self.mechanics if mechanic.latching]
         for _ in range(steps):
             for hand in hands:
                 hand.drive()
+            for mechanic in latching:
+                mechanic.drive()
             pybullet.stepSimulation(physicsClientId=self.client)
             self.steps += 1
             if self.disturb is not None:
@@ -115,11 +124,16 @@ class Engine:
                 self.watch(self)
         self.clock.stepping += time.process_time() - begin - (self.clock.rendering - rendering)
 
-    def follow(self, hand: Manipulator, positions: Array, velocities: Array) -> None:
-        """Drive an arm along timed postures; raise `SkillError` if it stays behind its command."""
+    def follow(
+        self, hand: Manipulator, positions: Array, velocities: Array, enough: Callable[[], bool] | None = None
+    ) -> None:
+        """Drive an arm along timed postures until it is `enough`; raise `SkillError` if it stays behind its command."""
         for i, (q, v) in enumerate(zip(positions, velocities, strict=True)):
             hand.command(q, v)
             self.run(1)
+            if enough is not None and i % 2 == 1 and enough():
+                hand.command(hand.measured())
+                return
             if i % 6 == 5:
                 self.check_course(hand)
         hand.command(positions[-1])
@@ -191,16 +205,45 @@ class Engine:
         """Return a body's perceived position."""
         return self.sense(name)[1]
 
+    def blur(self) -> Array:
+        """Return by how much something is perceived to be elsewhere than it is."""
+        return self.rng.normal(0.0, self.noise, 3) if self.noise else np.zeros(3)
+
+    def carrier(self, name: str) -> tuple[Array, Array]:
+        """Return the frame of a link or body that carries places; that of the world for an empty name."""
+        if not name:
+            return np.eye(3), np.zeros(3)
+        return self.links[name].frame(name) if name in self.links else self.truth(name)
+
+    def place(self, name: str) -> Array:
+        """Return where a place is now."""
+        place = self.embodiment.places[name]
+        turned, origin = self.carrier(place.carrier)
+        point: Array = origin + turned @ np.array(place.position)
+        return point
+
+    def carried_by(self, name: str) -> str:
+        """Return the carrier of the place at which a body is: a link or a body; empty if it is at none that is carried."""
+        carried = [place for place in self.embodiment.places.values() if place.carrier not in ("", name)]
+        base = self.truth(name)[1]
+        gaps = {place.name: float(np.linalg.norm(self.place(place.name) - base)) for place in carried}
+        best = min(gaps, key=gaps.__getitem__, default="")
+        return self.embodiment.places[best].carrier if best and gaps[best] < BESIDE else ""
+
     def top(self, name: str) -> Array:
         """Return the middle of a body's perceived top: of a vessel, its mouth."""
         rotation, base = self.sense(name)
         return base + rotation[:, 2] * height_of(self.bodies[name].shape)
 
     def nearest_place(self, point: Array) -> tuple[str, float]:
-        """Return the place that is horizontally nearest to a point, and its distance."""
-        gaps = {n: float(np.hypot(*(point[:2] - place.position[:2]))) for n, place in self.embodiment.places.items()}
-        name = min(gaps, key=gaps.__getitem__)
-        return name, gaps[name]
+        """Return the place that is horizontally nearest to a point, and its distance; of two above one another the next below."""
+        points = {name: self.place(name) for name in self.embodiment.places}
+        gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
+        below = {name: float(point[2] - where[2]) for name, where in points.items()}
+        best = min(
+            gaps, key=lambda name: (below[name] < -BESIDE, round(gaps[name], 2), max(below[name], 0.0), gaps[name])
+        )
+        return best, gaps[best]
 
     def held(self, hand: str, force: float = 1.0) -> str | None:
         """Return the body that both fingers of a hand press with at least `force` newtons."""
@@ -237,16 +280,25 @@ class Engine:
 
     # ------------------------------------------------------------------------------------------------- surroundings
 
-    def surroundings(self, mover: str, held: str | None = None) -> Surroundings:
-        """Return what a hand must not touch: furniture, bodies as perceived, the robots' trunks and other arms."""
+    def surroundings(
+        self, mover: str, held: str | None = None, values: Mapping[str, float] | None = None
+    ) -> Surroundings:
+        """Return what a hand must not touch: furniture, bodies as perceived, the robots' trunks and other arms.
+
+        With `values` some links are taken to be elsewhere than they are.
+        """
         solids = [box(fixture) for fixture in self.embodiment.fixtures]
+        for mechanic in self.mechanics:
+            solids += mechanic.solids({**mechanic.values(), **(values or {})})
         for name, thing in self.bodies.items():
             if name != held:
-                rotation, base = self.sense(name)
-                half = height_of(thing.shape) / 2
-                radius = outer_radius(thing.shape)
-                size, center = np.array([radius, radius, half]), base + rotation[:, 2] * half
-                solids.append(Solid(name, "cylinder", size, center, rotation))
+                rotation, base = self._taken_along(name, values) if values else self.sense(name)
+                for low, high, radius in cylinders(thing.shape):
+                    size, center = (
+                        np.array([radius, radius, (high - low) / 2]),
+                        base + rotation[:, 2] * (low + high) / 2,
+                    )
+                    solids.append(Solid(name, "cylinder", size, center, rotation))
         around = Surroundings(tuple(solids))
         for name, spheres in self.standing.items():
             around = around.plus(name, spheres)
@@ -258,6 +310,35 @@ class Engine:
                     arm = arm.holding(self.load_spheres(other, load))
                 around = around.plus(name, Spheres(arm.at(other.posture[None])[0], arm.spheres.radii))
         return around
+
+    def _taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return where a body will be perceived when links have moved to `values` and taken along what they carry."""
+        rotation, base = self.sense(name)
+        link = self.carried_by(name)
+        if link not in values:
+            return rotation, base
+        mechanic = self.links[link]
+        before, origin = mechanic.frame(link)
+        after, target = mechanic.frame(link, {**mechanic.values(), **values})
+        return after @ before.T @ rotation, target + after @ before.T @ (base - origin)
+
+    def check_swing(self, link: str, values: Sequence[float]) -> None:
+        """Raise `SkillError` if a body stands where a link passes on its way through some values of its joint."""
+        mechanic = self.links[link]
+        for name, thing in self.bodies.items():
+            if self.carried_by(name) == link:
+                continue
+            rotation, base = self.sense(name)
+            spheres = column(*outline(thing.shape), bottom=height_of(thing.shape) / 10)
+            points = base + spheres.centers @ rotation.T
+            gaps = [
+                float((solid.distance(points) - spheres.radii).min())
+                for value in values[1:]
+                for solid in mechanic.solids({**mechanic.values(), link: value})
+                if solid.name == link
+            ]
+            if min(gaps, default=1.0) <= 0:
+                raise SkillError("no path", (link, name), f"{name} stands in the way of {link}", clearance_m=min(gaps))
 
     def in_hand(self, hand: Manipulator, body: str) -> tuple[Array, Array]:
         """Return a body's rotation and base in the hand's frame."""

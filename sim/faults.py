@@ -96,8 +96,7 @@ def hidden_wall(
 
     `size` is its extent in metres along the line from robot to object, across it, and up.
     """
-    place = world.embodiment.places.get(before)
-    target = world.truth(before)[1] if place is None else np.array(place.position)
+    target = world.place(before) if before in world.embodiment.places else world.truth(before)[1]
     base = np.array(world.embodiment.robots[0].position)
     away = (target - base)[:2] / np.linalg.norm((target - base)[:2])
     half = [extent / 2 for extent in size]

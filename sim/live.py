@@ -20,7 +20,7 @@ from reasoner.symbols import Fact, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
 from sim.engine import Bead, Engine, Thing
 from sim.perception import tilt_of
-from sim.skills import skill
+from sim.skills import perform
 from sim.staging import pour_in
 from sim.urdf import Array
 from sim.verdict import SkillError, Verdict
@@ -128,7 +128,7 @@ class LiveWorld:
         for name in ("lift",) if upright else ("stand_upright", "lift"):
             try:
                 if name in uses:
-                    skill(name)(self.world, {"hand": hand}, uses[name].numbers)
+                    perform(self.world, uses[name], {"hand": hand})
             except SkillError:
                 return
 
@@ -193,7 +193,7 @@ def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     beads = contents(world, name)
     rotation, base = world.truth(name)
     inside = [(world_position(world, bead) - base) @ rotation for bead in beads]
-    place = np.array(world.embodiment.places[value].position)
+    place = world.place(value)
     thing = world.bodies[name]
     _set(world, thing.body, np.array([*place[:2], place[2] + center_height(thing.shape)]))
     for bead, local in zip(beads, inside, strict=True):

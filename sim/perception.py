@@ -22,10 +22,11 @@ from sim.urdf import Array
 
 @dataclass
 class Draft:
-    """A world to be built: where bodies stand (place names) and what vessels are filled with."""
+    """A world to be built: where bodies stand (place names) what vessels are filled with, which links are open."""
 
     places: dict[str, str] = field(default_factory=dict)
     contents: dict[str, list[str]] = field(default_factory=dict)
+    opened: dict[str, bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
         return None
     rotation, position = world.sense(body)
     place, distance = world.nearest_place(position)
-    standing = abs(position[2] - world.embodiment.places[place].position[2]) < use.numbers["contact_height"]
+    standing = abs(position[2] - world.place(place)[2]) < use.numbers["contact_height"]
     if standing and distance < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
         return place
     if not standing and any(world.held(hand) == body for hand in world.hands):
@@ -105,7 +106,7 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
     point = world.hands[hand].frame()[1] if held is None else world.sense(held)[1]
     top = point if held is None else world.top(held)
     place, distance = world.nearest_place(point)
-    height = min(point[2], top[2]) - world.embodiment.places[place].position[2]
+    height = min(point[2], top[2]) - world.place(place)[2]
     if height >= numbers["raised"]:
         return use.values["raised"]
     if held is not None and height < numbers["contact_height"]:
@@ -128,6 +129,28 @@ def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
     return use.values["tilted"] if angle >= use.numbers["tilted_angle"] else None
 
 
+# ------------------------------------------------------------------------------------------ how a joint is
+
+
+def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return whether a link's joint is `opened` or `shut`, or None between the two."""
+    name = arguments[0]
+    if name not in world.links:
+        return None
+    link, value = world.links[name].link(name), world.links[name].values()[name]
+    if value >= link.opened:
+        return use.values.get("opened", "true")
+    return use.values.get("shut", "false") if value <= link.shut else None
+
+
+def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Open the link, or leave it shut."""
+    draft.opened[arguments[0]] = value == use.values.get("opened", "true")
+
+
+# ------------------------------------------------------------------------------------------ at rest
+
+
 def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]:
     """Return an arranger for hands: a world begins with them at rest, so only the special value can be set up."""
 
@@ -146,6 +169,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_content": Perceiver(observe_content, arrange_content, "under-pour"),
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected"),
+    "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck"),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),
 }
 

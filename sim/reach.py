@@ -7,14 +7,16 @@ from before and go up, within all joints' limits and without touching furniture 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
-from sim.collision import Surroundings, box, fixed_spheres, read_mover
+from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
 from sim.kinematics import read_arm
+from sim.linkage import with_open_mechanisms
 from sim.motion import Reacher
 from sim.stages import MARGIN, Numbers, grip_stages
 from sim.urdf import Model, read_urdf
@@ -45,11 +47,12 @@ def reach(embodiment: Embodiment) -> Reach:
     numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
     heights = sorted({body.shape.grasp_height for body in embodiment.bodies.values()}) or [settings[0]["empty_height"]]
     pairs = set()
+    places, solids = with_open_mechanisms(embodiment)
     for robot in embodiment.robots:
         model = read_urdf(robot.urdf, robot.position, robot.yaw)
         for hand in robot.hands:
-            reacher = _reacher(embodiment, robot, hand, model)
-            found = [p for p in embodiment.places.values() if all(_reaches(reacher, p, h, numbers) for h in heights)]
+            reacher = _reacher(embodiment, robot, hand, model, solids)
+            found = [place for place in places.values() if all(_reaches(reacher, place, h, numbers) for h in heights)]
             pairs |= {(hand.name, place.name) for place in found}
     return Reach(frozenset(pairs), fingerprint(embodiment))
 
@@ -62,18 +65,20 @@ def fingerprint(embodiment: Embodiment) -> str:
         values["urdf"] = hashlib.sha256(Path(robot.urdf).read_bytes()).hexdigest()
         parts.append(repr(values))
     parts += [repr(fixture) for fixture in embodiment.fixtures]
-    parts += [repr(place) for _, place in sorted(embodiment.places.items())]
+    parts += [f"Place(name={p.name!r}, position={p.position!r})" for _, p in sorted(embodiment.places.items())]
+    parts += [repr(place.carrier) for _, place in sorted(embodiment.places.items()) if place.carrier]
+    parts += [repr(mechanism) for mechanism in embodiment.mechanisms]
     parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
     reaching = [use.numbers for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
     parts += [repr(sorted((name, value) for name, value in uses.items() if name != "time_limit")) for uses in reaching]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model) -> Reacher:
+def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, solids: Sequence[Solid]) -> Reacher:
     """Return an open hand among the furniture and the robot's own trunk."""
     arms = [read_arm(model, other.arm, other.tip) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
-    around = Surroundings(tuple(box(fixture) for fixture in embodiment.fixtures))
+    around = Surroundings((*map(box, embodiment.fixtures), *solids))
     around = around.plus(robot.name, fixed_spheres(model, arms))
     return Reacher(read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening)), around, MARGIN)
 

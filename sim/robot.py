@@ -79,9 +79,9 @@ class Manipulator:
         states = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
         return tuple(state[0] for state in states)
 
-    def mover(self, opened: bool = False) -> Mover:
-        """Return the arm as spheres, its fingers as they are, or `opened`."""
-        openings = [self.hand.opening] * len(self.fingers) if opened else self.openings()
+    def mover(self, opening: float | None = None) -> Mover:
+        """Return the arm as spheres, its fingers as they are, or open by so many metres."""
+        openings = self.openings() if opening is None else [opening] * len(self.fingers)
         return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, openings, strict=True)))
 
     def command(self, q: Array, velocity: Array | None = None) -> None:
@@ -99,10 +99,10 @@ class Manipulator:
             physicsClientId=self.client,
         )
 
-    def open(self) -> None:
-        """Let the fingers go to their open position."""
+    def open(self, opening: float | None = None) -> None:
+        """Let the fingers go to their open position, or to another one."""
         self.closing, self.grasp = False, None
-        self._fingers_to(self.hand.opening)
+        self._fingers_to(self.hand.opening if opening is None else opening)
 
     def close(self) -> None:
         """Let the fingers press; `drive` must then run in every step."""
@@ -136,13 +136,29 @@ class Manipulator:
                 physicsClientId=self.client,
             )
 
-    def pressing(self, other: int) -> tuple[float, ...]:
-        """Return the normal force in newtons with which each finger presses a body."""
+    def pressing(self, other: int, part: int = -1) -> tuple[float, ...]:
+        """Return the normal force in newtons with which each finger presses a body, or the link of that number."""
         forces = []
         for link in self.fingers:
-            contacts = pybullet.getContactPoints(self.body, other, link, -1, physicsClientId=self.client)
+            contacts = pybullet.getContactPoints(self.body, other, link, part, physicsClientId=self.client)
             forces.append(sum(contact[9] for contact in contacts))
         return tuple(forces)
+
+    @property
+    def first_finger(self) -> Array:
+        """Where the first finger goes as the hand opens, in the hand's frame."""
+        axis: Array = self.arm.tip_rotation.T @ self.model.joints[self.hand.fingers[0]].axis
+        return axis
+
+    def push(self) -> float:
+        """Return the newtons with which the fingers press things ahead of the hand."""
+        ahead = self.frame()[0][:, 0]
+        total = 0.0
+        for link in self.fingers:
+            for contact in pybullet.getContactPoints(self.body, linkIndexA=link, physicsClientId=self.client):
+                if contact[2] != self.body:
+                    total += contact[9] * abs(float(np.dot(contact[7], ahead)))
+        return total
 
 
 def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:

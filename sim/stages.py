@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.collision import Surroundings
 from sim.motion import SWIVELS, YAWS, poses_at
 from sim.urdf import Array
 
@@ -18,10 +19,18 @@ MARGIN = 0.008
 
 @dataclass(frozen=True)
 class Stage:
-    """Poses (n, 6) that all candidates must allow, and what may be touched there."""
+    """Poses (n, 6) that all candidates must allow, what may be touched there, and what else there is around by then.
+
+    The fingers have by then `closed` around something, or are as the others' are. At a handle, which is `near` what it is on,
+    a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits.
+    """
 
     poses: Array
     ignored: tuple[str, ...] = ()
+    around: Surroundings | None = None
+    closed: bool = False
+    near: bool = False
+    slack: float = 0.0
 
 
 def fan() -> tuple[Array, Array]:

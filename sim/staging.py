@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Fixture, Shape
+from reasoner.embodiment.values import Fixture, Mechanism, Shape
 from sim.bodies import KINDS, packed
 from sim.engine import Bead, Engine, Thing
+from sim.mechanisms import load_mechanism
 from sim.perception import Draft
 from sim.robot import load
 from sim.urdf import Array
@@ -24,27 +25,56 @@ SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
 
 @dataclass(frozen=True)
 class Perturbation:
-    """How a rollout may differ from the nominal world: each range is drawn from evenly, per body."""
+    """How a rollout may differ from the nominal world: each range is drawn from evenly, per body.
+
+    Mechanisms are shifted as bodies are, turned by `turn`, and their joints' friction and damping vary by `resistance`.
+    """
 
     position: float = 0.010
     yaw: float = np.pi
     friction: tuple[float, float] = (0.6, 1.2)
     mass: tuple[float, float] = (0.7, 1.3)
     fill: tuple[float, float] = (0.95, 1.1)
+    turn: float = 0.17
+    resistance: tuple[float, float] = (0.5, 2.0)
 
 
-def furnish(engine: Engine) -> None:
-    """Put the furniture and the robots of the embodiment into an engine."""
+def furnish(engine: Engine, perturb: Perturbation | None) -> None:
+    """Put the furniture, mechanisms and robots of the embodiment into an engine."""
     for fixture in engine.embodiment.fixtures:
         engine.names[_make_fixture(engine.client, fixture)] = fixture.name
+    for mechanism in engine.embodiment.mechanisms:
+        mechanic = load_mechanism(engine.client, _shifted(engine, mechanism, perturb))
+        engine.mechanics.append(mechanic)
+        engine.names[mechanic.body] = mechanism.name
+        engine.links |= dict.fromkeys((mechanism.name, *mechanic.joints), mechanic)
     for robot in engine.embodiment.robots:
         number, hands, still = load(engine.client, robot)
         engine.names[number], engine.standing[robot.name] = robot.name, still
         engine.hands |= {hand.hand.name: hand for hand in hands}
 
 
+def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None) -> Mechanism:
+    """Return a mechanism as it stands in this world."""
+    if perturb is None:
+        return mechanism
+    (x, y, z), limit = mechanism.position, perturb.position
+    dx, dy = engine.rng.uniform(-limit, limit, 2)
+    yaw = mechanism.yaw + float(engine.rng.uniform(-perturb.turn, perturb.turn))
+    friction = mechanism.friction * float(engine.rng.uniform(*perturb.friction))
+    links = []
+    for link in mechanism.links:
+        more = float(engine.rng.uniform(*perturb.resistance))
+        links.append(replace(link, friction=link.friction * more, damping=link.damping * more))
+    return replace(mechanism, position=(x + dx, y + dy, z), yaw=yaw, friction=friction, links=tuple(links))
+
+
 def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: bool) -> None:
     """Put the bodies of a draft, and what fills them, into an engine; let all come to rest."""
+    for name, opened in draft.opened.items():
+        if name not in engine.links:
+            raise ValueError(f"'{name}' is open or shut, but is no e:Link of a mechanism")
+        engine.links[name].set(name, opened)
     for name, place in draft.places.items():
         if place not in engine.embodiment.places:
             raise ValueError(
@@ -68,7 +98,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
 
 def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None) -> tuple[Shape, Array, float]:
     """Return shape, position and yaw of a body at a place, perturbed if that is wanted."""
-    position, yaw = np.array(engine.embodiment.places[place].position), 0.0
+    position, yaw = engine.place(place), 0.0
     if perturb is not None:
         limit = perturb.position
         position[:2] += engine.rng.uniform(-limit, limit, 2)

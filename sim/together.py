@@ -173,7 +173,7 @@ def _where(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...],
     hand = next((name for name in named if name in world.hands), None)
 
     def now() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None:
-        places = [np.array(world.embodiment.places[n].position[:2]) for n in named if n in world.embodiment.places]
+        places = [world.place(n)[:2] for n in named if n in world.embodiment.places]
         held = world.held(hand) if hand is not None else None
         bodies = [world.truth(n)[1][:2] for n in named if n in world.bodies and n != held]
         if bodies or places:

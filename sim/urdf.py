@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -45,20 +45,33 @@ class Spheres:
 
 
 @dataclass(frozen=True)
+class Primitive:
+    """A box (half extents) or cylinder (radius, radius, half height) of a link, in the world at the zero posture."""
+
+    name: str
+    kind: str
+    half: Array
+    center: Array
+    rotation: Array
+
+
+@dataclass(frozen=True)
 class Model:
-    """A robot at the zero posture: joints by name, link frames (rotation, origin) and covering spheres by link."""
+    """A robot or mechanism at the zero posture: joints by name; by link its frame, the spheres that cover it, and its solids."""
 
     joints: Mapping[str, Joint]
     frames: Mapping[str, tuple[Array, Array]]
     spheres: Mapping[str, Spheres]
     parents: Mapping[str, Joint]
+    primitives: Mapping[str, tuple[Primitive, ...]]
 
     @cached_property
     def chains(self) -> Mapping[str, tuple[Joint, ...]]:
         """The joints from the base to each link that has spheres, fixed ones included."""
-        return {link: self._chain(link) for link in self.spheres}
+        return {link: self.chain(link) for link in self.spheres}
 
-    def _chain(self, link: str) -> tuple[Joint, ...]:
+    def chain(self, link: str) -> tuple[Joint, ...]:
+        """Return the joints from the base to a link."""
         joints: list[Joint] = []
         while link in self.parents:
             joints.append(self.parents[link])
@@ -87,9 +100,21 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
         The file isn't a URDF robot; the message names file and reason.
     """
     try:
-        root = ET.parse(Path(path)).getroot()
-    except (OSError, ET.ParseError) as problem:
-        raise ValueError(f"cannot read the robot's URDF {path}: {problem}") from problem
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as problem:
+        raise ValueError(f"cannot read the URDF {path}: {problem}") from problem
+    return read_model(text, path, position, yaw)
+
+
+def read_model(text: str, path: str, position: tuple[float, float, float], yaw: float, covered: bool = True) -> Model:
+    """Read a robot or mechanism from the text of a URDF file, `path` being where it is from; raises as `read_urdf` does.
+
+    Only what is `covered` by spheres can be moved by a motion planner, and only primitives can be.
+    """
+    try:
+        root = ET.fromstring(text)
+    except ET.ParseError as problem:
+        raise ValueError(f"cannot read the URDF {path}: {problem}") from problem
     elements = {_end(joint, "child"): joint for joint in root.iter("joint") if joint.find("child") is not None}
     links = {link.get("name", ""): link for link in root.iter("link")}
     frames: dict[str, tuple[Array, Array]] = {}
@@ -114,10 +139,11 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
     try:
         for link in links:
             place(link)
-        spheres = {name: _cover(link, *frames[name]) for name, link in links.items()}
+        spheres = {name: _cover(link, *frames[name]) for name, link in links.items()} if covered else {}
+        primitives = {name: tuple(_primitives(link, *frames[name], Path(path).parent)) for name, link in links.items()}
     except ValueError as problem:
         raise ValueError(f"the robot's URDF {path} can't be used: {problem}") from problem
-    return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents)
+    return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents, primitives)
 
 
 def _end(joint: ET.Element, which: str) -> str:
@@ -182,6 +208,35 @@ def _cover(link: ET.Element, turn: Array, origin: Array) -> Spheres:
         centers.append(origin + (points @ local.T + shift) @ turn.T)
         radii.append(np.full(len(points), radius))
     return Spheres(np.concatenate(centers), np.concatenate(radii))
+
+
+def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[Primitive]:
+    """Yield the link's collision shapes as boxes and cylinders; a sphere is the cylinder around it, a mesh the box."""
+    for collision in link.iter("collision"):
+        local, shift = _origin(collision)
+        geometry = collision.find("geometry")
+        if geometry is None or not len(geometry):
+            continue
+        shape, kind = geometry[0], "cylinder"
+        if shape.tag == "box":
+            half, kind = _numbers(shape.get("size")) / 2, "box"
+        elif shape.tag == "mesh":
+            low, high = _bounds(folder / shape.get("filename", ""), _numbers(shape.get("scale"), "1 1 1"))
+            half, kind, shift = (high - low) / 2, "box", shift + local @ (low + high) / 2
+        else:
+            radius = float(shape.get("radius", 0.0))
+            length = float(shape.get("length", 0.0)) + (0.0 if shape.tag == "cylinder" else 2 * radius)
+            half = np.array([radius, radius, length / 2])
+        yield Primitive(collision.get("name", ""), kind, half, origin + turn @ shift, turn @ local)
+
+
+def _bounds(file: Path, scale: Array) -> tuple[Array, Array]:
+    """Return the corners of the box around a mesh; only OBJ files can be read."""
+    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
+    corners = [_numbers(line[2:]) * scale for line in lines if line.startswith("v ")]
+    if not corners:
+        raise ValueError(f"the mesh '{file}' isn't there, or is no OBJ file with vertices")
+    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def _primitive(shape: ET.Element) -> tuple[Array, float]:

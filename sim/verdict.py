@@ -18,7 +18,9 @@ CODES = {
     "spill": "too much went beside the target",
     "toppled": "something fell over",
     "misplaced": "the object is not where it should be",
+    "stuck": "the joint did not come to where it should be, or resists too much",
     "too slow": "the skill did not end in its time",
+    "ill-defined": "the skill can't be carried out as the ontology describes it",
     "unexpected": "what is perceived afterwards is not what the behaviour promises",
 }
 """Failure codes and what they mean. `Verdict.code` is one of them, or None for success."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from planner.validation import successor
 from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import Problem, State
+from reasoner.symbols import FALSE, TRUE, Problem, State
 from sim.engine import Clock, Engine
 from sim.perception import perceiver
 from sim.staging import Perturbation
@@ -151,7 +151,8 @@ def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
     """Return the verdict if what is perceived is what is expected, else one that names the first fact that isn't."""
     seen = world.observe()
     for symbol in world.symbols:
-        wanted, got = expected.get(symbol), seen.get(symbol)
+        got = seen.get(symbol)
+        wanted = expected.get(symbol, FALSE if got in (TRUE, FALSE) else None)
         if wanted is not None and got != wanted:
             code = perceiver(world.embodiment.perceivers[symbol.situation].perceiver).code
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))

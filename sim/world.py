@@ -11,7 +11,7 @@ from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import State, Symbol
 from sim.engine import RATE, Engine
 from sim.perception import Draft, perceiver
-from sim.skills import skill
+from sim.skills import perform
 from sim.staging import Perturbation, furnish, stage
 from sim.verdict import SkillError, Verdict
 
@@ -76,8 +76,10 @@ class World(Engine):
     ) -> None:
         super().__init__(embodiment, seed, noise, gui)
         self.symbols = [symbol for symbol in initial if symbol.situation in embodiment.perceivers]
+        joints = [Symbol(use.situation, (link,)) for use in embodiment.perceivers.values() for link in use.links]
+        self.symbols += [symbol for symbol in joints if symbol not in initial]  # what isn't said to be open is shut
         self.perturb = perturb
-        furnish(self)
+        furnish(self, perturb)
         stage(self, self._draft(initial), perturb, beads)
         self.watch = watch
 
@@ -94,7 +96,8 @@ class World(Engine):
         draft = Draft()
         for symbol in self.symbols:
             use = self.embodiment.perceivers[symbol.situation]
-            perceiver(use.perceiver).arrange(draft, use, symbol.arguments, initial[symbol])
+            if symbol in initial:
+                perceiver(use.perceiver).arrange(draft, use, symbol.arguments, initial[symbol])
         return draft
 
     def observe(self) -> State:
@@ -129,7 +132,7 @@ class World(Engine):
             hand.limit = use.numbers.get("time_limit", math.inf)
             hand.deadline = self.steps + hand.limit * RATE
         try:
-            measured = skill(use.skill)(self, roles, use.numbers)
+            measured = perform(self, use, roles)
         except SkillError as failure:
             return failure.verdict
         finally:

@@ -96,7 +96,7 @@ def _course(
 
 def embodiment_of(scene: Scene) -> Embodiment | None:
     """Return the scene's bodies; None where it has none, or none that are whole."""
-    from reasoner.embodiment.reading import EmbodimentError
+    from reasoner.embodiment.facts import EmbodimentError
 
     try:
         return scene.embodiment

@@ -49,7 +49,7 @@ def _width(shape: Shape) -> float:
     for (low, below), (high, above) in pairwise(shape.profile):
         if low <= shape.grasp_height <= high:
             radius = below + (above - below) * (shape.grasp_height - low) / ((high - low) or 1.0)
-    return 2 * (radius + shape.numbers.get("wall", 0.004))
+    return 2 * (radius + (shape.numbers.get("wall", 0.004) if shape.kind == "vessel" else 0.0))
 
 
 RULES: dict[str, Callable[[Embodiment], Iterator[Measured]]] = {

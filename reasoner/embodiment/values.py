@@ -59,10 +59,88 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Place:
-    """A location where things stand: the point on the supporting surface."""
+    """A location where things stand: the point on the supporting surface, in the frame of the `carrier` if it has one.
+
+    The carrier is a link or an object: a place in a drawer moves with the drawer.
+    """
 
     name: str
     position: Vector
+    carrier: str = ""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A solid of a link: its kind (box, cylinder, sphere or mesh), extent along its axes, and where it is in the link's frame.
+
+    `turned` is roll, pitch and yaw. A mesh is a `file` with one convex shape per object in it.
+    """
+
+    name: str
+    kind: str
+    size: Vector
+    position: Vector = (0.0, 0.0, 0.0)
+    turned: Vector = (0.0, 0.0, 0.0)
+    color: Color = (0.8, 0.8, 0.8, 1.0)
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A frame on a link at which a hand does something: x where the fingers point, y from finger to finger, z along a bar.
+
+    The hand may turn about z from `low` to `high` radians. `parts` are what the fingers touch.
+    """
+
+    name: str
+    position: Vector
+    turned: Vector = (0.0, 0.0, 0.0)
+    low: float = 0.0
+    high: float = 0.0
+    parts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Link:
+    """What a joint moves: its solids, its features, and the joint, by which it hangs on its parent ("": on the base).
+
+    `kind` is revolute, prismatic or fixed; `position` and `turned` say where the joint is in the parent's frame, which is the
+    link's own frame when the joint's value is 0. From `opened` on the joint counts as open or switched on, up to `shut` as shut.
+    `friction` (newtons or newton metres) and `damping` resist; a `spring` pushes back to 0 with a force; a joint that `latches`
+    stays at `opened` once it was pushed beyond, until it is pushed there again. `urdf_link` is its name in a URDF of the mechanism.
+    """
+
+    name: str
+    kind: str
+    parts: tuple[Part, ...] = ()
+    features: Mapping[str, Feature] = field(default_factory=dict)
+    parent: str = ""
+    position: Vector = (0.0, 0.0, 0.0)
+    turned: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    lower: float = 0.0
+    upper: float = 0.0
+    mass: float = 1.0
+    opened: float = 0.0
+    shut: float = 0.0
+    friction: float = 0.5
+    damping: float = 0.1
+    spring: float = 0.0
+    latches: bool = False
+    urdf_link: str = ""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Furniture with moving links: where it stands, the solids of its base, its links; from a file if `urdf` names one."""
+
+    name: str
+    position: Vector
+    yaw: float
+    parts: tuple[Part, ...]
+    links: tuple[Link, ...]
+    friction: float = 0.8
+    urdf: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,11 +183,60 @@ class Filling:
 
 
 @dataclass(frozen=True)
+class Guard:
+    """A bound on a measured quantity, ``force >= 30``: where a motion stops, or what must hold after it, else `code`.
+
+    `sign` is 1 if the quantity must reach the `bound` from below, -1 from above; the bound is an expression (see `Phase`).
+    """
+
+    quantity: str
+    sign: int
+    bound: str
+    code: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.quantity} {'>=' if self.sign > 0 else '<='} {self.bound}"
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One motion of a skill, relative to a feature of a thing.
+
+    `motion` is how the hand goes: free (planned around everything), line (straight), joint (as the thing's joint moves it), or
+    one that `sim.phases.MOTIONS` has besides. `to` is a role with a feature, ``target.grip``, that the hand's tip is brought
+    to, or what is named by `bring`; `offset` is a shift from there in the hand's frame, and `above` one upwards. These and
+    the others of type str are expressions: numbers and settings with signs between them, ``raised-slip``.
+
+    `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles, or features, that may be touched. The motion
+    ends early `until` one of the guards holds, and afterwards all `checks` must. A phase is done only `when` all of its words
+    say so, and one that is `foreseen` isn't done, but must be possible before the hand moves at all.
+    """
+
+    name: str
+    motion: str = ""
+    to: str = ""
+    bring: str = ""
+    offset: tuple[str, str, str] = ("0", "0", "0")
+    above: str = "0"
+    value: str = ""
+    speed: str = "1"
+    fingers: str = ""
+    wait: str = "0"
+    touches: tuple[str, ...] = ()
+    when: tuple[str, ...] = ()
+    foreseen: bool = False
+    until: tuple[Guard, ...] = ()
+    checks: tuple[Guard, ...] = ()
+    iri: str = ""
+
+
+@dataclass(frozen=True)
 class SkillUse:
     """Which skill executes a primitive behaviour.
 
     `parameters` are the roles that the behaviour's parameters play, in their order; `variables` maps its determined variables
-    to theirs. `numbers` are the skill's settings in metres, seconds, radians and newtons.
+    to theirs. `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python
+    function. `links` has by role the links of the scene that can play it.
     """
 
     behavior: str
@@ -117,13 +244,15 @@ class SkillUse:
     parameters: tuple[str, ...]
     variables: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
+    phases: tuple[Phase, ...] = ()
+    links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class PerceiverUse:
     """Which perceiver reads a situation type off the world, with its thresholds and the values that mean something special.
 
-    `choices` are the values that the situation type has, in declared order.
+    `choices` are the values that the situation type has, in declared order; `links` the links that it is a situation of.
     """
 
     situation: str
@@ -131,6 +260,7 @@ class PerceiverUse:
     numbers: Mapping[str, float] = field(default_factory=dict)
     values: Mapping[str, str] = field(default_factory=dict)
     choices: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -144,6 +274,7 @@ class Embodiment:
     fillings: Mapping[str, Filling]
     skills: Mapping[str, SkillUse]
     perceivers: Mapping[str, PerceiverUse]
+    mechanisms: tuple[Mechanism, ...] = ()
 
     def hand(self, name: str) -> tuple[Robot, Hand]:
         """Return the hand of that name with its robot; raise `KeyError` that lists the hands there are."""

@@ -7,6 +7,7 @@ form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
 our own rules       `reasoner.validation.rules.RULES`, for what a query can't say well
 measures of bodies  `reasoner.embodiment.measures.RULES`, where there is a robot
+skills in phases    `reasoner.embodiment.skill_checks.RULES`, likewise
 logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
 ==================  ========================================================================
 """
@@ -23,8 +24,9 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 import ontology
-from reasoner.embodiment import measures
-from reasoner.embodiment.reading import EmbodimentError, read_embodiment
+from reasoner.embodiment import measures, skill_checks
+from reasoner.embodiment.facts import EmbodimentError
+from reasoner.embodiment.reading import read_embodiment
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name
@@ -133,9 +135,9 @@ def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) ->
         why = "physics reads the file in the same way"
         yield places.finding("unreadable-body", graph.scene, str(error), why, "see the message")
         return
-    for rule, faults in measures.RULES.items():
+    for rule, faults in (measures.RULES | skill_checks.RULES).items():
         for name, what, why, remedy in faults(embodiment):
-            yield places.finding(rule, reading.names.iri(name), what, why, remedy)
+            yield places.finding(rule, name if "://" in name else reading.names.iri(name), what, why, remedy)
 
 
 def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:

@@ -1,7 +1,8 @@
 import pyoxigraph as ox
 import pytest
 
-from reasoner.embodiment.reading import EmbodimentError, read_embodiment
+from reasoner.embodiment.facts import EmbodimentError
+from reasoner.embodiment.reading import read_embodiment
 from reasoner.graph.knowledge import load
 from reasoner.names import local_name
 

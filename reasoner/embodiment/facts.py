@@ -1,0 +1,185 @@
+"""What the graph says about bodies, looked up: attributes, links, classes and indices by node.
+
+The vocabulary is that of ``ontology/embodiment.ttl``. Attributes are read in one query (every data property below
+``:attribute``), links in another; the rest is looking them up.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.embodiment.values import Color, Vector
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import local_name
+from reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
+
+PREFIXES = {
+    "": EMBODIMENT,
+    "c": CORE,
+    "owl": OWL,
+    "rdfs": RDFS,
+}
+ATTRIBUTES = (
+    "SELECT DISTINCT ?node ?property ?value WHERE { ?property rdfs:subPropertyOf+ :attribute . ?node ?property ?value }"
+)
+LINKS = """
+SELECT DISTINCT ?node ?property ?value WHERE {
+  { VALUES ?property { :shape :profilePoint :skill :role :perceiver :adjusts :phase :part
+      :feature :partOf :carriedBy :touchesPart c:handOf c:parameter c:termType c:hasSituationType } }
+  UNION { ?property rdfs:subPropertyOf :specialValue }
+  ?node ?property ?value
+} ORDER BY ?node ?property ?value"""
+TYPES = """
+SELECT DISTINCT ?node ?class WHERE {
+  ?node a owl:NamedIndividual, ?class . FILTER(!STRSTARTS(STR(?class), STR(owl:)))
+} ORDER BY ?node ?class"""
+SUPERS = """
+SELECT DISTINCT ?sub ?super WHERE {
+  ?sub rdfs:subClassOf ?super . FILTER(isIRI(?sub) && isIRI(?super))
+} ORDER BY ?sub ?super"""
+INDICES = "SELECT DISTINCT ?node ?index WHERE { ?node c:index ?index }"
+
+GREY = "0.7 0.7 0.7 1"
+
+
+class EmbodimentError(KnowledgeError):
+    """What the ontology says about bodies can't be used; the message says what, where, and what to do."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Attributes, links, classes and indices by node (an IRI)."""
+
+    attributes: Mapping[str, Mapping[str, str]]
+    links: Mapping[str, Mapping[str, Sequence[str]]]
+    classes: Mapping[str, Sequence[str]]
+    supers: Mapping[str, Sequence[str]]
+    indices: Mapping[str, int]
+
+    @classmethod
+    def read(cls, store: ox.Store) -> Facts:
+        """Ask a store."""
+        attributes: dict[str, dict[str, str]] = defaultdict(dict)
+        links: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+        for node, name, value in rows(store, ATTRIBUTES):
+            attributes[node][snake(local_name(name))] = value
+        for node, name, value in rows(store, LINKS):
+            links[node][snake(local_name(name))].append(value)
+        indices = {node: int(index) for node, index in rows(store, INDICES)}
+        return cls(attributes, links, grouped(rows(store, TYPES)), grouped(rows(store, SUPERS)), indices)
+
+    def text(self, node: str, name: str, default: str | None = None) -> str:
+        """Return an attribute's text, or raise that it's missing."""
+        value = self.attributes.get(node, {}).get(name, default)
+        if value is None:
+            raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)")
+        return value
+
+    def number(self, node: str, name: str, default: float | None = None) -> float:
+        """Return an attribute's number."""
+        return self.numbers(node, name, None if default is None else str(default))[0]
+
+    def numbers(self, node: str, name: str, default: str | None = None) -> tuple[float, ...]:
+        """Return the numbers of an attribute that lists some."""
+        value = self.text(node, name, default)
+        try:
+            return tuple(float(word) for word in value.split())
+        except ValueError:
+            raise EmbodimentError(f"{node} has :{camel(name)} '{value}'; wanted numbers") from None
+
+    def position(self, node: str, default: str | None = None) -> Vector:
+        """Return a node's coordinates."""
+        x, y, z = (self.numbers(node, name, default)[0] for name in ("x", "y", "z"))
+        return (x, y, z)
+
+    def color(self, node: str, default: str = GREY) -> Color:
+        """Return a node's colour."""
+        numbers = self.numbers(node, "color", default)
+        if len(numbers) != 4:
+            raise EmbodimentError(f"{node} has :color {numbers}; wanted red, green, blue and opacity")
+        return (numbers[0], numbers[1], numbers[2], numbers[3])
+
+    def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
+        """Return where the file is that an attribute names."""
+        file = self.text(node, name)
+        for folder in folders:
+            if (folder / file).is_file():
+                return str(folder / file)
+        raise EmbodimentError(
+            f"{node} has :{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}"
+        )
+
+    def all_numbers(self, node: str) -> dict[str, float]:
+        """Return all of a node's attributes that are numbers."""
+        found = {}
+        for name, value in self.attributes.get(node, {}).items():
+            try:
+                found[name] = float(value)
+            except ValueError:
+                continue
+        return found
+
+    def settings(self, general: str, special: str) -> dict[str, float]:
+        """Return the numbers of a skill or perceiver, those of who uses it before them, adjustments before both."""
+        settings = self.all_numbers(general) | self.all_numbers(special)
+        for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):
+            settings |= self.all_numbers(node)
+        return settings
+
+    def having(self, attribute: str) -> list[str]:
+        """Return the nodes that have an attribute."""
+        return [node for node, values in self.attributes.items() if attribute in values]
+
+    def linked(self, node: str, name: str) -> Sequence[str]:
+        """Return what a node is linked to."""
+        return self.links.get(node, {}).get(name, ())
+
+    def ordered(self, nodes: Iterable[str]) -> list[str]:
+        """Return nodes by index, those without one last, then by IRI."""
+        return sorted(nodes, key=lambda node: (self.indices.get(node, 10**9), node))
+
+    def members(self, class_name: str) -> list[str]:
+        """Return the individuals of a class of the vocabulary."""
+        return self.ordered(n for n, kinds in self.classes.items() if PREFIXES[""] + class_name in kinds)
+
+    def nearest_first(self, node: str) -> list[str]:
+        """Return a node, its classes and their superclasses, from the nearest to the most general."""
+        found = [node]
+        layer = list(self.classes.get(node, ()))
+        while layer:
+            found += [kind for kind in layer if kind not in found]
+            layer = [up for kind in layer for up in self.supers.get(kind, ()) if up not in found]
+        return found
+
+
+def rows(store: ox.Store, query: str) -> list[tuple[str, ...]]:
+    """Return the rows of a SELECT query as text."""
+    solutions = store.query(query, prefixes=PREFIXES, use_default_graph_as_union=True)
+    if not isinstance(solutions, ox.QuerySolutions):
+        raise TypeError("a SELECT query gives solutions")
+    return [tuple("" if term is None else term.value for term in row) for row in solutions]
+
+
+def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
+    """Return pairs as lists of second ones by the first."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    for key, value in rows:
+        groups[key].append(value)
+    return groups
+
+
+def snake(name: str) -> str:
+    """Return ``uprightAngle`` as ``upright_angle``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+def camel(name: str) -> str:
+    """Return ``uprightAngle`` of ``upright_angle``."""
+    head, *tail = name.split("_")
+    return head + "".join(word.capitalize() for word in tail)

@@ -1,0 +1,103 @@
+"""Furniture with moving links, as the graph describes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from reasoner.embodiment.facts import EmbodimentError, Facts
+from reasoner.embodiment.values import Feature, Link, Mechanism, Part, Vector
+
+KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
+"""The attributes that give a part's extent; a radius counts twice."""
+
+JOINTS = ("revolute", "prismatic", "fixed")
+
+
+def mechanisms(facts: Facts, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Mechanism, ...]:
+    """Return the mechanisms of a scene, each with the links that are part of it."""
+    return tuple(_mechanism(facts, node, names, folders) for node in facts.members("Mechanism"))
+
+
+def _mechanism(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Mechanism:
+    return Mechanism(
+        names(node),
+        facts.position(node),
+        facts.number(node, "yaw", 0.0),
+        _parts(facts, node, names, folders),
+        tuple(_link(facts, one, node, names, folders) for one in _links(facts, node)),
+        facts.number(node, "friction", 0.8),
+        facts.file(node, "urdf", folders) if facts.text(node, "urdf", "") else "",
+    )
+
+
+def _links(facts: Facts, mechanism: str) -> list[str]:
+    """Return the links of a mechanism, parents before what hangs on them."""
+    ordered: list[str] = []
+    waiting = [mechanism]
+    while waiting:
+        parent = waiting.pop(0)
+        children = facts.ordered(node for node in facts.links if parent in facts.linked(node, "part_of"))
+        ordered += children
+        waiting += children
+    return ordered
+
+
+def _turned(facts: Facts, node: str) -> Vector:
+    return (facts.number(node, "roll", 0.0), facts.number(node, "pitch", 0.0), facts.number(node, "yaw", 0.0))
+
+
+def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
+    kind, parent = facts.text(node, "joint", "fixed"), facts.linked(node, "part_of")[0]
+    if kind not in JOINTS:
+        raise EmbodimentError(f"{node} has :joint '{kind}'; wanted one of {', '.join(JOINTS)}")
+    axis = facts.numbers(node, "axis", "0 0 1")
+    if len(axis) != 3 or not any(axis):
+        raise EmbodimentError(f"{node} has :axis {axis}; wanted the three coordinates of a direction")
+    upper = facts.number(node, "upper", 0.0)
+    return Link(
+        names(node),
+        kind,
+        _parts(facts, node, names, folders),
+        {feature.name: feature for feature in (_feature(facts, one, names) for one in facts.linked(node, "feature"))},
+        "" if parent == mechanism else names(parent),
+        facts.position(node, "0"),
+        _turned(facts, node),
+        (axis[0], axis[1], axis[2]),
+        facts.number(node, "lower", 0.0),
+        upper,
+        facts.number(node, "mass", 1.0),
+        facts.number(node, "opened", 0.8 * upper),
+        facts.number(node, "shut", 0.05 * upper),
+        facts.number(node, "joint_friction", 0.5),
+        facts.number(node, "damping", 0.1),
+        facts.number(node, "spring", 0.0),
+        facts.text(node, "latches", "false") == "true",
+        facts.text(node, "urdf_link", ""),
+    )
+
+
+def _parts(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Part, ...]:
+    return tuple(_part(facts, one, names, folders) for one in facts.ordered(facts.linked(node, "part")))
+
+
+def _part(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Part:
+    kind = facts.text(node, "kind")
+    if kind not in KINDS and kind != "mesh":
+        raise EmbodimentError(f"{node} has :kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}")
+    x, y, z = (facts.number(node, name) * (2 if name == "radius" else 1) for name in KINDS.get(kind, KINDS["box"]))
+    file = facts.file(node, "mesh", folders) if kind == "mesh" else ""
+    place = facts.position(node, "0")
+    return Part(names(node), kind, (x, y, z), place, _turned(facts, node), facts.color(node), file)
+
+
+def _feature(facts: Facts, node: str, names: Callable[[str], str]) -> Feature:
+    """Return a feature; its name is what stands behind the last dot of its IRI."""
+    return Feature(
+        names(node).rsplit(".", 1)[-1],
+        facts.position(node, "0"),
+        _turned(facts, node),
+        facts.number(node, "lower", 0.0),
+        facts.number(node, "upper", 0.0),
+        tuple(names(part) for part in facts.linked(node, "touches_part")),
+    )

@@ -1,0 +1,115 @@
+"""Rules of validation on skills that are described in phases: see `RULES` at the end.
+
+`unplayed`, `unset` and `endless` ask of one skill what physics asks, too, before it begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from reasoner.embodiment.skills import TERM
+from reasoner.embodiment.values import Embodiment, Phase, SkillUse
+
+JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
+"""What an expression may name of a joint."""
+
+WITHOUT_ROLE = {"hand", "supports"}
+"""Words in the place of a role that name none."""
+
+Fault = tuple[str, str, str, str]
+"""IRI of the phase or short name of the link, what, why, remedy."""
+
+
+def roles_of(use: SkillUse) -> set[str]:
+    """Return the roles that a behaviour's terms play."""
+    return {role for role in (*use.parameters, *use.variables.values()) if role}
+
+
+def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
+    """Yield phases with a role that no term of the behaviour plays."""
+    for phase in use.phases:
+        for word in (*phase.to.split(), *phase.touches):
+            role = word.partition(".")[0]
+            if role not in WITHOUT_ROLE | roles_of(use):
+                yield phase, role
+
+
+def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
+    """Yield phases with a word in an expression that is neither a number nor a setting."""
+    for phase in use.phases:
+        bounds = [guard.bound for guard in (*phase.until, *phase.checks)]
+        for expression in (*phase.offset, phase.above, phase.value, phase.speed, phase.wait, *bounds):
+            for _, term in TERM.findall(expression):
+                if not (term[0].isdigit() or term[0] == "." or term in use.numbers or term in JOINT_NUMBERS):
+                    yield phase, term
+
+
+def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
+    """Yield phases of which nobody says where they end, with what is missing."""
+    for phase in use.phases:
+        if phase.motion in ("free", "line", "joint", "over") and not phase.to:
+            yield phase, "to"
+        if phase.motion == "joint" and not phase.value:
+            yield phase, "value"
+        if phase.motion == "rise" and phase.above == "0":
+            yield phase, "above"
+
+
+def role_not_played(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find phases with a role that nobody plays."""
+    for use in embodiment.skills.values():
+        for phase, role in unplayed(use):
+            yield (
+                phase.iri,
+                f"phase {phase.name} speaks of the role {role}, which no term of {use.behavior} plays",
+                f"the skill {use.skill} has to know who that is",
+                f"state e:role e:{role} of one of its parameters or variables, and :asksFor e:{role} of the skill",
+            )
+
+
+def unknown_setting(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find expressions that can't be worked out."""
+    for use in embodiment.skills.values():
+        for phase, term in unset(use):
+            yield (
+                phase.iri,
+                f"phase {phase.name} of {use.skill} has '{term}', which is neither a number nor a setting of the skill",
+                "nobody can tell how much that is",
+                f"state e:{term} of the skill, or mend the spelling",
+            )
+
+
+def phase_without_end(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find motions that nothing stops."""
+    for use in embodiment.skills.values():
+        for phase, missing in endless(use):
+            yield (
+                phase.iri,
+                f"phase {phase.name} of {use.skill} moves ({phase.motion}), and nothing says how far",
+                "a motion ends where it leads, or before when a guard of e:until holds",
+                f"state e:{missing} of the phase",
+            )
+
+
+def unknown_feature(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find features to which a phase leads and that a link which can play the role hasn't."""
+    links = {link.name: link for mechanism in embodiment.mechanisms for link in mechanism.links}
+    for use in embodiment.skills.values():
+        needed = {tuple(word.split(".")): phase for phase in use.phases for word in phase.to.split() if "." in word}
+        for (role, feature), phase in needed.items():
+            for name in use.links.get(role, ()):
+                if feature not in links[name].features:
+                    yield (
+                        name,
+                        f"{name} has no feature '{feature}', to which phase {phase.name} of {use.skill} brings the hand",
+                        f"{use.behavior} can be done with {name}, and the hand has to know where",
+                        f"give {name} an e:feature whose IRI ends with .{feature}, or mend the spelling",
+                    )
+
+
+RULES: dict[str, Callable[[Embodiment], Iterator[Fault]]] = {
+    "role-not-played": role_not_played,
+    "unknown-setting": unknown_setting,
+    "phase-without-end": phase_without_end,
+    "unknown-feature": unknown_feature,
+}

@@ -1,0 +1,120 @@
+"""Skills as the graph describes them: who carries out a primitive, with which roles and numbers, in which phases."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import pyoxigraph as ox
+
+from reasoner.embodiment.facts import EmbodimentError, Facts, grouped, rows, snake
+from reasoner.embodiment.values import Guard, Phase, SkillUse
+from reasoner.names import local_name
+
+VARIABLES = """
+SELECT DISTINCT ?behavior ?term WHERE {
+  ?behavior (c:precondition|c:postcondition)/(c:condition|c:alternative|c:when)*/(c:about|c:value|c:argument2|c:witness) ?term .
+  ?term a c:Variable ; :role ?role
+} ORDER BY ?behavior ?term"""
+MOTIONS = ("", "free", "line", "joint", "rise", "home", "over")
+FINGERS = ("", "open", "shut", "grasp")
+CONDITIONS = ("empty", "holding", "place", "thing")
+QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "leaning")
+"""What phases may say: `sim.phases` has a table for each."""
+
+GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
+TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")
+
+
+def skill_uses(facts: Facts, names: Callable[[str], str], store: ox.Store) -> dict[str, SkillUse]:
+    """Return by behaviour which skill carries it out."""
+    variables = grouped(rows(store, VARIABLES))
+    roles = {term: local_name(links["role"][0]) for term, links in facts.links.items() if "role" in links}
+    found = {}
+    for behavior in facts.ordered(node for node, links in facts.links.items() if "skill" in links):
+        skill = facts.linked(behavior, "skill")[0]
+        parameters = facts.ordered(facts.linked(behavior, "parameter"))
+        found[names(behavior)] = SkillUse(
+            names(behavior),
+            local_name(skill),
+            tuple(roles.get(parameter, "") for parameter in parameters),
+            {local_name(term).rsplit(".", 1)[-1]: roles[term] for term in variables.get(behavior, ())},
+            facts.settings(skill, behavior),
+            phases(facts, skill),
+            _links(facts, [*parameters, *variables.get(behavior, ())], names),
+        )
+    return found
+
+
+def _links(facts: Facts, terms: Sequence[str], names: Callable[[str], str]) -> dict[str, tuple[str, ...]]:
+    """Return by role the links that the terms which play it can stand for."""
+    found = {}
+    links = facts.ordered(node for node, linked in facts.links.items() if "part_of" in linked)
+    for term in terms:
+        kinds = set(facts.linked(term, "term_type"))
+        for role in facts.linked(term, "role"):
+            found[local_name(role)] = tuple(names(one) for one in links if kinds & set(facts.nearest_first(one)))
+    return found
+
+
+def phases(facts: Facts, skill: str) -> tuple[Phase, ...]:
+    """Return the phases of a skill in their order; none if it is a Python function."""
+    return tuple(_phase(facts, node) for node in facts.ordered(facts.linked(skill, "phase")))
+
+
+def _phase(facts: Facts, node: str) -> Phase:
+    def text(name: str, default: str = "") -> str:
+        return facts.text(node, name, default)
+
+    def words(name: str) -> tuple[str, ...]:
+        return tuple(text(name).split())
+
+    def sum_of(name: str, default: str = "") -> str:
+        return snake(text(name, default))
+
+    offset = sum_of("offset", "0 0 0").split()
+    if len(offset) != 3:
+        raise EmbodimentError(f"{node} has :offset '{text('offset')}'; wanted three numbers or settings: x y z")
+    found = Phase(
+        local_name(node),
+        text("motion"),
+        text("to"),
+        text("bring"),
+        (offset[0], offset[1], offset[2]),
+        sum_of("above", "0"),
+        sum_of("value"),
+        sum_of("speed", "1"),
+        text("fingers"),
+        sum_of("waits", "0"),
+        words("touches"),
+        words("when"),
+        text("foreseen", "false") == "true",
+        _guards(node, text("until")),
+        _guards(node, text("check")),
+        node,
+    )
+    for what, said, known in (
+        ("motion", [found.motion], MOTIONS),
+        ("fingers", [found.fingers], FINGERS),
+        ("when", found.when, CONDITIONS),
+        ("guard on", [guard.quantity for guard in (*found.until, *found.checks)], QUANTITIES),
+    ):
+        for word in said:
+            if word not in known:
+                raise EmbodimentError(f"{node} has the {what} '{word}'; wanted one of {', '.join(filter(None, known))}")
+    for expression in (*found.offset, found.above, found.value, found.speed, found.wait):
+        if expression != "".join(match[0] for match in TERM.finditer(expression)):
+            raise EmbodimentError(f"{node} has '{expression}'; wanted numbers and settings with signs between them")
+    return found
+
+
+def _guards(node: str, text: str) -> tuple[Guard, ...]:
+    """Read ``force >= 30; slip <= slip else slip or drop``."""
+    guards = []
+    for piece in (piece.strip() for piece in text.split(";")):
+        match = GUARD.fullmatch(piece)
+        if piece and match is None:
+            raise EmbodimentError(f"{node} has the guard '{piece}'; wanted QUANTITY >= VALUE, or <=, maybe else CODE")
+        if match is not None:
+            guards.append(Guard(match[1], 1 if match[2] == ">=" else -1, snake(match[3]), match[4] or ""))
+    return tuple(guards)

@@ -1,0 +1,171 @@
+"""Furniture with moving links as geometry: where links, features and solids are at which values of the joints.
+
+A mechanism is a URDF, written from its parts or somebody's file. Lengths in metres, angles in radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, Place
+from sim.collision import Solid
+from sim.urdf import Array, Model, read_model, rotation
+
+WIDER = 0.25
+"""The share of the way from `opened` to the end of a joint to which it is opened."""
+
+BASE = "base"
+"""The link of a generated URDF that stands fast."""
+
+
+def urdf_name(mechanism: Mechanism, link: str) -> str:
+    """Return a link's name in the URDF; a mechanism's own name stands for its base."""
+    if link == mechanism.name:
+        return BASE
+    found = next(one for one in mechanism.links if one.name == link)
+    return found.urdf_link or found.name
+
+
+def moved(mechanism: Mechanism, model: Model, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """Return rotation and shift of a link against the zero posture, its joints at `values` (by link, else 0)."""
+    turned, shift = np.eye(3), np.zeros(3)
+    by_urdf = {urdf_name(mechanism, link.name): values.get(link.name, 0.0) for link in mechanism.links}
+    for joint in model.chain(urdf_name(mechanism, name)):
+        value = by_urdf.get(joint.child, 0.0)
+        if joint.kind == "prismatic":
+            shift = shift + turned @ joint.axis * value
+        elif joint.kind in ("revolute", "continuous"):
+            local = about(joint.axis, value)
+            shift = shift + turned @ (joint.origin - local @ joint.origin)
+            turned = turned @ local
+    return turned, shift
+
+
+def about(axis: Array, angle: float) -> Array:
+    """Return the rotation matrix about a unit axis."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return matrix
+
+
+def solids(mechanism: Mechanism, model: Model, values: Mapping[str, float]) -> Iterator[Solid]:
+    """Yield the solids of a mechanism with its joints at `values`, named after it and their parts."""
+    owners = {urdf_name(mechanism, link.name): link.name for link in mechanism.links}
+    for link, primitives in model.primitives.items():
+        owner = owners.get(link, mechanism.name)
+        turned, shift = moved(mechanism, model, owner, values)
+        for part in primitives:
+            yield Solid(owner, part.kind, part.half, turned @ part.center + shift, turned @ part.rotation, part.name)
+
+
+def open_values(mechanism: Mechanism) -> dict[str, float]:
+    """Return the joints' values when all is open."""
+    return {link.name: wide(link) for link in mechanism.links}
+
+
+def wide(link: Link) -> float:
+    """Return the value to which a joint is opened: somewhat beyond the one from which on it counts as open.
+
+    >>> wide(Link("lid", "revolute", opened=1.2, upper=1.6))
+    1.3
+    """
+    return link.opened + WIDER * (link.upper - link.opened)
+
+
+def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list[Solid]]:
+    """Return the places, those that links carry in the world's frame, and the mechanisms' solids, all with every joint open.
+
+    Places on other carriers, which nobody knows the place of, are left out.
+    """
+    places = {name: place for name, place in embodiment.places.items() if not place.carrier}
+    around: list[Solid] = []
+    for mechanism in embodiment.mechanisms:
+        model, values = read_mechanism(mechanism), open_values(mechanism)
+        around += solids(mechanism, model, values)
+        for name in (mechanism.name, *(link.name for link in mechanism.links)):
+            turned, shift = moved(mechanism, model, name, values)
+            zero, origin = model.frames[urdf_name(mechanism, name)]
+            for place in embodiment.places.values():
+                if place.carrier == name:
+                    x, y, z = turned @ (zero @ np.array(place.position) + origin) + shift
+                    places[place.name] = Place(place.name, (float(x), float(y), float(z)))
+    return {name: places[name] for name in embodiment.places if name in places}, around
+
+
+def feature_frame(frame: tuple[Array, Array], feature: Feature) -> tuple[Array, Array]:
+    """Return where a feature is when its link's frame is `frame`."""
+    turned, origin = frame
+    return turned @ rotation(*feature.turned), origin + turned @ np.array(feature.position)
+
+
+def read_mechanism(mechanism: Mechanism) -> Model:
+    """Return a mechanism's model at the zero posture, placed in the world."""
+    text = Path(mechanism.urdf).read_text(encoding="utf-8") if mechanism.urdf else written(mechanism)
+    return read_model(text, mechanism.urdf or mechanism.name, mechanism.position, mechanism.yaw, False)
+
+
+def written(mechanism: Mechanism) -> str:
+    """Return a mechanism as URDF text, in short lines, as PyBullet's parser wants them."""
+    lines = [f'<robot name="{mechanism.name}">', *_link(BASE, mechanism.parts, 0.0)]
+    for link in mechanism.links:
+        lines += _link(link.name, link.parts, link.mass)
+        lines += [
+            f'<joint name="{link.name}" type="{link.kind}">',
+            f'<parent link="{link.parent or BASE}"/>',
+            f'<child link="{link.name}"/>',
+            _origin(link.position, link.turned),
+            f'<axis xyz="{_spaced(link.axis)}"/>',
+            f'<limit lower="{link.lower}" upper="{link.upper}" effort="1000" velocity="10"/>',
+            f'<dynamics damping="{link.damping}"/>',
+            "</joint>",
+        ]
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def _link(name: str, parts: Sequence[Part], mass: float) -> list[str]:
+    """Return a link; its inertia is that of a box around its parts."""
+    center, extent = np.zeros(3), np.full(3, 0.1)
+    if parts:
+        low = np.min([np.array(p.position) - np.array(p.size) / 2 for p in parts], axis=0)
+        high = np.max([np.array(p.position) + np.array(p.size) / 2 for p in parts], axis=0)
+        center, extent = (low + high) / 2, high - low
+    if not mass:
+        center = np.zeros(3)  # the base stands fast; PyBullet then takes its frame for its centre of mass
+    squares = extent**2
+    ixx, iyy, izz = (max(mass, 1e-3) / 12 * (squares.sum() - square) for square in squares)
+    lines = [
+        f'<link name="{name}">',
+        "<inertial>",
+        _origin(tuple(center.tolist()), (0.0, 0.0, 0.0)),
+        f'<mass value="{mass}"/>',
+        f'<inertia ixx="{ixx:.6g}" iyy="{iyy:.6g}" izz="{izz:.6g}" ixy="0" ixz="0" iyz="0"/>',
+        "</inertial>",
+    ]
+    for part in parts:
+        where, form = _origin(part.position, part.turned), f"<geometry>{_form(part)}</geometry>"
+        color = f'<material name="{part.name}"><color rgba="{_spaced(part.color)}"/></material>'
+        lines += [f'<visual name="{part.name}">', where, form, color, "</visual>"]
+        lines += [f'<collision name="{part.name}">', where, form, "</collision>"]
+    return [*lines, "</link>"]
+
+
+def _form(part: Part) -> str:
+    if part.kind == "cylinder":
+        return f'<cylinder radius="{part.size[0] / 2}" length="{part.size[2]}"/>'
+    if part.kind == "sphere":
+        return f'<sphere radius="{part.size[0] / 2}"/>'
+    if part.kind == "mesh":
+        return f'<mesh filename="{part.file}"/>'
+    return f'<box size="{_spaced(part.size)}"/>'
+
+
+def _origin(position: Sequence[float], turned: Sequence[float]) -> str:
+    return f'<origin xyz="{_spaced(position)}" rpy="{_spaced(turned)}"/>'
+
+
+def _spaced(numbers: Sequence[float]) -> str:
+    return " ".join(f"{number:.6g}" for number in numbers)

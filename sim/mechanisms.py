@@ -1,0 +1,129 @@
+"""Furniture with moving links in a physics world: loaded, driven, and looked at.
+
+Joints resist by friction and damping; springs push back and latches hold.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pybullet
+
+from reasoner.embodiment.values import Link, Mechanism
+from sim.collision import Solid
+from sim.linkage import moved, read_mechanism, solids, urdf_name, wide, written
+from sim.urdf import Array, Model
+
+TRIP, STAY = 0.6, 0.3
+"""Shares of the way from `opened` to the end of a latching joint at which it trips, and at which it is then held."""
+
+
+@dataclass
+class Mechanic:
+    """A mechanism in a physics world: its body, its model at the zero posture, and the number of each link's joint."""
+
+    client: int
+    body: int
+    mechanism: Mechanism
+    model: Model
+    joints: Mapping[str, int]
+    held: dict[str, bool] = field(default_factory=dict)
+    tripped: dict[str, bool] = field(default_factory=dict)
+
+    @property
+    def latching(self) -> bool:
+        """Whether there is a joint that latches."""
+        return any(link.latches for link in self.mechanism.links)
+
+    def link(self, name: str) -> Link:
+        """Return the link of that name."""
+        return next(link for link in self.mechanism.links if link.name == name)
+
+    def values(self) -> dict[str, float]:
+        """Return the joints' values by link."""
+        return {
+            name: pybullet.getJointState(self.body, joint, physicsClientId=self.client)[0]
+            for name, joint in self.joints.items()
+        }
+
+    def moved(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
+        """Return rotation and shift of a link against the zero posture, with its joints as they are or at `values`."""
+        return moved(self.mechanism, self.model, name, self.values() if values is None else values)
+
+    def frame(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
+        """Return a link's frame (rotation, origin) in the world; that of the base for the mechanism's own name."""
+        turned, shift = self.moved(name, values)
+        zero, origin = self.model.frames[urdf_name(self.mechanism, name)]
+        return turned @ zero, turned @ origin + shift
+
+    def solids(self, values: Mapping[str, float] | None = None) -> Iterator[Solid]:
+        """Yield what an arm must not touch."""
+        return solids(self.mechanism, self.model, self.values() if values is None else values)
+
+    def set(self, name: str, opened: bool) -> None:
+        """Begin with a link open or shut: the only time, but for interventions, that a joint is set instead of moved."""
+        link = self.link(name)
+        value = wide(link) if opened else 0.0
+        pybullet.resetJointState(self.body, self.joints[name], value, physicsClientId=self.client)
+        if link.latches:
+            self.held[name] = opened
+            _resist(self.client, self.body, self.joints[name], link, opened)
+
+    def drive(self) -> None:
+        """Let joints that latch trip, and springs push to where they are held."""
+        for name, joint in self.joints.items():
+            link = self.link(name)
+            if not link.latches:
+                continue
+            value = pybullet.getJointState(self.body, joint, physicsClientId=self.client)[0]
+            down = value > link.opened + TRIP * (link.upper - link.opened)
+            if down and not self.tripped.get(name, False):
+                self.held[name] = not self.held.get(name, False)
+                _resist(self.client, self.body, joint, link, self.held[name])
+            back = value < link.opened + (TRIP + STAY) / 2 * (link.upper - link.opened)
+            self.tripped[name] = down or (self.tripped.get(name, False) and not back)
+
+
+def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
+    """Put a mechanism into a physics world, every joint at 0."""
+    place = {
+        "basePosition": mechanism.position,
+        "baseOrientation": pybullet.getQuaternionFromEuler([0, 0, mechanism.yaw]),
+        "useFixedBase": True,
+        "physicsClientId": client,
+    }
+    if mechanism.urdf:
+        body = pybullet.loadURDF(mechanism.urdf, **place)
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "mechanism.urdf"
+            file.write_text(written(mechanism), encoding="utf-8")
+            body = pybullet.loadURDF(str(file), **place)
+    numbers = {}
+    for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
+        numbers[pybullet.getJointInfo(body, i, physicsClientId=client)[12].decode()] = i
+        pybullet.changeDynamics(body, i, lateralFriction=mechanism.friction, physicsClientId=client)
+    pybullet.changeDynamics(body, -1, lateralFriction=mechanism.friction, physicsClientId=client)
+    joints = {link.name: numbers[link.urdf_link or link.name] for link in mechanism.links}
+    for link in mechanism.links:
+        pybullet.changeDynamics(body, joints[link.name], jointDamping=link.damping, physicsClientId=client)
+        _resist(client, body, joints[link.name], link, False)
+    return Mechanic(client, int(body), mechanism, read_mechanism(mechanism), joints)
+
+
+def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:
+    """Give a joint its friction, or the spring that pushes it to where it rests or is held.
+
+    A motor at rest is what Coulomb friction is; PyBullet doesn't read that from the URDF.
+    """
+    if link.spring:
+        rest = link.opened + STAY * (link.upper - link.opened) if held else 0.0
+        control = {"controlMode": pybullet.POSITION_CONTROL, "targetPosition": rest, "force": link.spring}
+        gains = {"positionGain": 0.1, "velocityGain": 0.5}
+        pybullet.setJointMotorControl2(body, joint, **control, **gains, physicsClientId=client)
+    else:
+        control = {"controlMode": pybullet.VELOCITY_CONTROL, "targetVelocity": 0.0, "force": link.friction}
+        pybullet.setJointMotorControl2(body, joint, **control, physicsClientId=client)

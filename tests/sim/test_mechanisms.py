@@ -1,0 +1,190 @@
+"""Furniture with moving links: opened, shut and pressed by skills that the ontology describes, with friction alone."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import confab
+from confab.scene import Scene
+from reasoner.embodiment.skill_checks import RULES
+from reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES
+from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
+from reasoner.symbols import Symbol
+from sim import phases
+from sim.faults import displaced
+from sim.linkage import read_mechanism, wide
+from sim.skills import perform
+from sim.staging import Perturbation
+from sim.verdict import CODES, SkillError
+from sim.verify import expectations, verify
+from sim.world import World
+
+PANEL = Mechanism(
+    "panel",
+    (0.5, -0.1, 0.7),
+    0.0,
+    (Part("panel.body", "box", (0.06, 0.2, 0.2), (0.03, 0.0, 0.1)),),
+    (
+        Link(
+            "button",
+            "prismatic",
+            (Part("button.cap", "cylinder", (0.03, 0.03, 0.02), (-0.012, 0.0, 0.0), (0.0, 1.5708, 0.0)),),
+            {"cap": Feature("cap", (-0.022, 0.0, 0.0))},
+            position=(0.0, 0.0, 0.12),
+            axis=(1.0, 0.0, 0.0),
+            upper=0.01,
+            mass=0.05,
+            opened=0.003,
+            shut=0.002,
+            spring=6.0,
+            latches=True,
+        ),
+    ),
+)
+"""A board with a button that stays in when it is pressed, and comes out when it is pressed again."""
+
+
+@cache
+def kitchen() -> Scene:
+    return confab.load("kitchen-corner")
+
+
+def by_skill(embodiment: Embodiment) -> Mapping[str, SkillUse]:
+    return {use.skill: use for use in embodiment.skills.values()}
+
+
+def with_panel(**changed: float) -> World:
+    """A world with the board alone; the button's joint may be another one."""
+    button = replace(PANEL.links[0], **changed)  # type: ignore[arg-type]
+    return World(
+        replace(kitchen().embodiment, mechanisms=(replace(PANEL, links=(button,)),), places={}, perceivers={}), {}
+    )
+
+
+def test_a_cup_is_brought_from_a_cupboard_that_is_opened_and_shut_and_a_lid_is_put_on_a_pot() -> None:
+    scene = kitchen()
+    plan = scene.plan().plan
+    assert plan is not None
+    done = [step.behavior for step in plan.primitives]
+    assert done.index("F3_OPEN") < done.index("B3_GRASP") < done.index("F3_SHUT")
+    expected = expectations(scene.problem, plan.primitives)
+    rollout = verify(scene.embodiment, scene.problem.initial, plan.primitives, expected, beads=False)
+    assert rollout.failure is None
+    seen = {(symbol.situation, *symbol.arguments): value for symbol, value in rollout.state.items()}
+    assert seen["OPENED", "door"] == "false"
+    assert seen["LOCATION", "cup"] == "left_spot"
+    assert seen["LOCATION", "lid"] == "pot_top"
+
+
+def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
+    scene = kitchen()
+    skills, roles = by_skill(scene.embodiment), {"hand": "right_hand", "object": "drawer"}
+    with World(scene.embodiment, scene.problem.initial, seed=3, perturb=Perturbation(), beads=False) as world:
+        before = world.truth("jar")[1]
+        measured = perform(world, skills["operate"], roles)
+        moved = world.truth("jar")[1] - before
+        state = world.observe()
+        assert np.linalg.norm(moved) == pytest.approx(measured["joint"], abs=0.003)
+        assert state[Symbol("OPENED", ("drawer",))] == "true"
+        assert state[Symbol("LOCATION", ("jar",))] == "compartment"
+        perform(world, skills["operate_back"], roles)
+        assert np.linalg.norm(world.truth("jar")[1] - before) < 0.005
+        assert world.observe()[Symbol("OPENED", ("drawer",))] == "false"
+
+
+def test_a_button_latches_and_comes_out_when_it_is_pressed_again() -> None:
+    press, roles = by_skill(kitchen().embodiment)["press"], {"hand": "right_hand", "object": "button"}
+    with with_panel() as world:
+        for held in (True, False):
+            perform(world, press, roles)
+            assert (world.links["button"].values()["button"] > PANEL.links[0].opened) is held
+
+
+def test_a_button_that_resists_too_much_is_given_up_with_the_force() -> None:
+    press, roles = by_skill(kitchen().embodiment)["press"], {"hand": "right_hand", "object": "button"}
+    with with_panel(spring=200.0) as world, pytest.raises(SkillError) as failure:
+        perform(world, press, roles)
+    assert (failure.value.verdict.code, failure.value.verdict.objects) == ("stuck", ("button",))
+    assert failure.value.verdict.measured["joint"] < 0.003
+
+
+def test_what_stands_in_the_way_of_a_door_is_named_before_the_hand_moves() -> None:
+    scene = kitchen()
+    operate, roles = by_skill(scene.embodiment)["operate"], {"hand": "left_hand", "object": "door"}
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        displaced("lid", (-0.02, 0.52))(world)
+        with pytest.raises(SkillError) as failure:
+            perform(world, operate, roles)
+        assert (failure.value.verdict.code, failure.value.verdict.objects) == ("no path", ("door", "lid"))
+        assert world.steps == 0
+
+
+def test_the_lever_of_the_authoring_guide_is_turned_and_turned_back(tmp_path: Path) -> None:
+    guide = (Path(confab.__file__).parents[1] / "docs" / "authoring.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```ttl\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
+    imports = ", ".join(f"<https://w3id.org/confab/{name}>" for name in ("fittings-bodies", "two-arms"))
+    confab_prefixes = {"f": "fittings", "r": "two-arms", "e": "embodiment", "c": "core"}
+    prefixes = {name: f"https://w3id.org/confab/{file}#" for name, file in confab_prefixes.items()}
+    prefixes |= {"": "https://example.org/wall#", "owl": "http://www.w3.org/2002/07/owl#"}
+    prefixes |= {"rdfs": "http://www.w3.org/2000/01/rdf-schema#"}
+    head = "".join(f"@prefix {name}: <{iri}> .\n" for name, iri in prefixes.items())
+    file = tmp_path / "wall.ttl"
+    file.write_text(
+        f"{head}<https://example.org/wall> a owl:Ontology ; owl:imports {imports} .\n{block}", encoding="utf-8"
+    )
+    embodiment = confab.load(str(file)).embodiment
+    skills, roles = by_skill(embodiment), {"hand": "left_hand", "object": "lever"}
+    with World(embodiment, {}, seed=2, perturb=Perturbation()) as world:
+        for skill, value in (("operate", "true"), ("operate_back", "false")):
+            perform(world, skills[skill], roles)
+            assert world.observe()[Symbol("OPENED", ("lever",))] == value
+
+
+def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
+    scene = kitchen()
+    operate = by_skill(scene.embodiment)["operate"]
+    wrong = replace(operate, phases=(replace(operate.phases[0], to="thing.handle"),))
+    unset = replace(operate, phases=(replace(operate.phases[0], above="hover"),))
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        for use, word in ((wrong, "thing"), (unset, "hover")):
+            with pytest.raises(SkillError, match=f"'{word}' isn't told") as failure:
+                perform(world, use, {"hand": "left_hand", "object": "door"})
+            assert failure.value.verdict.code == "ill-defined"
+
+
+def test_validation_finds_a_feature_that_a_link_has_not() -> None:
+    embodiment = kitchen().embodiment
+    operate = embodiment.skills["F3_OPEN"]
+    wrong = replace(operate, phases=(replace(operate.phases[0], to="object.knob"),))
+    found = list(RULES["unknown-feature"](replace(embodiment, skills={"F3_OPEN": wrong})))
+    assert [name for name, *_ in found] == ["door", "drawer"]
+    assert list(RULES["unknown-feature"](embodiment)) == []
+
+
+def test_the_model_of_a_mechanism_is_where_physics_has_it() -> None:
+    mechanism = next(one for one in kitchen().embodiment.mechanisms if one.name == "cupboard")
+    mechanism = replace(mechanism, yaw=0.3)
+    with World(replace(kitchen().embodiment, mechanisms=(mechanism,), places={}, perceivers={}), {}) as world:
+        mechanic = world.links["door"]
+        for opened in (False, True):
+            mechanic.set("door", opened)
+            solid = next(one for one in mechanic.solids() if one.part == "door.bar")
+            rotation, origin = mechanic.frame("door")
+            bar = next(part for part in mechanic.link("door").parts if part.name == "door.bar")
+            np.testing.assert_allclose(solid.center, origin + rotation @ np.array(bar.position), atol=1e-9)
+        assert mechanic.values()["door"] == pytest.approx(wide(mechanic.link("door")))
+    assert read_mechanism(mechanism).parents["door"].kind == "revolute"
+
+
+def test_the_interpreter_has_all_that_phases_may_say() -> None:
+    assert {*phases.MOTIONS, "free"} == set(MOTIONS)
+    assert set(phases.FINGERS) == set(FINGERS)
+    assert set(phases.CONDITIONS) == set(CONDITIONS)
+    assert set(phases.QUANTITIES) == set(QUANTITIES)
+    said = {guard.code for use in kitchen().embodiment.skills.values() for p in use.phases for guard in p.checks}
+    assert said - {""} <= set(CODES)
