@@ -112,15 +112,22 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
         drawn.append(tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=f"{size:.1f}", class_="spot"))
         drawn.append(_text(x, y + size + 12, name(spot), "place"))
     together: dict[str, list[str]] = {}
-    for number, (thing, before, after) in enumerate(moves):
+    for number, (thing, before, after, away) in enumerate(moves):
         color, (x, y) = f"v{number % 8}", spots[after]
         way = f"{name(before)} → {name(after)}" if before != after else name(after)
         if before != after:
             drawn += _arrow(spots[before], spots[after], size, color)
         x += 5 * len(together.setdefault(after, []))
-        together[after].append(name(thing))
+        together[after].append(f"{name(thing)} ({name(away)})" if away else name(thing))
         dot = {"cx": f"{x:.1f}", "cy": f"{y:.1f}", "r": f"{size * 0.66:.1f}"}
-        drawn.append(tag("circle", tag("title", f"{name(thing)}: {way}"), class_=f"thing {color}", **dot))
+        drawn.append(
+            tag(
+                "circle",
+                tag("title", f"{name(thing)}: {way}"),
+                class_=f"{'before' if away else 'thing'} {color}",
+                **dot,
+            )
+        )
     for after, things in together.items():
         more = [f"+ {len(things) - MOST_NAMES} more"] if len(things) > MOST_NAMES else []
         for up, words in enumerate([*more, *things[:MOST_NAMES]]):
@@ -129,7 +136,7 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
     for x, y in map(at, ground.robots):
         drawn.append(_text(x, min(max(y, base + 24), height - 30), "robot (its left is left)", "place"))
     said = "; ".join(
-        f"{name(thing)} from {name(before)} to {name(after)}" for thing, before, after in moves if before != after
+        f"{name(thing)} from {name(before)} to {name(after)}" for thing, before, after, _ in moves if before != after
     )
     svg = tag(
         "svg", drawn, viewBox=f"0 0 {width:.0f} {height:.0f}", role="img", aria_label=f"Map: {said or 'nothing moved'}"
@@ -138,14 +145,14 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
     return tag("figure", svg, tag("figcaption", legend), class_="map")
 
 
-def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str]]:
-    """Return what stands on the map, with its first and its last place there.
+def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str, str]]:
+    """Return what stands on the map, with its first and its last place there, and where it is in the end if that's elsewhere.
 
     A thing stands where a situated object of it says that begins on the map and has no value of rest: what a hand passes
     on its way is no place of it. If several do, that counts which is longest on the map.
     """
     situations = course.problem.domain.situations
-    found: dict[str, tuple[float, str, str]] = {}
+    found: dict[str, tuple[float, str, str, str]] = {}
     for symbol, phases in sorted(course.phases.items()):
         places = [phase for phase in phases if phase.value in ground.spots]
         if len(symbol.arguments) != 1 or not places or phases[0].value not in ground.spots:
@@ -155,8 +162,9 @@ def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str]]:
         (thing,) = symbol.arguments
         long = sum(phase.end - phase.begin for phase in places)
         if thing not in found or long > found[thing][0]:
-            found[thing] = long, places[0].value, places[-1].value
-    return [(thing, before, after) for thing, (_, before, after) in sorted(found.items())]
+            last = phases[-1].value
+            found[thing] = long, places[0].value, places[-1].value, "" if last in ground.spots else last
+    return [(thing, before, after, away) for thing, (_, before, after, away) in sorted(found.items())]
 
 
 def _size(spots: Spots) -> float:

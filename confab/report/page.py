@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from pathlib import Path
 from string import Template
@@ -181,7 +182,7 @@ def _alarm(
             tag("h2", "✗ Failed: ", where),
             tag("p", f"after {failed.begin:.1f} {course.unit}", f", in “{' › '.join(above)}”" if above else None),
             tag("p", tag("b", failed.code or ""), f": {meaning}" if meaning else None),
-            tag("p", failed.note),
+            tag("p", re.sub(r" \(\w+ [-\d.e+]+(, \w+ [-\d.e+]+)*\)$", "", failed.note.removeprefix(f"{failed.code}: "))),
             tag("dl", pairs) if pairs else None,
             _reasons_of(execution),
             class_="alarm",

@@ -22,6 +22,8 @@
     const show = (time) => {
       cursor.style.display = "block";
       cursor.style.left = `${(100 * Math.min(time, end)) / end}%`;
+      const scroll = figure.querySelector(".scroll"), at = cursor.getBoundingClientRect().left, box = scroll.getBoundingClientRect();
+      if (at < box.left + 110 || at > box.right - 30) scroll.scrollLeft += at - (box.left + 0.6 * box.width);
       const now = [];
       for (const { bar, begin, share } of bars) {
         const on = begin <= time + slack && time < begin + (share * end) / 100 - slack;
