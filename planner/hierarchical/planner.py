@@ -21,7 +21,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.hierarchical.postoptimization import Improver, length, put_aside
+from planner.hierarchical.concerns import concerns, put_aside
+from planner.hierarchical.postoptimization import Improver, length
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
 from planner.hierarchical.subplans import LimitError, Watch, nobody
@@ -132,16 +133,16 @@ def _plan(
 
 def shorten(call: Call, improve: int, leave_levels: bool) -> None:
     """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
-    improver = Improver(call.refiner, call.using.shapes, improve)
-    concerns = improver.concerns(call.steps) if len(call.program.levels) > 1 else []
-    if not put_aside(concerns):
+    concerned = concerns(call.refiner, call.steps) if len(call.program.levels) > 1 else []
+    if not put_aside(concerned):
         return
+    improver = Improver(call.refiner, call.using.shapes, improve)
     first, call.steps = call.steps, reordered(call)
     if not leave_levels:
         return
     before = call.steps
     improver.clusters_left = improve if before is first else (improve + 1) // 2
-    call.steps = improver.improve(before, concerns if before is first else ())
+    call.steps = improver.improve(before, concerned if before is first else ())
     if length(call.steps) < length(before) and any(left.broken for left in levels_left(call.problem, call.tree())):
         call.steps = before
 

@@ -17,13 +17,14 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TypeAlias
 
+from planner.hierarchical.concerns import Concern, concerns, put_aside
 from planner.hierarchical.inherited_preconditions import binding
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
 from planner.hierarchical.subplans import Ground, LimitError
 from planner.hierarchical.subproblem import FEW, problem_of
 from planner.plan import OutOfTimeError, Reason, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
-from reasoner.symbols import Domain, Problem, Symbol, ValueCondition
+from reasoner.symbols import Domain, Problem, Symbol
 
 Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
 """What a step changes: the values before and after it."""
@@ -52,29 +53,6 @@ def worth_it(old: Sequence[RefinedStep], new: Sequence[RefinedStep]) -> bool:
     first = min(step.level for step in old) if old else 0
     given_up = [sum(step.level == first for step in steps) for steps in (old, new)]
     return length(old) - length(new) > max(given_up[0] - given_up[1], 0) / PER_PRIMITIVE
-
-
-@dataclass(frozen=True)
-class Concern:
-    """A step with the individuals that it moved, and the symbols of its own level that it changed and that it asked for."""
-
-    step: RefinedStep
-    moved: frozenset[str]
-    touched: frozenset[Cell]
-    asked: frozenset[Cell]
-
-
-def put_aside(steps: Sequence[Concern]) -> bool:
-    """Whether a step gives a symbol a value that nobody asks for before a later step overwrites it.
-
-    Only then can a level below save something that a level must do: elsewhere every step serves another one or the goal.
-    """
-    idle: set[Cell] = set()
-    for step in steps:
-        if not idle.isdisjoint(step.touched):
-            return True
-        idle = (idle - step.asked) | step.touched
-    return False
 
 
 def undone_by(changes: Sequence[Changes]) -> dict[int, int]:
@@ -125,7 +103,7 @@ class Improver:
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
 
-    def improve(self, steps: Sequence[RefinedStep], concerns: Sequence[Concern] = ()) -> list[RefinedStep]:
+    def improve(self, steps: Sequence[RefinedStep], known: Sequence[Concern] = ()) -> list[RefinedStep]:
         """Return steps to the same end, no longer than these; the table is left in the initial state.
 
         What they concern is looked for here if it isn't given.
@@ -136,7 +114,7 @@ class Improver:
         self.table.undo(0)
         if anew is not None:
             return anew if worth_it(best, anew) else best
-        found = self.clusters(concerns or self.concerns(best))
+        found = self.clusters(known or concerns(self.refiner, best))
         self.table.undo(0)
         best = found if worth_it(best, found) else best
         found = self.detours(best)
@@ -313,38 +291,6 @@ class Improver:
             found.append(again)
             position += 1
         return found
-
-    def concerns(self, steps: Sequence[RefinedStep]) -> list[Concern]:
-        """Return what each of the steps that were done concerns; the table is left in the initial state."""
-        self.table.undo(0)
-        found = []
-        for step in steps:
-            self.segments.check_time()
-            mark = len(self.table.trail)
-            self.refiner.redo(step)
-            found.append(self._concern(step, mark))
-        self.table.undo(0)
-        return found
-
-    def _concern(self, step: RefinedStep, mark: int) -> Concern:
-        """Return what a step has moved since a mark, what it has touched, and what it asked."""
-        level, name, arguments, bindings, _ = step
-        moved: set[str] = set()
-        touched: set[Cell] = set()
-        for situation, key, old in self.table.trail[mark:]:
-            if self.segments.program.domain.situations[situation].level <= level:
-                moved.update((old, self.table.now[situation][key]), arguments_of(key))
-                touched.add((situation, key))
-        behavior = self.segments.program.domain.behaviors[name]
-        terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
-        names = self.segments.program.variables[name]
-        terms |= dict(zip((f"?{variable}" for variable in names), bindings, strict=True))
-        asked = frozenset(
-            (c.situation, key_of(tuple(terms.get(a, a) for a in c.arguments)))
-            for c in behavior.preconditions
-            if isinstance(c, ValueCondition) and not c.negated
-        )
-        return Concern(step, frozenset(moved & {*arguments, *bindings}), frozenset(touched), asked)
 
     def _cluster(self, steps: Sequence[Concern], first: int) -> list[int]:
         """Return the positions of a step and of those soon after it that concern the same individuals.
