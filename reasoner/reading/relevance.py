@@ -339,12 +339,12 @@ class _Search:
         rows = []
         links, nodes = self.links, self.schema.nodes
         for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
-            if not isinstance(o, ox.NamedNode) and text(p) in links and text(s) not in nodes:
+            subject, said = text(s), text(p)
+            names = isinstance(o, ox.NamedNode)
+            if not names and said in links and subject not in nodes:
                 link((s, p, o))  # says what is wrong with it
-            if isinstance(s, ox.NamedNode) and (
-                isinstance(o, ox.NamedNode) or (isinstance(o, ox.Literal) and text(p) != TYPE)
-            ):
-                rows.append((s.value, text(p), text(o)))
+            if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
+                rows.append((subject, said, text(o)))
         self.triples.update(dict.fromkeys(rows))
         kinds = self._below(classes)
         self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
