@@ -136,7 +136,14 @@ def ways(task: Task) -> Bound:
             if old == away:
                 break
         tables.append((mask, away))
-    return lambda state: sum(away.get(state & mask, math.inf) for mask, away in tables)
+
+    def bound(state: int) -> float:
+        total = 0.0
+        for mask, away in tables:
+            total += away.get(state & mask, math.inf)
+        return total
+
+    return bound
 
 
 def _single(mask: int) -> list[int]:
