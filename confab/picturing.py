@@ -216,7 +216,6 @@ def _top(world: World, name: str) -> Array:
 
 def _table(scene: Scene, path: Path) -> Path:
     """Take a picture of the world as it begins, with objects, places, and who reaches those that not every hand does."""
-    import numpy as np
     from PIL import Image, ImageDraw, ImageFont
 
     from confab.reaching import with_reach
@@ -236,10 +235,11 @@ def _table(scene: Scene, path: Path) -> Path:
         hide_vessels(world)
         image = Image.fromarray(picture(world, camera))
         tops = {name: _top(world, name) for name in world.bodies}
+        spots = {name: world.place(name) for name in scene.embodiment.places}
     every = [hand for robot in scene.embodiment.robots for hand in robot.hands]
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     for place in scene.embodiment.places.values():
-        x, y = camera.pixel(np.array(place.position))
+        x, y = camera.pixel(spots[place.name])
         hands = sorted(hand for hand, *rest in reached if rest == [place.name])
         who = ", ".join(hands) if len(hands) < len(every) else ""
         words = f"{place.name}: {who or 'no hand'}" if who or not hands else place.name

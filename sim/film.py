@@ -152,7 +152,7 @@ class Film:
         canvas = Image.fromarray(image)
         draw, font = ImageDraw.Draw(canvas, "RGBA"), ImageFont.load_default(12)
         for place in world.embodiment.places.values():
-            x, y = self.camera.pixel(np.array(place.position))
+            x, y = self.camera.pixel(world.place(place.name))
             draw.text(
                 (x, y + 8), self.names.get(place.name, place.name), fill=(60, 40, 20, 200), font=font, anchor="mt"
             )

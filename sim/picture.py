@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from reasoner.embodiment.values import Embodiment, Shape
 from sim.bodies import outline, wall
 from sim.engine import Engine
+from sim.linkage import with_open_mechanisms
 from sim.urdf import Array, read_urdf
 from sim.urdf import rotation as rotated
 
@@ -111,8 +112,8 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
     below : int
         Pixels at the bottom where something else will be.
     """
-    places = np.array([place.position for place in embodiment.places.values()])
-    middle = places.mean(0)
+    places, _ = with_open_mechanisms(embodiment)
+    middle = np.array([place.position for place in places.values()]).mean(0)
     base = np.array(embodiment.robots[0].position) if embodiment.robots else middle - [0.5, 0.0, 0.0]
     away = middle - base
     away[2] = 0.0
@@ -136,12 +137,16 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
 
 def _seen(embodiment: Embodiment) -> Array:
     """Return points (n, 3) that a picture shall show: corners of tables, what stands on places, robots without their arms."""
+    places, around = with_open_mechanisms(embodiment)
     points: list[Array] = []
+    for solid in around:
+        corners = np.array([(dx, dy, dz) for dx in (-1, 1) for dy in (-1, 1) for dz in (-1, 1)]) * np.array(solid.half)
+        points.append(corners @ solid.rotation.T + solid.center)
     for fixture in embodiment.fixtures:
         half = np.array(fixture.size) / 2
         corners = np.array([(dx, dy, dz) for dx in (-1, 1) for dy in (-1, 1) for dz in (-1, 1)]) * half
         points.append(corners @ rotated(0.0, 0.0, fixture.yaw).T + np.array(fixture.position))
-    for place in embodiment.places.values():
+    for place in places.values():
         x, y, z = place.position
         points.append(np.array([(x, y, z), (x, y, z + TALL)]))
     for robot in embodiment.robots:
@@ -152,7 +157,7 @@ def _seen(embodiment: Embodiment) -> Array:
                 for shift in (-1.0, 1.0):
                     points.append(cover.centers + shift * cover.radii[:, None] * np.array([0.0, 0.0, 1.0]))
     seen = np.concatenate(points)
-    low = min((place.position[2] for place in embodiment.places.values()), default=0.0) - LEGS
+    low = min((place.position[2] for place in places.values()), default=0.0) - LEGS
     return np.maximum(seen, [-np.inf, -np.inf, low])
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from confab.report.course import Course
 from confab.report.markup import Markup, tag
 from reasoner.embodiment.values import Embodiment
@@ -49,6 +51,9 @@ def _table(embodiment: Embodiment) -> Ground | None:
     def seen(x: float, y: float) -> tuple[float, float]:
         return -y, -x
 
+    from sim.linkage import with_open_mechanisms
+
+    places, solids = with_open_mechanisms(embodiment)
     boxes = []
     for fixture in embodiment.fixtures:
         half = [(dx * fixture.size[0] / 2, dy * fixture.size[1] / 2) for dx, dy in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
@@ -56,8 +61,16 @@ def _table(embodiment: Embodiment) -> Ground | None:
             (x * cos(fixture.yaw) - y * sin(fixture.yaw), x * sin(fixture.yaw) + y * cos(fixture.yaw)) for x, y in half
         ]
         boxes.append(tuple(seen(fixture.position[0] + x, fixture.position[1] + y) for x, y in turned))
+    of: dict[str, list[tuple[float, float]]] = {}
+    for solid in solids:
+        reach = abs(solid.rotation) @ np.array(solid.half)
+        for sign in (-1, 1):
+            of.setdefault(solid.name, []).append(seen(*(solid.center + sign * reach)[:2]))
+    for corners in of.values():  # what mechanisms cover when all is open
+        (left, right), (back, front) = ((min(side), max(side)) for side in zip(*corners, strict=True))
+        boxes.append(((left, back), (right, back), (right, front), (left, front)))
     return Ground(
-        {place.name: seen(*place.position[:2]) for place in embodiment.places.values()},
+        {place.name: seen(*place.position[:2]) for place in places.values()},
         tuple(boxes),
         robots=tuple(seen(*robot.position[:2]) for robot in embodiment.robots),
     )

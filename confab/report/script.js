@@ -19,7 +19,9 @@
     const slack = end / 5000;
     const cursor = figure.querySelector(".cursor"), said = figure.querySelector("output");
     const bars = [...figure.querySelectorAll("a.bar")].map((bar) => ({ bar, begin: Number(bar.dataset.t), share: parseFloat(bar.style.width) }));
+    let shown = null;
     const show = (time) => {
+      shown = time;
       cursor.style.display = "block";
       cursor.style.left = `${(100 * Math.min(time, end)) / end}%`;
       const scroll = figure.querySelector(".scroll"), at = cursor.getBoundingClientRect().left, box = scroll.getBoundingClientRect();
@@ -32,6 +34,7 @@
       }
       said.textContent = `${time.toFixed(1)} ${unit}${now.length ? ": " + now.join(" › ") : ""}`;
     };
+    addEventListener("resize", () => { if (shown !== null) show(shown); });
     const lanes = figure.querySelector(".lanes"), over = figure.querySelector(".over");
     lanes.addEventListener("click", (event) => {
       const box = over.getBoundingClientRect();

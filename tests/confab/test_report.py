@@ -18,6 +18,7 @@ from confab.cli import app
 from confab.memory import Memory
 from confab.report import report_html
 from confab.report.course import of_episode, of_plan, of_rollout
+from confab.report.maps import ground_of
 from confab.report.notebook import SHOWN
 from confab.report.pieces import anchor
 from confab.table import Table
@@ -238,3 +239,14 @@ def test_plan_and_execute_write_a_page_and_learning_a_curve(tmp_path: Path) -> N
     assert run(app, [*learn, "--plot", str(curve), "--rounds", "2"]).exit_code == 0
     assert "</svg>" in curve.read_text()
     assert run(app, [*learn, "--plot", str(tmp_path / "curve.txt")]).exit_code != 0
+
+
+def test_a_place_in_a_drawer_is_on_the_map_where_the_drawer_is() -> None:
+    scene = confab.load("kitchen-corner")
+    ground = ground_of(scene.problem, scene.embodiment)
+    assert ground is not None
+    for name, place in scene.embodiment.places.items():
+        beside = min(
+            abs(complex(*ground.spots[name]) - complex(*other)) for n, other in ground.spots.items() if n != name
+        )
+        assert beside > 0.05, (name, place)
