@@ -5,6 +5,7 @@
 #   make check    what a change must pass: lint, format, types, tests
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
+#   make vocabulary  docs/vocabulary.md from the ontology files
 #   make fuzz     100,000 broken inputs at every door, going on where the last run ended
 #   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
 #   make clean    remove .venv, caches and results
@@ -19,13 +20,13 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test test-all check bench figures fuzz lock clean
+.PHONY: help demo test test-all check bench figures vocabulary fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
 
 demo: $(VENV)/installed
-	@$(BIN)/confab run
+	@$(BIN)/confab run --memory confab-out/run-memory.ttl
 
 test: $(VENV)/installed
 	@$(BIN)/python -m pytest -n auto
@@ -38,6 +39,9 @@ check: $(VENV)/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto
+
+vocabulary: $(VENV)/installed
+	@$(BIN)/python -m benchmarks.vocabulary
 
 fuzz: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.fuzz

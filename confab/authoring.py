@@ -30,6 +30,8 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 </catalog>
 """
 TERMS = [CORE + name for name in ("behavior", "situationType", "relation")]
+WORDS = [CORE + name for name in ("facts", "asks", "answer")]
+"""What names terms in texts."""
 ROLES = [CORE + name for name in ARGUMENTS]
 
 
@@ -210,7 +212,7 @@ def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.
     value: Any = quad.object
     if isinstance(value, ox.NamedNode):
         value = ox.NamedNode(table.get(value.value, value.value))
-    elif isinstance(value, ox.Literal) and quad.predicate.value == CORE + "facts":
+    elif isinstance(value, ox.Literal) and quad.predicate.value in WORDS:
         value = ox.Literal(re.sub(r"\w+", lambda match: words.get(match[0], match[0]), value.value))
     return ox.Triple(quad.subject, quad.predicate, value)
 

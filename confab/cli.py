@@ -1,16 +1,17 @@
 """The command line: one function per command, each a few calls to the rooms behind it.
 
-Results go to stdout, progress and errors to stderr. Exit 0: yes; 1: the answer is no; 2: misuse or unreadable input; 3: gave up
-at a limit; 4: a fault of ours. Heavy imports wait inside the commands that need them.
+Results go to stdout, progress and errors to stderr (`confab.terminal`). Exit 0: yes; 1: the answer is no; 2: misuse or
+unreadable input; 3: gave up at a limit; 4: a fault of ours. Heavy imports wait inside the commands that need them.
 """
 
 from __future__ import annotations
 
+import glob
 import json
-import os
+import logging
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -18,6 +19,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 from click.exceptions import Exit
 
+import ontology
+from confab.examples import examples
+from confab.progress import progress
+from confab.terminal import GAVE_UP, NO, YES, remark, run_to_end, show_result
 from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
@@ -28,9 +33,6 @@ if TYPE_CHECKING:
     from planner.plan import Plan
     from reasoner.limits import Deadline
 
-YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
-LONGEST = 2_000
-"""Signs of a message: it quotes what others wrote, which may be of any length."""
 FORMS = {
     ".ttl": "turtle",
     ".txt": "table",
@@ -41,10 +43,6 @@ FORMS = {
     ".srx": "sparql-xml",
 }
 """What a query's answer can be written as, by the ending of the file's name."""
-WITHOUT_PHYSICS = (
-    "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
-    "pip install 'confab-planner[physics]' compiles it; all but physics works without"
-)
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 
 PATH = click.Path(path_type=Path)
@@ -67,15 +65,54 @@ def _version(context: click.Context, option: click.Parameter, wanted: bool) -> N
         raise Exit
 
 
+def _quiet(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    if wanted or context.parent is None:
+        logging.disable(logging.WARNING if wanted else logging.NOTSET)
+
+
+def _completion(context: click.Context, option: click.Parameter, shell: str | None) -> None:
+    if shell:
+        from click.shell_completion import get_completion_class
+
+        kind = get_completion_class(shell)
+        assert kind is not None
+        print(kind(app, {}, "confab", "_CONFAB_COMPLETE").source())
+        raise Exit
+
+
+def _scenes(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
+    """Return what a scene's name can go on with: shipped names, and files of ontologies."""
+    folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
+    found = sorted(folder.glob(f"{glob.escape(begun.rpartition('/')[2])}*"))
+    files = [str(path) + "/" * path.is_dir() for path in found if path.is_dir() or path.suffix in ontology.SUFFIXES]
+    return [*(name for name in ontology.scenes() if name.startswith(begun)), *files]
+
+
+QUIET = click.option(
+    "-q", "--quiet", is_flag=True, expose_value=False, callback=_quiet, help="Say nothing but results and errors."
+)
+
+
 @click.group(name="confab", cls=InOrder, context_settings=SETTINGS)
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Print the version and exit."
 )
+@click.option(
+    "--completion",
+    type=click.Choice(["bash", "zsh", "fish"]),
+    is_eager=True,
+    expose_value=False,
+    callback=_completion,
+    help='Print what completes commands, scenes and files: eval "$(confab --completion bash)".',
+)
+@QUIET
 def app() -> None:
     """Plan what a robot does from an ontology, and verify it in physics."""
 
 
-SCENE = click.argument("scene", metavar="SCENE", help="Shipped name, file, or URL of a SPARQL endpoint.")
+SCENE = click.argument(
+    "scene", metavar="SCENE", shell_complete=_scenes, help="Shipped name, file, or URL of a SPARQL endpoint."
+)
 SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
 GOALS = click.option(
     "--goal",
@@ -88,7 +125,11 @@ MEMORY_FILE = click.option(
 )
 NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan without memory, in so many words.")
 MODE = click.option(
-    "--mode", default="guarded", metavar="MODE", help="guarded, leading, strict, optimal, or paper (eq. 5)."
+    "--mode",
+    default="guarded",
+    metavar="MODE",
+    shell_complete=lambda *_: ["guarded", "leading", "strict", "optimal", "paper"],
+    help="guarded, leading, strict, optimal, or paper (eq. 5).",
 )
 TIME_LIMIT = click.option(
     "--time-limit",
@@ -99,10 +140,19 @@ TIME_LIMIT = click.option(
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
 GUI = click.option("--gui", is_flag=True, help="Show the first rollout in a window; needs a screen.")
-OUT = click.option("--out", type=PATH, default=Path("confab-out"), metavar="DIR", help="Where files are written.")
+OUT = click.option(
+    "-o",
+    "--output",
+    "--out",
+    "out",
+    type=PATH,
+    default=Path("confab-out"),
+    metavar="DIR",
+    help="Folder to write into.",
+)
 
 
-@app.command()
+@app.command(epilog=examples("plan"))
 @SCENE
 @GOALS
 @MEMORY_FILE
@@ -127,8 +177,10 @@ OUT = click.option("--out", type=PATH, default=Path("confab-out"), metavar="DIR"
 )
 @click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
 @click.option("--report", type=PATH, metavar="FILE.html", help="Write the plan and its reasons as a page.")
+@click.option("-o", "--output", "out", type=PATH, metavar="PLAN.json", help="Write the plan into this file.")
 @SCENE_IRI
 @AS_JSON
+@QUIET
 def plan(
     scene: str,
     goal: tuple[str, ...],
@@ -143,39 +195,49 @@ def plan(
     engine: str | None,
     level: int | None,
     report: Path | None,
+    out: Path | None,
     iri: str | None,
     as_json: bool,
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
+    from confab.show import summary
     from reasoner.limits import Deadline
 
     deadline = Deadline.after(time_limit)
+    if out is not None:
+        _json(out)
     loaded = _load(scene, iri, deadline)
     if diff is not None:
         from confab.authoring import difference
 
         changed = difference(_load(diff), loaded, mode)
-        _print(changed.json() if as_json else str(changed))
+        show_result(changed.json() if as_json else str(changed))
         raise Exit(YES)
     remembered = _memory(memory, no_memory, loaded)
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     limit = None if time_limit is None else deadline
-    result = loaded.plan(
-        goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
-    )
+    with progress("planning"):
+        result = loaded.plan(
+            goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
+        )
     if report is not None:
         result.report(report)
-    _print(result.json() if as_json else result)
+    if out is not None:
+        show_result(f"{result.save(out)}: {summary(result.outcome)}")
+    else:
+        show_result(result.json() if as_json else result)
+    _doubt(loaded)
     raise Exit(EXIT[result.outcome.status.value])
 
 
-@app.command()
+@app.command(epilog=examples("run"))
 @click.argument(
     "scene",
     required=False,
     default="beverage-serving",
     metavar="[SCENE]",
+    shell_complete=_scenes,
     help="Shipped name, file, or URL of a SPARQL endpoint.",
 )
 @MEMORY_FILE
@@ -184,6 +246,7 @@ def plan(
 @OUT
 @click.option("--no-video", is_flag=True, help="Don't film: faster.")
 @GUI
+@QUIET
 def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_video: bool, gui: bool) -> None:
     """Validate, plan, verify in physics, learn and report."""
     from confab.running import run as run_all
@@ -191,7 +254,7 @@ def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_vid
     raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
 
 
-@app.command()
+@app.command(epilog=examples("verify"))
 @SCENE
 @click.argument(
     "plan", type=PATH, metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form."
@@ -202,7 +265,9 @@ def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_vid
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--video", type=PATH, metavar="OUT.mp4", help="Film the first rollout.")
 @GUI
+@click.option("-o", "--output", "out", type=PATH, metavar="VERDICTS.json", help="Write the verdicts into this file.")
 @AS_JSON
+@QUIET
 def verify(
     scene: str,
     plan: Path,
@@ -212,21 +277,30 @@ def verify(
     perturb: bool,
     video: Path | None,
     gui: bool,
+    out: Path | None,
     as_json: bool,
 ) -> None:
     """Carry a plan out in physics and check every primitive."""
     from confab.physics import counted
 
+    if out is not None:
+        _json(out)
     loaded = _load(scene)
     with counted(rollouts) as done:
         report = loaded.verify(
             _plan(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
         )
-    _print(report.json() if as_json else report)
+    if out is not None:
+        from reasoner.files import write_whole
+
+        write_whole(out, json.dumps(report.json(), indent=1) + "\n")
+        show_result(f"{out}: {report.summary()}")
+    else:
+        show_result(report.json() if as_json else report)
     raise Exit(YES if report.verified else NO)
 
 
-@app.command()
+@app.command(epilog=examples("execute"))
 @SCENE
 @click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
 @click.option(
@@ -238,13 +312,29 @@ def verify(
 @NO_MEMORY
 @MODE
 @SEED
-@click.option("--save", type=PATH, metavar="EPISODE.ttl", help="Write the episode here.")
+@click.option(
+    "-o",
+    "--output",
+    "--save",
+    "save",
+    type=PATH,
+    metavar="EPISODE.ttl",
+    help="Write the episode into this file.",
+)
 @click.option("--report", type=PATH, metavar="FILE.html", help="Write what happened as a page.")
 @SCENE_IRI
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
 @click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
+@click.option(
+    "--serve",
+    "serve_at",
+    type=click.IntRange(0, 65535),
+    metavar="PORT",
+    help="Meanwhile show it on a page, and answer SPARQL, at this port.",
+)
 @AS_JSON
+@QUIET
 def execute(
     scene: str,
     world: str,
@@ -261,17 +351,25 @@ def execute(
     perturb: bool,
     both_hands: bool,
     learn: bool,
+    serve_at: int | None,
     as_json: bool,
 ) -> None:
     """Act in a closed loop: watch, be interrupted, repair, replan."""
-    from confab.live import spectator
+    from confab.live import both, spectator
     from confab.memory import Memory, undisturbed
 
     loaded = _load(scene, iri)
     remembered = _memory(memory, no_memory, loaded)
     if learn and (memory is None or remembered is None):
         raise KnowledgeError("--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)")
-    with spectator() as tell:
+    with ExitStack() as stack:
+        tell = stack.enter_context(spectator())
+        if serve_at is not None:
+            from confab.serving import serving
+
+            server = stack.enter_context(serving(loaded, serve_at))
+            remark(f"{server.url} shows what happens, {server.url}sparql answers SPARQL 1.1")
+            tell = both(tell, server.service.take)
         execution = loaded.execute(
             plan,
             intervene or (),
@@ -293,16 +391,47 @@ def execute(
         execution.save(save)
     if report is not None:
         execution.report(report)
-    _print(execution.json() if as_json else execution)
+    show_result(execution.json() if as_json else execution)
     raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
 
-@app.command()
+@app.command(epilog=examples("serve"))
+@SCENE
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=7879, metavar="N", help="On 127.0.0.1; 0 is any free one."
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0),
+    default=60.0,
+    metavar="S",
+    help="Seconds after which a query ends.",
+)
+@click.option(
+    "--rows", type=click.IntRange(min=1), default=100000, metavar="N", help="More rows than this end it, too."
+)
+@QUIET
+def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
+    """Serve a scene as a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
+    from threading import Event
+
+    from confab.serving import serving
+    from reasoner.graph.apart import QueryLimits
+
+    with serving(_load(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
+        show_result(f"{server.url}sparql answers SPARQL 1.1, {server.url} shows the scene; Ctrl-C ends it")
+        sys.stdout.flush()
+        Event().wait()
+
+
+@app.command(epilog=examples("query"))
 @SCENE
 @click.argument(
     "sparql", required=False, metavar="[QUERY]", help="SPARQL text, a .rq file, or a ready query: where-was-it."
 )
-@click.option("--episodes", metavar="FILE", help="Ask this saved episode as well; repeatable.")
+@click.option(
+    "--episodes", multiple=True, type=PATH, metavar="FILE", help="Ask this saved episode as well; repeatable."
+)
 @click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies it.")
 @click.option("--applicable", is_flag=True, help="With --show: the query with its preconditions, where it can be done.")
 @click.option("--affords", metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
@@ -329,10 +458,11 @@ def execute(
 @click.option("--service", is_flag=True, help="Let the query ask other endpoints (SERVICE).")
 @SCENE_IRI
 @AS_JSON
+@QUIET
 def query(
     scene: str,
     sparql: str | None,
-    episodes: list[Path] | None,
+    episodes: tuple[Path, ...],
     show: str | None,
     applicable: bool,
     affords: str | None,
@@ -355,7 +485,7 @@ def query(
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
     if applicable and show is None:
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
-    loaded = _load(scene, iri).with_episodes(*(episodes or ()))
+    loaded = _load(scene, iri).with_episodes(*episodes)
     if show is not None:
         print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
         return
@@ -366,7 +496,8 @@ def query(
             raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
         print(f"{out}: {loaded.construct(_sparql(sparql), out, limits)} triples")
         return
-    table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql), limits)
+    with progress("asking"):
+        table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql), limits)
     form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
     if form is None or form not in FORMS.values():
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
@@ -375,8 +506,15 @@ def query(
     raise Exit(NO if table.truth is False else YES)
 
 
-@app.command()
-@click.argument("scenes", nargs=-1, required=True, metavar="SCENE…", help="Scenes to gather experience in.")
+@app.command(epilog=examples("learn"))
+@click.argument(
+    "scenes",
+    nargs=-1,
+    required=True,
+    metavar="SCENE…",
+    shell_complete=_scenes,
+    help="Scenes to gather experience in.",
+)
 @click.option("--memory", type=PATH, required=True, metavar="FILE", help="Memory file to learn into; made if missing.")
 @click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
 @click.option("--plot", type=PATH, metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF.")
@@ -387,6 +525,7 @@ def query(
     help="How often all scenes are gone through.",
 )
 @AS_JSON
+@QUIET
 def learn(
     scenes: tuple[str, ...],
     memory: Path,
@@ -404,9 +543,10 @@ def learn(
     status, curve = YES, Curve()
     if plot is not None:
         require_drawable(plot)
-    rounds = rounds or (6 if plot is not None and len(scenes) == 1 else 1)
-    with undisturbed(memory):
-        for name in scenes * rounds:
+    scenes *= rounds or (6 if plot is not None and len(scenes) == 1 else 1)
+    with undisturbed(memory), progress("learning", 2 * len(scenes)) as advance:
+        for name in scenes:
+            advance(f"planning in {name}", 0)
             loaded = _load(name)
             if remembered is None:
                 remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
@@ -415,29 +555,41 @@ def learn(
             links = remembered.links
             if demonstration:
                 remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+                advance(f"learned {name}", 2)
             else:
                 result = loaded.plan()
                 if not result.solved:
                     status = EXIT[result.outcome.status.value]
                     why = result.outcome.reason.text if result.outcome.reason else ""
-                    _say(f"{name}: nothing to learn, {result.outcome.status.value}: {why}")
+                    remark(f"{name}: nothing to learn, {result.outcome.status.value}: {why}")
+                    advance(name, 2)
                     continue
+                advance(f"learning {name}", 1)
                 remembered.teach(loaded, result.plan)
+                advance(f"learned {name}", 1)
             if remembered.links is links:
-                _say(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned")
+                remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned")
         assert remembered is not None
         if remembered.experience.episodes:
             remembered.save(memory)
     if plot is not None:
         curve.save(plot)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
-    _print(data if as_json else f"{memory}: {remembered!r}")
+    show_result(data if as_json else f"{memory}: {remembered!r}")
     raise Exit(status)
 
 
-@app.command()
+@app.command(epilog=examples("new"))
 @click.argument("domain", metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")
-@click.option("--folder", type=PATH, metavar="DIR", help="Where to write; default: DOMAIN.")
+@click.option(
+    "-o",
+    "--output",
+    "--folder",
+    "folder",
+    type=PATH,
+    metavar="DIR",
+    help="Folder to write into; default: DOMAIN.",
+)
 @click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
 def new(domain: str, folder: Path | None, bodies: bool) -> None:
     """Begin a domain of your own with a commented skeleton."""
@@ -446,23 +598,34 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
     files = new_domain(domain, folder or Path(domain), bodies)
     scene = next(file for file in files if file.stem.endswith("-scene"))
     then = "run" if bodies else "plan"
-    _print("\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"]))
+    show_result(
+        "\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"])
+    )
 
 
-@app.command()
+@app.command(epilog=examples("fetch"))
 @click.argument("url", metavar="URL", help="IRI of an ontology that lies on the web.")
-@click.option("--into", "folder", type=PATH, default=Path(), metavar="DIR", help="Beside the file that imports it.")
+@click.option(
+    "-o",
+    "--output",
+    "--into",
+    "folder",
+    type=PATH,
+    default=Path(),
+    metavar="DIR",
+    help="Folder of the file that imports it.",
+)
 def fetch(url: str, folder: Path) -> None:
     """Fetch an ontology that is imported by URL."""
     from reasoner.graph.fetching import fetch as fetch_ontology
 
     fetched = fetch_ontology(url, folder)
-    _print(
+    show_result(
         "\n".join([f"{fetched.file}, named in {fetched.catalog}", *(f"it imports {iri}" for iri in fetched.imports)])
     )
 
 
-@app.command()
+@app.command(epilog=examples("picture"))
 @SCENE
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="FILE.png", help="File to draw into.")
 @click.option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
@@ -480,40 +643,62 @@ def memory_app() -> None:
     """Look after a memory file."""
 
 
-@memory_app.command()
+@memory_app.command(epilog=examples("memory migrate"))
 @click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
 def migrate(memory: Path, renames: tuple[str, ...]) -> None:
     """Rename terms in a memory, so that what was learned of them isn't lost."""
     from confab.authoring import migrate as rename
 
-    _print(f"{memory}: {rename(memory, renames)} statements changed")
+    show_result(f"{memory}: {rename(memory, renames)} statements changed")
 
 
-@app.command()
-@click.argument("files", nargs=-1, required=True, metavar="FILE…", help="Ontology files, or names of shipped scenes.")
+@app.command(epilog=examples("validate"))
+@click.argument(
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="FILE…",
+    shell_complete=_scenes,
+    help="Ontology files, or names of shipped scenes.",
+)
 @click.option("--deep", is_flag=True, help="Ask HermiT for contradictions as well; needs Java.")
 @click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
+@click.option("--watch", is_flag=True, help="Check again whenever one of the files changes, until Ctrl-C.")
 @AS_JSON
-def validate(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> None:
+@QUIET
+def validate(files: tuple[str, ...], deep: bool, strict: bool, watch: bool, as_json: bool) -> None:
     """Check ontologies: what is wrong where, why, and what to do."""
+    from confab.watching import again_and_again
+
+    code = _validated(files, deep, strict, as_json)
+    for _ in again_and_again(files) if watch else ():
+        code = _validated(files, deep, strict, as_json)
+    raise Exit(code)
+
+
+def _validated(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> int:
+    """Check some files, print what was found, and return the exit code."""
     from reasoner.validation.findings import ERROR, WARNING
+    from reasoner.validation.validate import STAGES
     from reasoner.validation.validate import validate as check
 
-    findings = check(files, deep=deep)
+    with progress("validating", len(files) * STAGES) as advance:
+        findings = check(files, deep=deep, done=lambda what: advance(what, 1))
     errors, warnings = (sum(finding.severity == kind for finding in findings) for kind in (ERROR, WARNING))
     if as_json:
-        _print([finding.as_dict() for finding in findings])
+        show_result([finding.as_dict() for finding in findings])
     else:
-        _print("\n".join([*map(str, findings), *([] if errors or warnings else ["nothing is wrong"])]))
+        show_result("\n".join([*map(str, findings), *([] if errors or warnings else ["nothing is wrong"])]))
         if errors or warnings:
             from confab.memory import counted
 
-            print(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}", file=sys.stderr)
-    raise Exit(NO if errors or (strict and warnings) else YES)
+            remark(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}")
+    sys.stdout.flush()
+    return NO if errors or (strict and warnings) else YES
 
 
-@app.command()
+@app.command(epilog=examples("explain"))
 @SCENE
 @click.argument(
     "which", required=False, metavar="[STEP]", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."
@@ -533,6 +718,7 @@ def validate(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) ->
 @click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
 @click.option("--plot", type=PATH, metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
 @AS_JSON
+@QUIET
 def explain(
     scene: str,
     which: str | None,
@@ -548,9 +734,10 @@ def explain(
     """Say why each step is there, why not another one, or why no plan."""
     loaded = _load(scene)
     remembered = _memory(memory, False, loaded)
-    result = loaded.plan(goal or (), remembered)
+    with progress("planning"):
+        result = loaded.plan(goal or (), remembered)
     if not result.solved:
-        _print(result.json() if as_json else result)
+        show_result(result.json() if as_json else result)
         raise Exit(EXIT[result.outcome.status.value])
     if level not in result.problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
@@ -566,7 +753,7 @@ def explain(
                 "--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT"
             )
         told = result.explain() if which is None else result.why(which)
-    _print(told.json() if as_json else told)
+    show_result(told.json() if as_json else told)
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
@@ -589,7 +776,7 @@ def _by_memory(result: Result, memory: Memory, which: str, against: str | None, 
     return found
 
 
-@memory_app.command()
+@memory_app.command(epilog=examples("memory show"))
 @click.argument("memory", metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
 @click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="So many rows.")
 @AS_JSON
@@ -599,13 +786,13 @@ def show(memory: str, most: int, as_json: bool) -> None:
 
     loaded = Memory.load(memory)
     if as_json:
-        _print({"memory": memory, "summary": repr(loaded), "counts": loaded.counts(most).records()})
+        show_result({"memory": memory, "summary": repr(loaded), "counts": loaded.counts(most).records()})
     else:
-        _print(repr(loaded))
-        _print(loaded.counts(most))
+        show_result(repr(loaded))
+        show_result(loaded.counts(most))
 
 
-@memory_app.command()
+@memory_app.command(epilog=examples("memory merge"))
 @click.argument("memories", nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge.")
 @click.option(
     "-o", "--output", "out", type=PATH, required=True, metavar="FILE", help="The merged memory; may be one of them."
@@ -620,10 +807,10 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
         for source in memories[1:]:
             merged.merge(Memory.load(source), trust)
         merged.save(out)
-    _print(f"{out}: {merged!r}")
+    show_result(f"{out}: {merged!r}")
 
 
-@memory_app.command("trust")
+@memory_app.command("trust", epilog=examples("memory trust"))
 @click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
 def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
@@ -634,10 +821,10 @@ def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
         loaded = Memory.load(memory)
         loaded.trust(sorted(loaded.experience.episodes) if replicas == ("all",) else replicas)
         loaded.save(memory)
-    _print(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
+    show_result(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")
 
 
-@app.command()
+@app.command(epilog=examples("generate"))
 @click.argument("family", metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable.")
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option("--objects", type=int, default=4, metavar="N", help="Objects, half of them cups.")
@@ -652,7 +839,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
-@app.command("import")
+@app.command("import", epilog=examples("import"))
 @click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
 @click.argument("problem", type=PATH, metavar="PROBLEM.pddl")
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
@@ -668,7 +855,7 @@ def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
     print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
 
-@app.command()
+@app.command(epilog=examples("export"))
 @SCENE
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
 @click.option("--level", type=int, help="Level to export; the lowest if not given.")
@@ -686,7 +873,22 @@ def _load(source: str, iri: str | None = None, deadline: Deadline | None = None)
     from confab.reaching import with_current_reach
     from confab.scene import load
 
-    return with_current_reach(load(source, iri, deadline), _say)
+    with progress(f"reading {source}"):
+        scene = load(source, iri, deadline)
+    return with_current_reach(scene, remark)
+
+
+def _doubt(scene: Scene) -> None:
+    """Say in one line if `confab validate` would find errors in a scene of the user's own."""
+    path = scene.knowledge.path
+    if path is None or path.is_relative_to(ontology.ROOT):
+        return
+    from reasoner.validation.validate import quick_errors
+
+    errors = quick_errors(scene.knowledge)
+    if errors:
+        more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
+        remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
 
 
 def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
@@ -705,19 +907,19 @@ def _memory(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
             lines = memory_lines(path)
             if unknown := unknown_terms(lines, scene.knowledge):
-                _say(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
+                remark(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
         if not path.is_file():
             raise
-        _say(f"{error}; planning goes on without memory")
+        remark(f"{error}; planning goes on without memory")
         return None
 
 
 def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -> None:
     """Print the rows of a query, or write them into a file."""
     if form == "table" and out is None:
-        _print("true" if table.truth else table if table.truth is None else "false")
+        show_result("true" if table.truth else table if table.truth is None else "false")
         return
     if form == "table":
         text = f"{table!r}\n"
@@ -761,6 +963,13 @@ def _sparql(given: str) -> str:
     return given
 
 
+def _json(path: Path) -> Path:
+    """Return the path of a plan or of verdicts to write, if it says that it is JSON."""
+    if path.suffix.lower() != ".json":
+        raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
+    return path
+
+
 def _turtle(path: Path) -> Path:
     """Return the path of a scene to write, if a scene can be read from there again."""
     if path.suffix.lower() != ".ttl":
@@ -782,108 +991,6 @@ def _plan(path: Path, scene: Scene) -> Plan:
         raise KnowledgeError(f"{path}: {error}") from error
 
 
-def _print(what: Any) -> None:
-    """Print JSON data, a line of text, or what rich can show, to stdout."""
-    if isinstance(what, dict | list):
-        print(json.dumps(what, indent=1, ensure_ascii=False))
-    elif isinstance(what, str):
-        print(what)
-    else:
-        from confab.show import show as show_whole
-
-        show_whole(what)
-
-
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
-    from planner.language import DomainError
-    from reasoner.limits import LimitError
-
-    _open_streams()
-    try:
-        code = app(arguments, prog_name="confab", standalone_mode=False) or YES  # None where a command decides nothing
-        sys.stdout.flush()
-    except click.ClickException as error:
-        _end(MISUSE, _usage(error))
-    except (KnowledgeError, DomainError) as error:
-        _end(MISUSE, str(error))
-    except LimitError as error:
-        _end(GAVE_UP, str(error))
-    except MemoryError:
-        _end(GAVE_UP, "gave up: there isn't enough memory for this")
-    except RecursionError as error:
-        _end(GAVE_UP, f"gave up: something is nested too deeply to be worked on; where, is said in {_log(error)}")
-    except (KeyboardInterrupt, click.Abort):
-        _end(INTERRUPTED, "interrupted; every file is as it was before, or whole")
-    except OSError as error:
-        try:
-            sys.stdout.flush()
-        except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still buffered has nowhere to go
-        _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
-    except Exception as error:
-        if isinstance(error, ModuleNotFoundError) and error.name == "pybullet":
-            _end(MISUSE, WITHOUT_PHYSICS)
-        what = f"{type(error).__name__}: {error}"
-        _end(
-            BUG,
-            f"a fault of Confab, not yours ({what[:200]}); please open an issue (CONTRIBUTING.md) with {_log(error)}",
-        )
-    sys.exit(code)
-
-
-def _open_streams() -> None:
-    """See to it that no file that is opened later takes the place of a standard stream that the caller has closed."""
-    closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
-    for _ in closed:
-        os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
-    if 2 in closed:
-        sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
-    if 1 in closed:
-        sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
-        _end(MISUSE, "stdout is closed, so that nothing could be answered; nothing was done")
-
-
-def _is_open(stream: int) -> bool:
-    try:
-        os.fstat(stream)
-    except OSError:
-        return False
-    return True
-
-
-def _log(error: BaseException) -> str:
-    """Write a traceback into a file of its own and return where it lies."""
-    import tempfile
-    import traceback
-
-    said = "".join(traceback.format_exception(error))
-    try:
-        with tempfile.NamedTemporaryFile("w", prefix="confab-", suffix=".log", delete=False, encoding="utf-8") as file:
-            file.write(f"{sys.version}\n{sys.argv}\n{said}")
-    except OSError as failure:
-        return f"what follows, since no log can be written ({failure.strerror}): {said.splitlines()[-3:]}"
-    return file.name
-
-
-def _usage(error: Any) -> str:
-    """Return in one line what is wrong with a call; where nothing at all was asked for, print the help instead."""
-    if type(error).__name__ == "NoArgsIsHelpError":
-        error.show()
-        sys.exit(MISUSE)
-    command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
-    said = " ".join(error.format_message().split()).rstrip(".")
-    return f"{said[:1].lower()}{said[1:]}; see {command} --help"
-
-
-def _say(text: str) -> None:
-    """Say something on stderr in one line, whatever signs it quotes."""
-    line = " ".join(text.split())
-    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
-    with suppress(OSError):
-        print(f"confab: {shown}{' …' if len(line) > LONGEST else ''}", file=sys.stderr)
-
-
-def _end(code: int, text: str) -> NoReturn:
-    _say(text)
-    sys.exit(code)
+    """Run the command line: whatever happens in it ends as an exit code and at most one line on stderr."""
+    run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from planner.acting.executive import Moment
+from reasoner.symbols import Symbol
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -20,14 +21,18 @@ LOG = 6
 
 @dataclass(repr=False)
 class View:
-    """What is shown of the last moment, and of what happened before."""
+    """What is shown of the last moment, and of what happened before; `known` is what holds now, as far as that was observed."""
 
     moment: Moment | None = None
     log: list[str] = field(default_factory=list)
+    known: dict[Symbol, str] = field(default_factory=dict)
 
     def take(self, moment: Moment) -> None:
         """Take note of a moment."""
         self.moment = moment
+        if moment.what == "end":
+            self.known |= {fact.symbol: fact.value for fact in moment.expected}
+            self.known |= {s.symbol: s.observed for s in moment.surprises if s.observed is not None}
         if moment.what == "intervention":
             self.log.append(f"✋ {moment.text}")
         elif moment.what in ("repair", "replan"):
@@ -41,7 +46,7 @@ class View:
         """Return what is to be said of each step: done, or being done."""
         if self.moment is None:
             return {}
-        notes = {step.path: "✓" for step in self.moment.plan.walk() if not step.steps and step.path in self.moment.done}
+        notes = {step.path: "✓" for step in self.moment.plan.walk() if _is_done(step, self.moment)}
         if self.moment.what == "begin" and self.moment.step is not None:
             notes[self.moment.step.path] = "◀ " + "; ".join(map(str, self.moment.expected))
         return notes
@@ -96,6 +101,17 @@ def spectator() -> Iterator[Tell | None]:
             yield tell
     else:
         yield None
+
+
+def both(one: Tell | None, other: Tell) -> Tell:
+    """Return what tells two spectators."""
+
+    def tell(moment: Moment) -> None:
+        if one is not None:
+            one(moment)
+        other(moment)
+
+    return tell
 
 
 @contextmanager

@@ -173,8 +173,10 @@ class Memory:
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 
-    def merge(self, other: Memory, trust: bool = False) -> None:
-        """Take in another memory's counts; with `trust`, they may lead. The paper's links can't be merged and stay as they are."""
+    def merge(self, other: Memory | str | Path, trust: bool = False) -> None:
+        """Take in the counts of another memory, or of its file; with `trust`, they may lead. The paper's links can't be merged."""
+        if not isinstance(other, Memory):
+            other = Memory.load(other)
         self.experience.merge(other.experience)
         if trust:
             self.trusted.update(other.experience.episodes)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from confab.labels import Labels, labels_of
+from confab.progress import progress
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Fact, State
@@ -21,7 +22,6 @@ from sim.world import Step as PrimitiveStep
 from sim.world import World
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
     from rich.tree import Tree
 
     from confab.scene import Scene
@@ -262,25 +262,15 @@ def _shown(
         return trial.run(seed, watch, progress, gui)
 
 
-def progress_bar() -> Progress:
-    """Return a rich progress bar on stderr, which goes away when it is done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:<44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-
-
 @contextmanager
 def counted(rollouts: int) -> Iterator[Done]:
     """Show a progress bar on stderr; give what counts a rollout as done."""
-    with progress_bar() as bar:
-        task, good = bar.add_task("rollouts", total=rollouts), 0
+    with progress("rollouts", rollouts) as advance:
+        good = 0
 
         def done(rollout: Rollout) -> None:
             nonlocal good
             good += rollout.ok
-            bar.update(task, advance=1, description=f"rollouts, {good} verified")
+            advance(f"rollouts, {good} verified", 1)
 
         yield done

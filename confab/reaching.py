@@ -15,8 +15,14 @@ from reasoner.vocabulary import EMBODIMENT, EPISODES
 log = logging.getLogger(__name__)
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
-  FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }} }}"""
-"""A file with an episode is about a scene that has its own reach."""
+  FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
+  FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
+"""A file with an episode, or a memory, is about a scene that has its own reach."""
+
+
+def has_robot(scene: Scene) -> bool:
+    """Return whether a scene has a robot with a body, which physics could move."""
+    return bool(scene.knowledge.select(ROBOTS))
 
 
 def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:

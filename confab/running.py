@@ -1,14 +1,14 @@
-"""The main job, end to end: validate, plan, verify in physics, learn from it, report."""
+"""The main job, end to end: validate, plan, verify in physics where there are bodies, learn from it, report."""
 
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 from confab.memory import Memory, undisturbed
-from confab.physics import Report, progress_bar
-from confab.reaching import with_reach
+from confab.physics import Report
+from confab.progress import progress, tell
+from confab.reaching import has_robot, with_reach
 from confab.scene import Result, Scene, load
 from confab.show import show
 from planner.plan import Status
@@ -22,7 +22,9 @@ TOLD = 8
 
 
 def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool, gui: bool = False) -> int:
-    """Do the main job on a scene and say on stdout what came of it; files go to `out`.
+    """Do the main job on a scene and say on stdout what came of it; files go to `out`, what was learned to `memory` alone.
+
+    A scene without a robot's body is planned in, and the plan is checked; physics has no say then.
 
     Returns
     -------
@@ -35,68 +37,71 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
         The scene, or the memory, can't be read.
     """
     tell("validating")
-    findings = validate([name])
+    with progress("validating") as advance:
+        findings = validate([name], done=lambda what: advance(what, 0))
     if findings:
         print("\n".join(map(str, findings)))
     if any(finding.serious for finding in findings):
         return NO
-    tell("loading the scene, and computing what the hands reach if that isn't known")
-    scene = with_reach(load(name))
+    tell("loading the scene")
+    scene = load(name)
+    bodies = has_robot(scene)
+    scene = with_reach(scene) if bodies else scene
     tell("planning")
-    remembered = Memory.load(memory, scene) if memory else Memory.of(scene)
-    result = scene.plan(memory=remembered, mode=mode)
+    with progress("planning"):
+        remembered = Memory.load(memory, scene) if memory and memory.exists() else Memory.of(scene)
+        result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
         show(result)
+        print(f"report    {reported(scene, result, None, None, out)}")
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
-    report = verified(scene, result, seed, out / "run.mp4" if film else None, gui)
-    show(report)
-    assert_observed(scene.knowledge, report.rollouts[0].state, scene.names)
-    target = out / "memory.ttl"
-    with undisturbed(target):
-        if memory and target.exists() and memory.samefile(target):  # others may have learned meanwhile
-            remembered = Memory.load(memory, scene)
-        if report.verified:
-            remembered.learn(scene, result.plan)
-        remembered.save(target)
-    for what, path in {"memory": target, **written(scene, result, report, out)}.items():
+    report = verified(scene, result, seed, out / "run.mp4" if film else None, gui) if bodies else None
+    show(result if report is None else report)
+    if memory and (report is None or report.verified):
+        with undisturbed(memory):
+            if memory.exists():  # others may have learned meanwhile
+                remembered = Memory.load(memory, scene)
+            remembered.learn(scene, result)
+            remembered.save(memory)
+    files = written(scene, result, report, remembered if memory else None, out)
+    for what, path in {"memory": memory, **files}.items() if memory else files.items():
         print(f"{what:<9} {path}")
-    return YES if report.verified else NO
+    return YES if report is None or report.verified else NO
 
 
 def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: bool = False) -> Report:
     """Return what physics says of a plan, with a progress bar on stderr meanwhile."""
     steps = result.plan.primitives
     tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
-    with progress_bar() as bar:
-        task = bar.add_task("", total=len(steps))
+    with progress("carrying out", len(steps)) as advance:
 
-        def progress(done: int, step: object) -> None:
-            bar.update(task, completed=done, description=str(step))
+        def before(done: int, step: object) -> None:
+            advance(str(step), bool(done))
             if done and done % TOLD == 0:
                 tell(f"{done} of {len(steps)} primitives done")
 
-        return scene.verify(result.plan, seed=seed, video=video, gui=gui, progress=progress)
+        return scene.verify(result, seed=seed, video=video, gui=gui, progress=before)
 
 
-def tell(what: str) -> None:
-    """Say on stderr what goes on, where no progress bar can be shown."""
-    if not sys.stderr.isatty():
-        print(f"confab: {what}", file=sys.stderr, flush=True)
-
-
-def written(scene: Scene, result: Result, report: Report, out: Path) -> dict[str, Path]:
-    """Write plan, verdicts, observed facts and report, and return what lies where."""
+def reported(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> Path:
+    """Write the report of a run, and return where it lies."""
     from confab.report import report_html
 
-    paths = {
-        "plan": result.save(out / "plan.json"),
-        "verdicts": out / "verify.json",
-        "observed": out / "observed.ttl",
-        "report": out / "report.html",
-    }
+    path = out / "report.html"
+    write_whole(path, report_html(scene, result, report, learned=learned))
+    return path
+
+
+def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> dict[str, Path]:
+    """Write plan and report, of what was carried out verdicts and observed facts too, and return what lies where."""
+    paths = {"plan": result.save(out / "plan.json"), "report": reported(scene, result, report, learned, out)}
+    if report is None:
+        return paths
+    paths |= {"verdicts": out / "verify.json", "observed": out / "observed.ttl"}
     write_whole(paths["verdicts"], json.dumps(report.json(), indent=1) + "\n")
-    save_observed(paths["observed"], report.rollouts[0].state, scene.names, scene.iri)
-    write_whole(paths["report"], report_html(scene, result, report))
+    seen = report.rollouts[0].state
+    assert_observed(scene.knowledge, seen, scene.names)
+    save_observed(paths["observed"], seen, scene.names, scene.iri)
     if report.video is not None:
         paths |= {"video": report.video, "stills": report.video.with_suffix("")}
     return paths

@@ -286,11 +286,13 @@ class Scene:
         LimitError
             It takes more time, rows or memory than the limits allow.
         """
-        from reasoner.graph.apart import ask
+        from reasoner.graph.apart import ask, unheard_of
 
         kind, columns, found = ask(self._asked(sparql), sparql, limits)
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
+        if not found and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
+            log.warning("confab: the scene doesn't speak of %s; is the prefix the right one?", ", ".join(unheard))
         columns = ["subject", "predicate", "object"] if kind == "triples" else columns
         rows = tuple(tuple(self._cell(term) for term in row) for row in found)
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
@@ -748,7 +750,7 @@ def _sentence(facts: Iterable[Fact]) -> str:
 
 
 def load(source: str | Path, scene: str | None = None, deadline: Deadline | None = None) -> Scene:
-    """Load a scene: a shipped name, a file in Turtle, N-Triples or RDF/XML, or the URL of a SPARQL 1.1 endpoint.
+    """Load a scene: a shipped name, a file of RDF, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
     ----------

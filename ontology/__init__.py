@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 CATALOG = "catalog-v001.xml"
-SUFFIXES = (".ttl", ".owl", ".rdf", ".nt")
+SUFFIXES = (".ttl", ".owl", ".rdf", ".nt", ".jsonld", ".trig", ".nq")
 SATELLITES = ("reach", "memory", "observed", "episodes")
 """Middle parts of the names of files that belong to a scene, as in ``SCENE.reach.ttl``."""
 

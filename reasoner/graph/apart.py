@@ -10,6 +10,7 @@ import pickle
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
@@ -23,6 +24,7 @@ from reasoner.limits import LimitError
 from reasoner.names import nearest
 from reasoner.vocabulary import CORE
 
+UNION = tuple(BASE + name for name in GRAPHS)
 PROCESS = Path(__file__).with_name("asked_apart.py")
 SECONDS, ROWS, MEGABYTES = 60.0, 100_000, 2_000
 TEXTS = re.compile(
@@ -37,6 +39,7 @@ WORDS = re.compile(
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
 """More that could stand there than helps anybody."""
+NAMESPACES = re.compile(r"\bPREFIX\s+([\w-]*):\s*<([^<>]*)>", re.IGNORECASE)
 PLACE = re.compile(r"error at (\d+):(\d+): ")
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
@@ -86,7 +89,6 @@ class Apart:
         self._setup = pickle.dumps(
             {
                 "prefixes": graph.spoken,
-                "graphs": [BASE + name for name in GRAPHS],
                 "quads": graph.store.dump(format=ox.RdfFormat.N_QUADS),
                 "memory": limits.megabytes * 1_000_000,
                 "rows": limits.rows,
@@ -101,20 +103,24 @@ class Apart:
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         """End the process."""
+        self.close()
+
+    def close(self) -> None:
+        """End the process, if it has begun."""
         if self._process is not None:
             self._process.kill()
             self._process.communicate()
             self._process = None
 
-    def ask(self, query: str) -> Answer:
-        """Return what a query answers; errors as of the function `ask`."""
+    def ask(self, query: str, graphs: Sequence[str] = UNION) -> Answer:
+        """Return what a query answers on the union of some graphs; errors as of the function `ask`."""
         self.graph.round_trips += 1
-        found = self._answer(core_names(self.graph, allowed(query, self.limits)))
+        found = self._answer(core_names(self.graph, allowed(query, self.limits)), graphs)
         if found[0] == "error":
-            found = self._answer(query)  # as it was written, so that the position is right
+            found = self._answer(query, graphs)  # as it was written, so that the position is right
         return _checked(self.graph, query, self.limits, found)
 
-    def _answer(self, query: str) -> Answer:
+    def _answer(self, query: str, graphs: Sequence[str]) -> Answer:
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, str(PROCESS)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -131,7 +137,7 @@ class Apart:
         timer = Timer(self.limits.seconds, end)
         timer.start()
         try:
-            self._send(pickle.dumps(query))
+            self._send(pickle.dumps((query, list(graphs))))
             answer: Answer = pickle.load(process.stdout)
             return answer
         except (EOFError, pickle.UnpicklingError):
@@ -209,18 +215,36 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
     if own == CORE or "" in DECLARED.findall(query):
         return query
 
-    def said(iri: str) -> bool:
-        node = ox.NamedNode(iri)
-        places = (node, None, None), (None, node, None), (None, None, node)
-        return any(next(graph.store.quads_for_pattern(*place), None) for place in places)
-
     def put(match: re.Match[str]) -> str:
         name = match["name"]
         if match["text"] is not None or match["prefix"] is not None or name is None:
             return match[0]
-        return f"<{CORE}{name}>" if said(CORE + name) and not said(own + name) else match[0]
+        core_alone = _speaks_of(graph, CORE + name) and not _speaks_of(graph, own + name)
+        return f"<{CORE}{name}>" if core_alone else match[0]
 
     return WORDS.sub(put, query)
+
+
+def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
+    """Return the prefixed names in a query of which the graph doesn't speak, each with where such a name is."""
+    known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
+    found = []
+    for match in WORDS.finditer(core_names(graph, query)):
+        prefix, name = match["prefix"] or "", match["name"]
+        if match["text"] is not None or name is None or prefix not in known or _speaks_of(graph, known[prefix] + name):
+            continue
+        near = next((p for p, space in sorted(known.items()) if _speaks_of(graph, space + name)), None)
+        found.append(f"{prefix}:{name}" + (f" (did you mean {near}:{name}?)" if near is not None else ""))
+    return list(dict.fromkeys(found))
+
+
+def _speaks_of(graph: KnowledgeGraph, iri: str) -> bool:
+    try:
+        node = ox.NamedNode(iri)
+    except ValueError:
+        return False
+    places = (node, None, None), (None, node, None), (None, None, node)
+    return any(next(graph.store.quads_for_pattern(*place), None) for place in places)
 
 
 def standing_alone(graph: KnowledgeGraph, query: str) -> str:

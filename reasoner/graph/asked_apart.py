@@ -25,21 +25,21 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))  # stdin, stdout, stderr: there is no further one to be had
     while True:
         try:
-            query = pickle.load(sys.stdin.buffer)
+            query, graphs = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        said = pickle.dumps(answer(store, query, asked))
+        said = pickle.dumps(answer(store, query, graphs, asked))
         if len(said) > asked["memory"] // 10:  # it takes several times as much where it is read
             said = pickle.dumps(("too many", (), ()))
         sys.stdout.buffer.write(said)
         sys.stdout.buffer.flush()
 
 
-def answer(store: ox.Store, query: str, asked: dict[str, Any]) -> tuple[str, object, object]:
-    """Return what one query gives."""
+def answer(store: ox.Store, query: str, graphs: list[str], asked: dict[str, Any]) -> tuple[str, object, object]:
+    """Return what one query gives, on the union of some graphs."""
     try:
-        graphs = [ox.NamedNode(name) for name in asked["graphs"]]
-        found = store.query(query, prefixes=asked["prefixes"], default_graph=graphs)  # type: ignore[arg-type]
+        union = [ox.NamedNode(name) for name in graphs]
+        found = store.query(query, prefixes=asked["prefixes"], default_graph=union)  # type: ignore[arg-type]
         if isinstance(found, ox.QueryBoolean):
             return "truth", (), bool(found)
         columns = [variable.value for variable in getattr(found, "variables", ())]

@@ -19,7 +19,23 @@ FORMATS = {
     ".nt": ox.RdfFormat.N_TRIPLES,
     ".owl": ox.RdfFormat.RDF_XML,
     ".rdf": ox.RdfFormat.RDF_XML,
+    ".xml": ox.RdfFormat.RDF_XML,
+    ".jsonld": ox.RdfFormat.JSON_LD,
+    ".trig": ox.RdfFormat.TRIG,
+    ".nq": ox.RdfFormat.N_QUADS,
 }
+SYNTAXES = {".ofn": "functional syntax", ".omn": "Manchester syntax", ".owx": "OWL/XML", ".obo": "OBO"}
+"""What no library here reads as it is meant."""
+SIGNS = (
+    (rb"(@prefix|@base|PREFIX|BASE)\s", ox.RdfFormat.TURTLE),
+    (rb"[{\[]", ox.RdfFormat.JSON_LD),
+    (rb"(Prefix|Ontology)\s*\(", SYNTAXES[".ofn"]),
+    (rb"(Prefix|Ontology):\s", SYNTAXES[".omn"]),
+    (rb"(<\?xml[^>]*>\s*)?(<!DOCTYPE\s+Ontology|<Ontology\s)", SYNTAXES[".owx"]),
+    (rb"format-version:", SYNTAXES[".obo"]),
+)
+"""How files begin that are called .owl, or .rdf, and hold something else."""
+REMOTE = re.compile(rb'"@context"\s*:\s*(\[\s*)?"')
 MOST_EXPANDED = 50_000_000
 """Bytes that all references to entities of a document may stand for."""
 PLAIN = re.compile(r"[^\s<>&%\"']*")
@@ -38,14 +54,25 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
     Raises
     ------
     DocumentError
-        Another kind of file; no XML; entities that read other files, or grow.
+        Another kind of file, and what to save it as; no XML; entities that read other files, or grow.
     OSError
         The file can't be read.
     """
-    form = FORMATS.get(file.suffix.lower())
+    ending = file.suffix.lower()
+    form: ox.RdfFormat | str | None = FORMATS.get(ending) or SYNTAXES.get(ending)
     if form is None:
         raise DocumentError(f"unknown kind of file; wanted one of {', '.join(FORMATS)}")
     content = file.read_bytes()
+    if form == ox.RdfFormat.RDF_XML:
+        begin = re.sub(rb"^(\xef\xbb\xbf)?(\s*#[^\n]*\n|\s+)*", b"", content[:10_000])
+        form = next((found for sign, found in SIGNS if re.match(sign, begin)), form)
+    if isinstance(form, str):
+        raise DocumentError(
+            f"is in {form}, which isn't read here; open it in Protégé and save it as Turtle or RDF/XML (File, Save as …), or "
+            f"convert it: robot convert -i {file.name} -o {file.stem}.ttl"
+        )
+    if form == ox.RdfFormat.JSON_LD and REMOTE.search(content):
+        raise DocumentError("its @context lies elsewhere, and nothing is fetched; put the context itself into the file")
     return (plain_xml(content) if form == ox.RdfFormat.RDF_XML else content), form
 
 

@@ -7,6 +7,7 @@ in the shipped one.
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -23,7 +24,7 @@ import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
 from reasoner.names import nearest
-from reasoner.vocabulary import PREFIXES
+from reasoner.vocabulary import CORE, PREFIXES
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
@@ -96,7 +97,7 @@ class KnowledgeGraph:
     @property
     def spoken(self) -> dict[str, str]:
         """The prefixes of people's queries: the scene's, as its file declares them, before ours."""
-        return {**self.prefixes, **self.declared}
+        return {"confab": CORE, **self.prefixes, **self.declared}
 
     def require_whole(self) -> None:
         """Raise `KnowledgeError` if something is missing that planning would need."""
@@ -186,7 +187,7 @@ def load(
     Parameters
     ----------
     source : str or Path
-        Name of a shipped scene, or a file in Turtle, N-Triples or RDF/XML.
+        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads.
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
     deadline : Deadline, optional
@@ -247,6 +248,12 @@ def scene_file(source: str | Path) -> Path:
     path = Path(source)
     if path.is_file():
         return path.resolve()
+    found = sorted(path.iterdir() if path.is_dir() else path.parent.glob(f"{glob.escape(path.name)}.*"))
+    files = [file for file in found if file.suffix in ontology.SUFFIXES]
+    files.sort(key=lambda file: "scene" not in file.stem)
+    if files or path.is_dir():
+        which = f"; did you mean '{files[0]}'?" if files else ", without a file of an ontology in it"
+        raise KnowledgeError(f"'{source}' is {'a folder' if path.is_dir() else 'no file'}{which}")
     near = nearest(str(source), shipped)
     raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene ({', '.join(shipped)}){near}")
 
@@ -257,7 +264,11 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
         timed = _Timed(content, graph.deadline, f"reading {file}")
-        graph.store.load(input=timed, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
+        if form.supports_datasets:  # whatever graphs it has, it is one file
+            quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
+            graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
+        else:
+            graph.store.load(input=timed, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
         if any(sign in content for sign in TRIPLE_TERMS) and graph.query(HAS_TRIPLE_TERM, [name]):
             raise KnowledgeError(f"{file}: speaks of triples (RDF 1.2), which OWL doesn't know; take them out")
         read_prefixes(graph, file)

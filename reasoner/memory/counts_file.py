@@ -2,7 +2,8 @@
 
 Each counter is an individual per replica, epoch, behaviour and classes of its roles, `:associatedWith` the patterns that it
 counted; an ``owl:Axiom`` on each of these links has `:chosen`, `:passedOver`, `:failed` and the `:probability` that they amount to.
-Writers never share a counter, patterns are named by their content: the union of two files is a file of both memories.
+Writers never share a counter, patterns are named by their content: the union of two files is a file of both memories. A pattern
+leads to its lifted facts, each an individual with what it asks, the answer, and its place among the others.
 
 A file is written one link a line, and such lines are read by a regular expression; in any other layout (Protégé's, say) the
 triples themselves are read.
@@ -14,7 +15,7 @@ import hashlib
 import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from urllib.error import URLError
 from urllib.parse import quote, unquote, urlencode
@@ -28,9 +29,11 @@ from reasoner.memory.counts import Conclusion, Experience, Pattern, Tally
 from reasoner.names import Names
 from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDFS
 
-FORMAT = 2
+FORMAT, OLDER = 3, 2
+"""In an older file a pattern has all its facts in one text."""
 TALLY = ("chosen", "passedOver", "failed")
-BETWEEN = " | "  # facts of a pattern; no line break, which the OWL API turns into an n when it saves Turtle
+BETWEEN = " | "  # facts of a pattern in an older file
+SHOWN = 3  # facts of a pattern that its label names
 PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
 
 HEAD = """@prefix : <{core}> .
@@ -47,9 +50,10 @@ LINK = (
 )
 MOST = 2**53  # so far counts are exact as floating-point numbers
 COUNTS = re.compile(
-    r"^m:(?:(pattern_\w+) a owl:NamedIndividual, :Pattern ; :facts \"([^\"\\\n]*)\" \.\n|"
-    r"(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\3 ; "
-    r"owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:\4 ; "
+    r"^m:(?:(pattern_\w+) a owl:NamedIndividual, :Pattern ; "
+    r"(?:rdfs:label \"[^\"\\\n]*\" ; :fact (m:[^\n;]*)|:facts \"([^\"\\\n]*)\") \.\n|"
+    r"(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\4 ; "
+    r"owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:\5 ; "
     r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
     re.MULTILINE,
 )
@@ -58,26 +62,32 @@ COUNTS = re.compile(
 
 @dataclass(frozen=True)
 class Lines:
-    """A memory file taken apart: the facts of patterns, the links with their counts, and the rest as Turtle."""
+    """A memory file taken apart: the links with their counts, the facts of patterns, and the rest as Turtle.
 
-    facts: dict[str, str]
-    links: list[tuple[str, str, Tally]]
-    rest: str
+    `facts` are a pattern's facts as the file names them (``m:fact_…``), `texts` what older files say of a pattern.
+    """
+
+    links: list[tuple[str, str, Tally]] = field(default_factory=list)
+    facts: dict[str, list[str]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    rest: str = ""
 
 
 def lines(text: str) -> Lines:
     """Take a memory file apart."""
-    facts, links, rest, at = {}, [], [], 0
+    links, facts, texts, rest, at = [], {}, {}, [], 0
     for match in COUNTS.finditer(text):
         if match.start() > at:
             rest.append(text[at : match.start()])
         at = match.end()
-        pattern, said, counter, about, *counts = match.groups()
-        if pattern is not None:
-            facts[MEMORY + pattern] = said
+        pattern, parts, said, counter, about, *counts = match.groups()
+        if parts is not None:
+            facts[MEMORY + pattern] = parts.split(", ")
+        elif pattern is not None:
+            texts[MEMORY + pattern] = said
         else:
             links.append((counter, about, Tally(*map(int, counts))))
-    return Lines(facts, links, "".join([*rest, text[at:]]))
+    return Lines(links, facts, texts, "".join([*rest, text[at:]]))
 
 
 def new_replica() -> str:
@@ -127,6 +137,7 @@ def turtle(experience: Experience, names: Names, domain: str, only: str | None =
             yield f"{node} a owl:NamedIndividual, :Replica ; :replica {_text(replica)} ; :episodes {episodes} .\n"
     written: set[Pattern] = set()
     ids: dict[Pattern, str] = {}
+    lifted: dict[tuple[int, str, str], str] = {}
     for (replica, epoch), tallies in sorted(experience.counts.items()):
         if only not in (None, replica):
             continue
@@ -144,8 +155,16 @@ def turtle(experience: Experience, names: Names, domain: str, only: str | None =
                 name = ids.get(pattern) or ids.setdefault(pattern, _pattern(pattern))
                 if pattern not in written:
                     written.add(pattern)
-                    facts = BETWEEN.join(f"{fact}: {value}" for fact, value in pattern)
-                    yield f"m:{name} a owl:NamedIndividual, :Pattern ; :facts {_text(facts)} .\n"
+                    for place, (fact, value) in enumerate(pattern):
+                        if (place, fact, value) not in lifted:
+                            lifted[place, fact, value] = _lifted(place, fact, value)
+                            yield (
+                                f"m:{lifted[place, fact, value]} a owl:NamedIndividual, :LiftedFact ; :index {place} ; "
+                                f":asks {_text(fact)} ; :answer {_text(value)} ; rdfs:label {_text(f'{fact}: {value}')} .\n"
+                            )
+                    parts = ", ".join(f"m:{lifted[place, fact, value]}" for place, (fact, value) in enumerate(pattern))
+                    facts = f" ; :fact {parts}" if parts else ""
+                    yield f"m:{name} a owl:NamedIndividual, :Pattern ; rdfs:label {_text(_label(pattern))}{facts} .\n"
                 yield LINK.format(counter=counter, pattern=name, t=tally, p=probability(tally))
 
 
@@ -154,6 +173,17 @@ def _counter(replica: str, epoch: int, conclusion: Conclusion) -> str:
     words = ".".join((conclusion.behavior, *conclusion.classes))
     digest = hashlib.sha1(f"{words} {replica}".encode(), usedforsecurity=False).hexdigest()[:16]
     return f"{re.sub(r'[^A-Za-z0-9_]', '_', words)}_{epoch}_{digest}"
+
+
+def _lifted(place: int, fact: str, value: str) -> str:
+    """Return the name of a lifted fact, which says what it is and is no other's."""
+    digest = hashlib.sha1(f"{place}|{fact}|{value}".encode(), usedforsecurity=False).hexdigest()[:14]
+    return f"fact_{digest}"
+
+
+def _label(pattern: Pattern) -> str:
+    said = ", ".join(f"{fact}: {value}" for fact, value in pattern[:SHOWN])
+    return said + (f" and {len(pattern) - SHOWN} more" if len(pattern) > SHOWN else "")
 
 
 def _pattern(pattern: Pattern) -> str:
@@ -219,20 +249,23 @@ class Pairs(dict[str, tuple[str, str]]):
 
 
 def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: Names | None) -> Experience:
-    links, facts = list(found.links), dict(found.facts)
+    links, facts, texts = list(found.links), dict(found.facts), dict(found.texts)
     nodes: dict[str, dict[str, str]] = {}
     trusts: dict[str, set[str]] = {}
+    lifted: dict[str, set[str]] = {}
     for triple in triples:
         predicate = triple.predicate.value.removeprefix(CORE)
         if predicate == "trusts":
             trusts.setdefault(_id(triple.subject), set()).add(_id(triple.object))
+        if predicate == "fact":
+            lifted.setdefault(_id(triple.subject), set()).add(_id(triple.object))
         nodes.setdefault(_id(triple.subject), {})[predicate] = _id(triple.object)
     iri, head = next(((iri, node) for iri, node in nodes.items() if "memoryFormat" in node), ("", None))
     if head is None:
         raise KnowledgeError(
             f"{source}: no memory of counts: it says no :memoryFormat; a memory of the paper's mode has none"
         )
-    if head["memoryFormat"] != str(FORMAT):
+    if head["memoryFormat"] not in (str(FORMAT), str(OLDER)):
         raise KnowledgeError(
             f"{source}: memory of format {head['memoryFormat']}, wanted {FORMAT}: this version doesn't read it; "
             "learn anew, or use the version of Confab that wrote it"
@@ -248,9 +281,17 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 counter, pattern = (_local(node[OWL + end]) for end in ("annotatedSource", "annotatedTarget"))
                 links.append((counter, pattern, Tally(*(int(node.get(key, "0")) for key in TALLY))))
         counters = {key: _meaning(node, names) for key, node in nodes.items() if "epoch" in node}
-        facts |= {key: node["facts"] for key, node in nodes.items() if "facts" in node}
+        texts |= {key: node["facts"] for key, node in nodes.items() if "facts" in node}
         pairs = Pairs()
-        patterns = {key: _facts(text, _local(key), source, pairs) for key, text in facts.items()}
+        patterns = {key: _facts(text, _local(key), source, pairs) for key, text in texts.items()}
+        said = {
+            key: (int(node["index"]), (node["asks"], node["answer"])) for key, node in nodes.items() if "asks" in node
+        }
+        patterns |= {key: () for key in nodes.keys() - patterns.keys() if key.startswith(MEMORY + "pattern_")}
+        short = {f"m:{_local(key)}": fact for key, fact in said.items()}
+        for known, parts_of in ((said, lifted), (short, facts)):
+            for name, parts in parts_of.items():
+                patterns[name] = tuple([fact for _, fact in sorted([known[part] for part in parts])])
         for counter, pattern, tally in links:
             who, conclusion = counters[MEMORY + counter]
             table = experience.counts.setdefault(who, {}).setdefault(conclusion, {})
@@ -316,7 +357,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
     triples = [q.triple for q in ox.parse(answer, format=ox.RdfFormat.N_TRIPLES)]
     if not triples:
         return Experience(own)
-    found = _experience(triples, Lines({}, [], ""), endpoint, names)
+    found = _experience(triples, Lines(), endpoint, names)
     found.replica = own
     return found
 

@@ -15,7 +15,7 @@ logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothi
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -51,6 +51,10 @@ CONSEQUENCES = {
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
 
+STAGES = 4
+"""Of the validation of a file."""
+QUICK = 100_000
+"""Triples up to which errors are looked for besides planning."""
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }} }}"""
 SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos")))
@@ -58,7 +62,9 @@ SPOKEN_OF = (CORE, *(PREFIXES[prefix] for prefix in ("rdf", "rdfs", "owl", "skos
 LISTS = (RDF + "first", RDF + "rest")
 
 
-def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding]:
+def validate(
+    files: Sequence[str | Path], *, deep: bool = False, done: Callable[[str], object] | None = None
+) -> list[Finding]:
     """Return everything that is wrong with some ontology files and what they import.
 
     Parameters
@@ -67,6 +73,8 @@ def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding
         Files, or names of shipped scenes. Each is checked together with its imports.
     deep : bool
         Ask HermiT as well, which needs Java.
+    done : callable, optional
+        Is told what is being done, `STAGES` times for each file.
 
     Returns
     -------
@@ -80,11 +88,32 @@ def validate(files: Sequence[str | Path], *, deep: bool = False) -> list[Finding
     reasoner.validation.hermit.NoJavaError
         `deep` is wanted and there is no Java; the message says how to get one.
     """
-    return unique(finding for file in files for finding in _validate_one(file, deep))
+    return unique(finding for file in files for finding in _validate_one(file, deep, done or (lambda _: None)))
 
 
-def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
+def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
+    """Return the errors that are found in a moment in a graph whose conclusions are drawn: without shapes, bodies and HermiT.
+
+    A very large graph isn't looked at.
+    """
+    if len(graph.store) > QUICK:
+        return []
+    places = Places(graph)
+    case = Case(graph, None)
+    found = [*_violations(graph, places), *_by_rules(case, places)]
+    unsure = misread(case)
+    return unique(f for f in found if f.serious and (f.rule not in CONSEQUENCES or f.node not in unsure))
+
+
+def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
+    for rule, faults in RULES.items():
+        for node, what, why, remedy in faults(case):
+            yield places.finding(rule, node, what, why, remedy)
+
+
+def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -> Iterator[Finding]:
     path = scene_file(file)
+    done(f"reading {path.name}")
     try:
         graph = load(path)
     except KnowledgeError as error:
@@ -93,8 +122,12 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
         yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
         return
     places = Places(graph)
+    done(f"checking {path.name}")
     yield from _merged(graph, places)
-    found = [*_violations(graph, places), *_ill_formed(graph, places)]
+    found = [*_violations(graph, places)]
+    done(f"checking the shapes of {path.name}")
+    found += _ill_formed(graph, places)
+    done(f"reading {path.name} as the planner does")
     reading, problem = _read(graph)
     case = Case(graph, reading)
     unsure = misread(case)
@@ -106,10 +139,9 @@ def _validate_one(file: str | Path, deep: bool) -> Iterator[Finding]:
         )
     if not any(finding.serious for finding in found):
         yield from _measured(graph, places, reading)
-    for rule, faults in RULES.items():
-        for node, what, why, remedy in faults(case):
-            yield places.finding(rule, node, what, why, remedy)
+    yield from _by_rules(case, places)
     if deep:
+        done(f"asking HermiT about {path.name}")
         from reasoner.validation.hermit import faults as deep_faults
 
         for rule, node, what, why, remedy in deep_faults(graph):

@@ -14,8 +14,9 @@ import pytest
 
 import confab
 from confab.authoring import migrate, new_domain
-from confab.cli import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, main
+from confab.cli import main
 from confab.memory import Memory
+from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES
 from reasoner.files import alone, write_whole
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError

@@ -138,6 +138,17 @@ def test_any_file_of_rdf_can_be_asked_and_says_what_is_missing(
     assert confab.load(tmp_path / "any.ttl").query("SELECT ?o WHERE { :x :y ?o }")[0] == ("z",)
 
 
+def test_an_empty_answer_says_which_names_mean_nothing_here(
+    scene: confab.Scene, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        scene.query("SELECT ?o WHERE { ?o :location ?l ; rdfs:label ':cup1 x:y' . FILTER(?o != :cup1) }")
+        assert "doesn't speak of :location (did you mean k:location?)" in caplog.text
+        caplog.clear()
+        scene.query("SELECT ?o WHERE { ?o k:location :cup1 }")
+        assert caplog.text == ""
+
+
 def test_one_missing_value_blocks_no_query(tmp_path: Path) -> None:
     new_domain("tearoom", tmp_path)
     file = tmp_path / "tearoom-scene.ttl"

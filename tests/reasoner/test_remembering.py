@@ -15,7 +15,7 @@ import pytest
 import rdflib
 
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience, Pattern
 from reasoner.memory.counts_file import load, pull, push, save
 from reasoner.names import Names
 
@@ -45,12 +45,43 @@ def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: P
     assert load(tmp_path / "theirs.ttl", NAMES) == experience
 
 
+def older(text: str, pattern: Pattern) -> str:
+    """Return a memory of one pattern as it was written before facts were individuals."""
+    facts = " | ".join(f"{fact}: {value}" for fact, value in pattern)
+    text = re.sub(r"m:fact_\w+ a [^\n]*\n", "", text).replace(":memoryFormat 3", ":memoryFormat 2")
+    return re.sub(r":Pattern ; [^\n]*\n", f':Pattern ; :facts "{facts}" .\n', text)
+
+
+def test_facts_of_a_pattern_can_be_asked_for(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    facts = tuple((f"object · goal LOCATION {number}", str(number % 3)) for number in range(12))
+    shown = ('object "is" \\', "Cup, or: none"), ("first", "")
+    for pattern in (facts, facts[::-1], shown, ()):
+        experience.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup",)), pattern))])
+    save(tmp_path / "now.ttl", experience, NAMES, DOMAIN)
+    assert load(tmp_path / "now.ttl", NAMES) == experience
+    graph = rdflib.Graph().parse(tmp_path / "now.ttl")
+    asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?what ?answer WHERE {
+      ?counter :associatedWith ?pattern . ?pattern :fact ?fact . ?fact :asks ?what ; :answer ?answer ; :index 0 } ORDER BY ?what"""
+    assert [tuple(map(str, row)) for row in graph.query(asked) if isinstance(row, tuple)] == [
+        shown[0],
+        facts[0],
+        facts[-1],
+    ]
+    labels = graph.query("SELECT ?l WHERE { ?p a <https://w3id.org/confab/core#Pattern> ; rdfs:label ?l } ORDER BY ?l")
+    assert "object · goal LOCATION 0: 0, object · goal LOCATION 1: 1, object · goal LOCATION 2: 2 and 9 more" in {
+        str(row[0]) for row in labels if isinstance(row, tuple)
+    }
+    graph.serialize(tmp_path / "theirs.ttl")  # any other layout
+    assert load(tmp_path / "theirs.ttl", NAMES) == experience
+
+
 def test_the_first_files_of_this_format_are_read_and_spoilt_ones_say_so(tmp_path: Path) -> None:
     experience = Experience("robot")
     pattern = (("object · goal LOCATION", "unmet"), ("object is", "Cup"))
     experience.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup",)), pattern))])
     save(tmp_path / "now.ttl", experience, NAMES, DOMAIN)
-    text = (tmp_path / "now.ttl").read_text()
+    text = older((tmp_path / "now.ttl").read_text(), pattern)
     for between, name in ((r"\n", "first.ttl"), ("n", "spoilt.ttl")):  # the OWL API made a plain n of the line breaks
         (tmp_path / name).write_text(text.replace("unmet | object", f"unmet{between}object"))
     assert load(tmp_path / "first.ttl", NAMES) == experience
@@ -73,7 +104,7 @@ def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> No
     [
         ("<a> <b", "broken memory"),
         ("<a> <b> <c> .", "says no :memoryFormat"),
-        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 2"),
+        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 3"),
     ],
 )
 def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content: str, message: str) -> None:

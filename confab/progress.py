@@ -1,0 +1,76 @@
+"""How far something is, on stderr: a bar with the remaining time in a terminal, a line here and there elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Timer
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+log = logging.getLogger(__name__)
+PATIENCE = 1.0
+"""Seconds after which a bar appears: what is done by then needs none."""
+
+Advance: TypeAlias = Callable[[str, int], None]
+"""Takes what is being done now, and how much more is done."""
+
+
+@contextmanager
+def progress(what: str, total: int | None = None) -> Iterator[Advance]:
+    """Show how far something is, once it takes longer than `PATIENCE`; give what is to be told.
+
+    Parameters
+    ----------
+    what : str
+        What is being done.
+    total : int, optional
+        How much there is to do; if nobody knows, the bar shows the time alone.
+    """
+    if quiet() or not sys.stderr.isatty():
+        yield lambda _, __: None
+        return
+    bar = progress_bar()
+    task = bar.add_task(what, total=total)
+    timer = Timer(PATIENCE, bar.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield lambda now, more: bar.update(task, description=now, advance=more)
+    finally:
+        timer.cancel()
+        timer.join()
+        bar.stop()
+
+
+def progress_bar() -> Progress:
+    """Return a rich progress bar on stderr, which goes away when it is done."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    left = TextColumn("left:"), TimeRemainingColumn()
+    columns = (TextColumn("{task.description:<44}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), *left)
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=quiet() or not console.is_terminal)
+
+
+def tell(what: str) -> None:
+    """Say on stderr in a line what goes on, where no bar can be shown."""
+    if not quiet() and not sys.stderr.isatty():
+        print(f"confab: {what}", file=sys.stderr, flush=True)
+
+
+def quiet() -> bool:
+    """Return whether nothing but results and errors is to be said (`confab COMMAND --quiet`)."""
+    return not log.isEnabledFor(logging.WARNING)

@@ -1,0 +1,140 @@
+"""The terminal's end of the command line: what is printed where, and how everything that can happen ends.
+
+Results go to stdout, remarks and errors to stderr, in one line each. No traceback ever reaches a user.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import click
+
+from confab.progress import quiet
+from reasoner.graph.knowledge import KnowledgeError
+
+YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
+LONGEST = 2_000
+"""Signs of a message: it quotes what others wrote, which may be of any length."""
+
+WITHOUT_PHYSICS = (
+    "this needs physics, and PyBullet isn't installed here, for which there are wheels for Python 3.10 and 3.11; elsewhere "
+    "pip install 'confab-planner[physics]' compiles it; all but physics works without"
+)
+
+
+def run_to_end(call: Callable[[], int | None]) -> NoReturn:
+    """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
+    from planner.language import DomainError
+    from reasoner.limits import LimitError
+
+    _open_streams()
+    try:
+        code = call() or YES  # None where a command decides nothing
+        sys.stdout.flush()
+    except click.ClickException as error:
+        _end(MISUSE, _usage(error))
+    except (KnowledgeError, DomainError) as error:
+        _end(MISUSE, str(error))
+    except LimitError as error:
+        _end(GAVE_UP, str(error))
+    except MemoryError:
+        _end(GAVE_UP, "gave up: there isn't enough memory for this")
+    except RecursionError as error:
+        _end(GAVE_UP, f"gave up: something is nested too deeply to be worked on; where, is said in {_log(error)}")
+    except (KeyboardInterrupt, click.Abort):
+        _end(INTERRUPTED, "interrupted; every file is as it was before, or whole")
+    except OSError as error:
+        try:
+            sys.stdout.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still buffered has nowhere to go
+        _end(MISUSE, f"{error.filename or 'stdout'}: {error.strerror or error}")
+    except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "pybullet":
+            _end(MISUSE, WITHOUT_PHYSICS)
+        what = f"{type(error).__name__}: {error}"
+        _end(
+            BUG,
+            f"a fault of Confab, not yours ({what[:200]}); please open an issue (CONTRIBUTING.md) with {_log(error)}",
+        )
+    sys.exit(code)
+
+
+def show_result(what: Any) -> None:
+    """Print JSON data, a line of text, or what rich can show, to stdout."""
+    if isinstance(what, dict | list):
+        print(json.dumps(what, indent=1, ensure_ascii=False))
+    elif isinstance(what, str):
+        print(what)
+    else:
+        from confab.show import show as show_whole
+
+        show_whole(what)
+
+
+def _open_streams() -> None:
+    """See to it that no file that is opened later takes the place of a standard stream that the caller has closed."""
+    closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
+    for _ in closed:
+        os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+    if 2 in closed:
+        sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
+    if 1 in closed:
+        sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
+        _end(MISUSE, "stdout is closed, so that nothing could be answered; nothing was done")
+
+
+def _is_open(stream: int) -> bool:
+    try:
+        os.fstat(stream)
+    except OSError:
+        return False
+    return True
+
+
+def _log(error: BaseException) -> str:
+    """Write a traceback into a file of its own and return where it lies."""
+    import tempfile
+    import traceback
+
+    said = "".join(traceback.format_exception(error))
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="confab-", suffix=".log", delete=False, encoding="utf-8") as file:
+            file.write(f"{sys.version}\n{sys.argv}\n{said}")
+    except OSError as failure:
+        return f"what follows, since no log can be written ({failure.strerror}): {said.splitlines()[-3:]}"
+    return file.name
+
+
+def _usage(error: Any) -> str:
+    """Return in one line what is wrong with a call; where nothing at all was asked for, print the help instead."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        sys.exit(MISUSE)
+    command = error.ctx.command_path if getattr(error, "ctx", None) else "confab"
+    said = " ".join(error.format_message().split()).rstrip(".")
+    return f"{said[:1].lower()}{said[1:]}; see {command} --help"
+
+
+def remark(text: str) -> None:
+    """Say something on stderr in one line, unless nothing but results and errors is wanted."""
+    if not quiet():
+        _say(text)
+
+
+def _say(text: str) -> None:
+    """Say something on stderr in one line, whatever signs it quotes."""
+    line = " ".join(text.split())
+    shown = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line[:LONGEST])
+    with suppress(OSError):
+        print(f"confab: {shown}{' …' if len(line) > LONGEST else ''}", file=sys.stderr)
+
+
+def _end(code: int, text: str) -> NoReturn:
+    _say(text)
+    sys.exit(code)

@@ -1,0 +1,71 @@
+"""A scene is the same in every form of RDF that a library reads; of another form it is said how to save it."""
+
+from pathlib import Path
+
+import pyoxigraph as ox
+import pytest
+
+import confab
+from confab.authoring import new_domain
+from reasoner.graph.knowledge import KnowledgeError, load
+
+FORMS = {
+    "nt": ox.RdfFormat.N_TRIPLES,
+    "owl": ox.RdfFormat.RDF_XML,
+    "rdf": ox.RdfFormat.RDF_XML,
+    "xml": ox.RdfFormat.RDF_XML,
+    "jsonld": ox.RdfFormat.JSON_LD,
+    "trig": ox.RdfFormat.TRIG,
+    "nq": ox.RdfFormat.N_QUADS,
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    new_domain("tearoom", tmp_path)
+    return tmp_path / "tearoom-scene.ttl"
+
+
+@pytest.mark.parametrize("ending", FORMS)
+def test_a_scene_plans_alike_in_every_form(scene: Path, ending: str) -> None:
+    wanted = confab.load(scene).plan().plan
+    named = FORMS[ending].supports_datasets
+    for file in (scene, scene.with_name("tearoom.ttl")):
+        graph = ox.NamedNode("urn:g") if named else ox.DefaultGraph()
+        parsed = ox.parse(path=str(file), base_iri="https://example.org/")
+        quads = [ox.Quad(q.subject, q.predicate, q.object, graph) for q in parsed]
+        file.with_suffix(f".{ending}").write_bytes(ox.serialize(quads, format=FORMS[ending]) or b"")
+        file.unlink()
+    catalog = scene.with_name("catalog-v001.xml")
+    catalog.write_text(catalog.read_text().replace("tearoom.ttl", f"tearoom.{ending}"))
+    assert confab.load(scene.with_suffix(f".{ending}")).plan().plan == wanted
+
+
+def test_turtle_under_another_name_is_read(scene: Path) -> None:
+    file = scene.rename(scene.with_suffix(".owl"))
+    assert load(file).scene == "https://example.org/tearoom-scene"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "form"),
+    [
+        ("a.ofn", "Prefix(:=<http://e.org/>)\nOntology(<http://e.org/>)", "functional syntax"),
+        ("a.owl", "# saved by Protégé\nPrefix(:=<http://e.org/>)\nOntology(<http://e.org/>)", "functional syntax"),
+        ("a.omn", "Prefix: : <http://e.org/>\nOntology: <http://e.org/>", "Manchester syntax"),
+        ("a.owl", "Prefix: : <http://e.org/>\nOntology: <http://e.org/>", "Manchester syntax"),
+        ("a.owx", '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "OWL/XML"),
+        ("a.owl", '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "OWL/XML"),
+    ],
+)
+def test_another_form_says_how_to_save_it(tmp_path: Path, name: str, text: str, form: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(
+        KnowledgeError, match=f"is in {form}, which isn't read here; open it in Protégé and save it as Turtle"
+    ):
+        load(tmp_path / name)
+
+
+def test_a_context_elsewhere_is_not_fetched(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonld").write_text('{"@context": "https://schema.org/", "@id": "https://e.org/a"}')
+    with pytest.raises(KnowledgeError, match="nothing is fetched"):
+        load(tmp_path / "a.jsonld")
