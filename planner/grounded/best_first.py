@@ -4,12 +4,13 @@ It plans imported domains that have one level only, and is the last resort where
 
 state       a Python integer, a bit per fact
 h           relaxed-plan heuristic of a state (`planner.grounded.hff`)
-best        least h so far; a lower one boosts the preferred operators and is followed by a lookahead
-open        two queues of expanded nodes, by h: with all of a node's operators, with its preferred ones
+least       least h so far; a lower one boosts the preferred operators and is followed by a lookahead
+open        two queues of expanded nodes, by h: with all of a node's operators, with its preferred ones; two more by landmarks
 
 Lazy greedy best-first search with preferred operators: Richter and Helmert, "Preferred operators and deferred
-evaluation in satisficing planning", ICAPS 2009. Lookahead: Vidal, "A lookahead strategy for heuristic search
-planning", ICAPS 2004. What is found is made shorter by `planner.grounded.plan_windows`.
+evaluation in satisficing planning", ICAPS 2009. Lookahead, with what is stuck replaced: Vidal, "A lookahead strategy
+for heuristic search planning", ICAPS 2004. Landmarks to come: Richter and Westphal, "The LAMA planner", JAIR 39 (2010).
+What is found is made shorter by `planner.grounded.plan_windows`.
 """
 
 from __future__ import annotations
@@ -17,14 +18,18 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
+from functools import cache, reduce
+from operator import or_
 from time import perf_counter
+from typing import TypeAlias
 
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate
+from planner.grounded.hff_dense import effort
 from planner.grounded.hff_numba import automatic
-from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, successors
+from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks, successors
 from planner.grounded.plan_windows import shorter
-from planner.grounded.task import Task
+from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
 from planner.plan import Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from reasoner.symbols import Problem, State
@@ -32,6 +37,9 @@ from reasoner.symbols import Problem, State
 BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
 SHORTEN, SHORTENING = 200_000, 50  # work on the finished plan: operators, and a fiftieth of the bits of the search's
+
+Path: TypeAlias = "tuple[int, list[int]]"
+"""A state, and the operators that lead to it."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +99,8 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Five searches share the time: by novelty, broad and deep; by h with lookahead, without it, since it can lead astray, and by
-    open goals first. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
+    Five searches share the time: by novelty, broad and deep; by h with lookahead, the same by landmarks too, and without it, since
+    it can lead astray. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
     deadline can only cut the search short.
 
     Parameters
@@ -110,16 +118,18 @@ def search(
     counts = Counts()
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
-    evaluate = evaluate or automatic(task)
+    work, by_arrays = effort(task)
+    evaluate = evaluate or automatic(task, by_arrays)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     tree = successors(task)
+    lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (6, by_novelty(task, tree, evaluate, counts, deep=False)),
-        (4, _best_first(task, evaluate, counts, lookahead=True, goals_first=False)),
-        (3, by_novelty(task, tree, evaluate, counts, deep=True)),
-        (1, _best_first(task, evaluate, counts, lookahead=False, goals_first=False)),
-        (1, _best_first(task, evaluate, counts, lookahead=True, goals_first=True)),
+        (5, by_novelty(task, tree, evaluate, work, counts)),
+        (5, _best_first(task, evaluate, work, counts, lookahead)),
+        (3, by_novelty(task, tree, evaluate, work, counts, marks)),
+        (2, _best_first(task, evaluate, work, counts, lookahead, marks)),
+        (1, _best_first(task, evaluate, work, counts)),
     ]
     spent = [0.0] * len(searches)
     total = 0
@@ -127,24 +137,24 @@ def search(
         turn = spent.index(min(spent))
         share, search_ = searches[turn]
         try:
-            work = next(search_)
-            total += work
-            spent[turn] += work / share
+            done = next(search_)
+            total += done
+            spent[turn] += done / share
         except OutOfMemoryError:
             del searches[turn], spent[turn]
-        except StopIteration as done:
-            if done.value is None:
+        except StopIteration as end:
+            if end.value is None:
                 return Flat(
                     Status.UNSOLVABLE,
                     (),
                     Reason("no plan exists: all states that can be reached were searched"),
                     counts,
                 )
-            plan = _path(*done.value)
+            plan = _path(*end.value)
             if found:
                 found(plan)
-            work = SHORTEN + total // SHORTENING
-            return Flat(Status.SOLVED, tuple(shorter(task, plan, work, deadline)), None, counts)
+            shortening = SHORTEN + total // SHORTENING
+            return Flat(Status.SOLVED, tuple(shorter(task, plan, shortening, deadline)), None, counts)
         if counts.expanded >= limits.expansions:
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
@@ -152,23 +162,40 @@ def search(
 
 
 def _best_first(
-    task: Task, evaluate: Evaluate, counts: Counts, lookahead: bool, goals_first: bool
+    task: Task,
+    evaluate: Evaluate,
+    work: int,
+    counts: Counts,
+    lookahead: Callable[[int, Sequence[int]], Path] | None = None,
+    marked: Callable[[], int] | None = None,
 ) -> Generator[int, None, tuple[Seen, int] | None]:
-    """Search greedily; yield the work of each evaluation, return what was seen and the last state, or None if there is no plan."""
+    """Search greedily; yield the `work` of each evaluation, return what was seen and the last state, or None if there is no plan.
+
+    Where there are landmarks (`marked`), two more queues go by how many of them (and of goals that were undone) are still to come.
+    """
     apply, goal = task.applied, task.goal
+    marks = marked() | goal if marked else 0
     came_from: Seen = {task.initial: (task.initial, ())}
-    queues: tuple[list[tuple[int, int, int, list[int]]], ...] = (
-        [],
-        [],
-    )  # (h, number, state, operators still to be tried)
-    turns = [0, 0]
-    number, best = 0, 1 << 60
+    met = {task.initial: task.initial & marks}
+    # (h or marks to come, number, state, operators still to be tried); all operators and the preferred ones by turns
+    queues: list[list[tuple[int, int, int, list[int]]]] = [[] for _ in range(4 if marks else 2)]
+    turns = [0] * len(queues)
+    least = [FAR] * (len(queues) // 2)
+    number = 0
     waiting = [task.initial]  # states to be evaluated, the last first
+
+    def reached(after: int, before: int, path: tuple[int, ...]) -> None:
+        came_from[after] = (before, path)
+        if marks:
+            met[after] = met[before] | after & marks
+        waiting.append(after)
+
     while True:
         if not waiting:
-            if not queues[0] and not queues[1]:
+            filled = [which for which, queue in enumerate(queues) if queue]
+            if not filled:
                 return None
-            which = int(not queues[0] or (bool(queues[1]) and turns[1] <= turns[0]))
+            which = min(filled, key=lambda which: (turns[which], -which))
             turns[which] += 1
             _, _, state, operators = queues[which][0]
             operator = operators.pop()
@@ -178,54 +205,90 @@ def _best_first(
             counts.generated += 1
             if after is None or after in came_from:
                 continue
-            came_from[after] = (state, (operator,))
-            waiting.append(after)
+            reached(after, state, (operator,))
         state = waiting.pop()
         if state & goal == goal:
             return came_from, state
         evaluation = evaluate(state)
         counts.evaluated += 1
-        yield task.relaxing
+        yield work
         if evaluation is None:
             continue
         counts.expanded += 1
         h, relaxed_plan, applicable = evaluation
-        if goals_first:
-            h += FAR * (goal & ~state).bit_count()
+        ranks = [h]
+        if marks:
+            ranks.append((marks & ~met[state]).bit_count() + (goal & met[state] & ~state).bit_count())
         number += 1
         possible = set(applicable)
         preferred = [operator for operator in relaxed_plan if operator in possible]
-        if applicable:
-            rest = possible.difference(preferred)
-            heapq.heappush(queues[0], (h, number, state, [*sorted(rest, reverse=True), *preferred[::-1]]))
-        if preferred:
-            heapq.heappush(queues[1], (h, number, state, preferred[::-1]))
-        if h < best:
-            best = h
-            turns[1] -= BOOST
+        rest = sorted(possible.difference(preferred), reverse=True)
+        for i, rank in enumerate(ranks):
+            if applicable:
+                heapq.heappush(queues[2 * i], (rank, number, state, [*rest, *preferred[::-1]]))
+            if preferred:
+                heapq.heappush(queues[2 * i + 1], (rank, number, state, preferred[::-1]))
+        if any(rank < known for rank, known in zip(ranks, least, strict=True)):
+            least = [min(pair) for pair in zip(ranks, least, strict=True)]
+            turns = [turn - BOOST * (which % 2) for which, turn in enumerate(turns)]
             if lookahead:
-                after, path = _ahead(task, state, relaxed_plan)
+                after, path = lookahead(state, relaxed_plan)
                 if len(path) > 1 and after not in came_from:
-                    came_from[after] = (state, tuple(path))
-                    waiting.append(after)
+                    reached(after, state, tuple(path))
 
 
-def _ahead(task: Task, state: int, relaxed_plan: Sequence[int]) -> tuple[int, list[int]]:
-    """Apply a relaxed plan as far as it goes; return the state reached and the operators applied."""
-    path: list[int] = []
-    left = list(relaxed_plan)
-    while True:
-        stuck = []
-        for operator in left:
-            after = task.applied(state, operator)
-            if after is None:
-                stuck.append(operator)
-            elif after != state:
-                state = after
+def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
+    """Return a function that carries out a relaxed plan as far as it goes, from a state: what is reached, and by which operators.
+
+    Where no operator of it is applicable, one is replaced by an applicable one that brings about what it was to bring about for
+    a later one or the goal: a truck that went north in the meantime comes from there.
+    """
+
+    @cache
+    def setters() -> list[dict[int, None]]:
+        found: list[dict[int, None]] = [{} for _ in range(task.size)]
+        for bits, owner in zip(task.adds.lists(), task.owners, strict=True):
+            for bit in bits:
+                if owner >= 0:
+                    found[bit][owner] = None
+        return found
+
+    set_by = cache(lambda operator: reduce(or_, (set_ for _, _, set_ in task.known(operator)[1]), 0))
+
+    def replaced(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
+        needed = [task.goal]  # by the goal and, from the last on, by the operators behind
+        for operator in reversed(stuck):
+            needed.append(needed[-1] | task.known(operator)[0])
+        for i, operator in enumerate(stuck):
+            for bit in bits_of(set_by(operator) & needed[-2 - i] & ~state):
+                for other in setters()[bit]:
+                    after = task.applied(state, other)
+                    if after is not None and after >> bit & 1:
+                        return after, other, stuck[:i] + stuck[i + 1 :]
+        return None
+
+    def carried_out(state: int, relaxed_plan: Sequence[int]) -> Path:
+        path: list[int] = []
+        left = list(relaxed_plan)
+        while True:
+            stuck = []
+            for operator in left:
+                if set_by(operator) & ~state:  # else it has nothing left to do
+                    after = task.applied(state, operator)
+                    if after is None:
+                        stuck.append(operator)
+                    elif after != state:
+                        state = after
+                        path.append(operator)
+            if len(stuck) == len(left):
+                instead = replaced(state, stuck)
+                if instead is None:
+                    return state, path
+                state, operator, stuck = instead
                 path.append(operator)
-        if len(stuck) == len(left):
-            return state, path
-        left = stuck
+            left = stuck
+
+    return carried_out
 
 
 def _path(came_from: Seen, state: int) -> list[int]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 from planner.grounded.hff import Evaluate
@@ -38,11 +38,17 @@ class OutOfMemoryError(Exception):
 
 
 def by_novelty(
-    task: Task, tree: Tree, evaluate: Evaluate, counts: Counts, deep: bool
+    task: Task,
+    tree: Tree,
+    evaluate: Evaluate,
+    relaxing: int,
+    counts: Counts,
+    marked: Callable[[], int] | None = None,
 ) -> Generator[int, None, tuple[Seen, int] | None]:
     """Search by novelty; yield the work done, in bits, every so many states; return what was seen and the last state.
 
-    Where it is `deep`, landmarks that weren't met yet count like goals, and of equal states the last comes first.
+    `relaxing` is the work of a relaxed plan.
+    Where there are landmarks (`marked`), those that weren't met yet count like goals, and of equal states the last comes first.
 
     Raises
     ------
@@ -54,15 +60,15 @@ def by_novelty(
     seen: Seen = {task.initial: (task.initial, ())}
     most = MOST_BYTES // (STATE_BYTES + task.size // 4)
     known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
-    marks = landmarks(task) & ~(task.initial | goal) if deep else 0
+    marks = marked() & ~(task.initial | goal) if marked else 0
     child = CHILD + task.size // 50
-    number, step = 0, -1 if deep else 1
+    number, step = 0, -1 if marked else 1
     # (no new fact, distance, number, state, facts of the relaxed plan (-1: not made yet), those met, landmarks left)
     first = (goal & ~task.initial).bit_count() + marks.bit_count()
     queue: list[tuple[bool, int, int, int, int, int, int]] = [(False, first, 0, task.initial, -1, 0, marks)]
     work = turns = 0
     while queue:
-        _, open_, _, state, wanted, met, marked = heapq.heappop(queue)
+        _, open_, _, state, wanted, met, unmet = heapq.heappop(queue)
         turns += 1
         if not turns % AT_ONCE:
             yield work
@@ -72,7 +78,7 @@ def by_novelty(
         if wanted < 0:
             evaluation = evaluate(state)
             counts.evaluated += 1
-            work += task.relaxing
+            work += relaxing
             if evaluation is None:
                 continue
             wanted = 0
@@ -94,7 +100,7 @@ def by_novelty(
             missing = goal & ~after
             if not missing:
                 return seen, after
-            remaining = marked & ~after
+            remaining = unmet & ~after
             left = missing.bit_count() + remaining.bit_count()
             if left < open_:
                 facts, reached, distance = -1, 0, (left, 0)

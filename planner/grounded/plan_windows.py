@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from planner.grounded.hff import heuristic
 from planner.grounded.joins import Ints
-from planner.grounded.task import Change, Grouped, Task
+from planner.grounded.task import Change, Grouped, Task, bits_of
 
 SIZES = (8, 16)  # steps of a window
 OPERATORS = 150  # of a window's search
@@ -104,19 +104,19 @@ def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
                 need |= when
                 clear |= c
                 set_ |= s
-        for bit in _bits(need):
+        for bit in bits_of(need):
             if bit in setter:
                 after[setter[bit]].add(i)
                 causes[i].add(setter[bit])
             readers.setdefault(bit, []).append(i)
-        for bit in _bits(clear):
+        for bit in bits_of(clear):
             for r in readers.pop(bit, ()):
                 if r != i:
                     after[r].add(i)
             if bit in setter and setter[bit] != i:
                 after[setter[bit]].add(i)
             clearer[bit] = i
-        for bit in _bits(set_):
+        for bit in bits_of(set_):
             if bit in clearer and clearer[bit] != i:
                 after[clearer[bit]].add(i)
             setter[bit] = i
@@ -322,12 +322,12 @@ class _Windows:
         rows = [*operators, *(r for r in self.beside if task.owners[r] < 0 or task.owners[r] in place)]
         needs = [task.needs[r] for r in rows]
         derived = sum(bit for bit, _ in task.derived)
-        bits = sorted({bit for found in needs for bit in found}.union(_bits(wanted | derived)))
+        bits = sorted({bit for found in needs for bit in found}.union(bits_of(wanted | derived)))
         new = {bit: i for i, bit in enumerate(bits)}
         mask = sum(1 << bit for bit in bits)
 
         def small(state: int) -> int:
-            return sum(1 << new[bit] for bit in _bits(state & mask))
+            return sum(1 << new[bit] for bit in bits_of(state & mask))
 
         def change(operator: int) -> tuple[int, tuple[Change, ...]]:
             precondition, changes = task.known(operators[operator])
@@ -352,15 +352,6 @@ class _Windows:
     def beside(self) -> list[int]:
         """The relaxed operators that are conditional effects or derived bits."""
         return list(range(len(self.task), len(self.task.owners)))
-
-
-def _bits(mask: int) -> list[int]:
-    found = []
-    while mask:
-        low = mask & -mask
-        found.append(low.bit_length() - 1)
-        mask ^= low
-    return found
 
 
 def _grouped(lists: Sequence[Sequence[int]]) -> Grouped:

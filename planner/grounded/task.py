@@ -99,11 +99,6 @@ class Task:
         """Return the number of operators."""
         return len(self.costs)
 
-    @property
-    def relaxing(self) -> int:
-        """The work of relaxing a state: the bits that all relaxed operators need and may set."""
-        return len(self.needs.items) + len(self.adds.items)
-
     def applied(self, state: int, operator: int) -> int | None:
         """Return the state after an operator, or None where it isn't applicable."""
         precondition, changes = self._changes.get(operator) or self.known(operator)
@@ -150,3 +145,17 @@ class Task:
             number = self.problem.id_of(behavior, arguments)
             found.append(Step((position,), number, self.level, behavior, arguments, bindings))
         return tuple(found)
+
+
+def bits_of(mask: int) -> list[int]:
+    """Return the bits that are set.
+
+    >>> bits_of(0b1010)
+    [1, 3]
+    """
+    found = []
+    while mask:
+        low = mask & -mask
+        found.append(low.bit_length() - 1)
+        mask ^= low
+    return found

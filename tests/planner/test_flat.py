@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Generator
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -84,7 +85,7 @@ def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
 def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated = 0  # what the clock shows: each evaluation takes a second, however busy the machine is
 
-    def slow(task: Task) -> Evaluate:
+    def slow(task: Task, _: bool) -> Evaluate:
         fast = heuristic(task)
 
         def evaluate(state: int) -> Evaluation:
@@ -119,7 +120,8 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
 def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
     task = ground(carrier(3))
     assert isinstance(task, Task)
-    seen, state = finished(by_novelty(task, successors(task), heuristic(task), Counts(), deep)) or ({}, 0)
+    marks = partial(landmarks, task) if deep else None
+    seen, state = finished(by_novelty(task, successors(task), heuristic(task), 1, Counts(), marks)) or ({}, 0)
     assert state & task.goal == task.goal
     while state != task.initial:
         before, operators = seen[state]
@@ -128,7 +130,7 @@ def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
         state = before
     me = sum(1 << bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == "ME")
     nowhere = replace(task, goal=task.goal | me)  # here and there at once: relaxed, that can be
-    assert finished(by_novelty(nowhere, successors(nowhere), heuristic(nowhere), Counts(), deep)) is None
+    assert finished(by_novelty(nowhere, successors(nowhere), heuristic(nowhere), 1, Counts(), marks)) is None
 
 
 def finished(search: Generator[int, None, tuple[Seen, int] | None]) -> tuple[Seen, int] | None:
