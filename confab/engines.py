@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import warnings
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from time import perf_counter
 
@@ -86,11 +87,23 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
         unified-planning isn't installed, or has no such engine, or none for such a problem.
     """
     try:
+        from unified_planning import environment as environments
         from unified_planning.environment import Environment
         from unified_planning.exceptions import UPException
         from unified_planning.io import PDDLReader
     except ImportError:
         raise KnowledgeError("engines need unified-planning; install the extra pddl") from None
+
+    @contextmanager
+    def used_everywhere(environment: Environment) -> Iterator[None]:
+        """Have the reader make metrics in the environment that it was given, too, not in the one of the whole process."""
+        before = environments.GLOBAL_ENVIRONMENT
+        environments.GLOBAL_ENVIRONMENT = environment
+        try:
+            yield
+        finally:
+            environments.GLOBAL_ENVIRONMENT = before
+
     environment = Environment()
     environment.error_used_name, environment.credits_stream = False, None  # a type may be called as a predicate is
     factory = environment.factory
@@ -101,7 +114,12 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
         )
     with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
         warnings.simplefilter("ignore")
-        task = PDDLReader(environment).parse_problem_string(domain, problem)
+        try:
+            with used_everywhere(environment):
+                task = PDDLReader(environment).parse_problem_string(domain, problem)
+        except Exception as error:  # its reader's asserts and pyparsing's errors among them: ours goes on without it
+            said = " ".join(str(error).split())[:200]
+            raise KnowledgeError(f"unified-planning can't read this level: {type(error).__name__}: {said}") from None
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:

@@ -26,6 +26,7 @@ from typing import TypeAlias
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate
 from planner.grounded.hff_dense import effort
+from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
 from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks, successors
 from planner.grounded.plan_windows import shorter
@@ -111,7 +112,8 @@ def search(
     deadline : float, optional
         On the clock of `time.perf_counter`.
     evaluate : function of a state, optional
-        In place of h_FF, plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`).
+        In place of h_FF: plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`);
+        for the searches by h by arrays, where these are less work.
     found : function of a plan, optional
         Called with the first plan, before it is made shorter.
     """
@@ -119,17 +121,19 @@ def search(
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
     work, by_arrays = effort(task)
-    evaluate = evaluate or automatic(task, by_arrays)
+    arrays = evaluate is None and by_arrays < work
+    evaluate = evaluate or automatic(task)
+    often, quick = (dense(task), by_arrays) if arrays else (evaluate, work)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     tree = successors(task)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (5, by_novelty(task, tree, evaluate, work, counts)),
-        (5, _best_first(task, evaluate, work, counts, lookahead)),
+        (6, by_novelty(task, tree, evaluate, work, counts)),
+        (4, _best_first(task, often, quick, counts, lookahead)),
         (3, by_novelty(task, tree, evaluate, work, counts, marks)),
-        (2, _best_first(task, evaluate, work, counts, lookahead, marks)),
-        (1, _best_first(task, evaluate, work, counts)),
+        (1, _best_first(task, often, quick, counts, lookahead, marks)),
+        (1, _best_first(task, often, quick, counts)),
     ]
     spent = [0.0] * len(searches)
     total = 0

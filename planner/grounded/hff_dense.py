@@ -1,8 +1,8 @@
 """The relaxed-plan heuristic by whole arrays, for tasks of which a state reaches much in few layers.
 
 `planner.grounded.hff` follows what is reached, bit by bit. Here each layer looks at all that every operator needs and sets, in a
-few calls of NumPy, until no cost falls. That is more work, done a few dozen times faster: `effort` says which of the two is less,
-by counting at the initial state.
+few calls of NumPy, until no cost falls. That is more work, done a few dozen times faster: `effort` counts at the initial state
+which of the two is less.
 
 cost      of a bit: of the cheapest operator that sets it, one plus the costs of what that needs; zero where it is set
 """
@@ -21,15 +21,15 @@ AT_ONCE, CALLS = 35, 600
 """In the time in which Python follows one bit, arrays look at so many; and the calls of one layer take the time of so many bits."""
 
 
-def effort(task: Task) -> tuple[int, bool]:
-    """Return the work of relaxing the initial state, in bits followed, and whether arrays take less of it."""
+def effort(task: Task) -> tuple[int, int]:
+    """Return the work of relaxing the initial state, in bits followed: what is followed, and what arrays take the time of."""
     needs, starts = _with_always(task)
     known = np.append(_flags(task.initial, task.size), True)
     goal = np.append(_flags(task.goal, task.size), False)
     sizes = np.diff(task.needs.starts) + np.diff(task.adds.starts)
     layers, ready, before = 0, np.zeros(len(sizes), bool), -1
     if not len(sizes):
-        return 1, False
+        return 1, CALLS
     while not known[goal].all() and known.sum() != before:
         before = known.sum()
         layers += 1
@@ -37,7 +37,7 @@ def effort(task: Task) -> tuple[int, bool]:
         known[task.adds.items[np.repeat(ready, np.diff(task.adds.starts))]] = True
     followed = 1 + int(sizes[ready].sum())
     at_once = (layers + 2) * (int(sizes.sum()) // AT_ONCE + CALLS)
-    return min(followed, at_once), at_once < followed
+    return followed, at_once
 
 
 def heuristic(task: Task) -> Evaluate:

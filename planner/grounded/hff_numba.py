@@ -14,17 +14,14 @@ from typing import Any
 import numpy as np
 
 from planner.grounded import hff as relaxed
-from planner.grounded import hff_dense as dense
 from planner.grounded.hff import Evaluate, Evaluation
 from planner.grounded.task import Grouped, Task
 
 PLAIN = 4_000_000  # operators looked at by the plain heuristic, about two seconds, before it is compiled
 
 
-def automatic(task: Task, by_arrays: bool) -> Evaluate:
-    """Return h_FF of a task: by arrays where they are less work, else compiled by numba (where it is) once the search is long."""
-    if by_arrays:
-        return dense.heuristic(task)
+def automatic(task: Task) -> Evaluate:
+    """Return h_FF of a task, compiled by numba once the search turns out to be long, if numba is installed."""
     use, work = relaxed.heuristic(task), 0
 
     def evaluate(state: int) -> Evaluation:

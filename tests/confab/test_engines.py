@@ -8,7 +8,7 @@ from click.testing import CliRunner
 import confab
 from confab import engines
 from confab.cli import app
-from confab.engines import Answer, at_rest, plan_by_engine
+from confab.engines import Answer, answer, at_rest, plan_by_engine
 from planner.grounded.best_first import search
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
@@ -106,3 +106,16 @@ def test_fast_downward_plans_the_lowest_level(monkeypatch: pytest.MonkeyPatch, s
     outcome = plan_by_engine(problem, "fast-downward")
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert validate(problem, outcome.plan) == []
+
+
+def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_said() -> None:
+    pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
+    domain = """(define (domain d) (:requirements :strips :action-costs) (:predicates (p)) (:functions (total-cost))
+     (:action a :parameters () :effect (and (p) (increase (total-cost) 3))))"""
+    problem = "(define (problem x) (:domain d) (:init (= (total-cost) 0)) (:goal (p)) (:metric minimize (total-cost)))"
+    try:
+        assert answer(domain, problem, None, 10.0)[1].startswith("SOLVED")
+    except KnowledgeError as error:  # where no engine is installed
+        assert "no engine takes this problem" in str(error)
+    with pytest.raises(KnowledgeError, match="unified-planning can't read this level"):
+        answer("(define (domain d) (:predicates", problem, None, 10.0)

@@ -9,9 +9,10 @@ from functools import partial
 
 import pytest
 
-from planner.grounded.best_first import plan_level, search
+from planner.grounded.best_first import ahead, plan_level, search
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
+from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
 from planner.grounded.novelty import AT_ONCE, Seen, by_novelty, landmarks, successors
 from planner.grounded.plan_windows import regrouped, shortened, shorter
@@ -85,7 +86,7 @@ def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
 def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated = 0  # what the clock shows: each evaluation takes a second, however busy the machine is
 
-    def slow(task: Task, _: bool) -> Evaluate:
+    def slow(task: Task) -> Evaluate:
         fast = heuristic(task)
 
         def evaluate(state: int) -> Evaluation:
@@ -96,6 +97,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
         return evaluate
 
     monkeypatch.setattr("planner.grounded.best_first.automatic", slow)
+    monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: (100, 100))
     for module in ("best_first", "plan_windows", "reachability"):
         monkeypatch.setattr(f"planner.grounded.{module}.perf_counter", lambda: float(evaluated))
     problem = carrier(12)
@@ -208,6 +210,45 @@ def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> 
     again = regrouped(task, plan)
     assert sorted(again) == sorted(plan)
     assert validate(tabletop, Plan(task.steps(again))) == []
+
+
+def test_a_lookahead_replaces_what_is_stuck() -> None:
+    domain = """(define (domain collect) (:predicates (way ?p ?q) (me ?p) (at ?x ?p) (have ?x))
+     (:action go :parameters (?p ?q) :precondition (and (way ?p ?q) (me ?p)) :effect (and (me ?q) (not (me ?p))))
+     (:action take :parameters (?x ?p) :precondition (and (me ?p) (at ?x ?p)) :effect (and (have ?x) (not (at ?x ?p)))))"""
+    places = "abcd"
+    ways = " ".join(f"(way {p} {q})" for p in places for q in places if p != q)
+    text = f"""(define (problem p) (:domain collect) (:objects a b c d x y z)
+     (:init (me a) {ways} (at x b) (at y c) (at z d)) (:goal (and (have x) (have y) (have z))))"""
+    task = ground(imported(parse(domain, text)).problem)
+    assert isinstance(task, Task)
+    evaluation = heuristic(task)(task.initial)
+    assert evaluation is not None and evaluation[0] == 6
+    state, path = ahead(task)(
+        task.initial, evaluation[1]
+    )  # from a to b, c and d: only one of them can be done as it stands
+    assert state & task.goal == task.goal and len(path) == 6
+    reached: int | None = task.initial
+    for operator in path:
+        assert reached is not None
+        reached = task.applied(reached, operator)
+    assert reached == state
+
+
+def test_relaxing_by_arrays_finds_what_relaxing_bit_by_bit_finds(tabletop: Problem) -> None:
+    for problem in (tabletop, corridor(12), carrier(4)):
+        task = ground(problem)
+        assert isinstance(task, Task)
+        plain, arrays, choice, state = heuristic(task), by_arrays(task), random.Random(1), task.initial
+        for _ in range(60):
+            one, other = plain(state), arrays(state)
+            assert (one is None) == (other is None)
+            if one is None or other is None or not one[2]:
+                break
+            assert one[2] == other[2] and 0 < len(other[1]) == other[0] <= 2 * one[0]
+            state = task.applied(state, choice.choice(one[2])) or 0
+            if state & task.goal == task.goal:
+                break
 
 
 def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
