@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pybullet
@@ -84,6 +84,9 @@ class Engine:
         self.standing: dict[str, Spheres] = {}
         self.mechanics: list[Mechanic] = []
         self.links: dict[str, Mechanic] = {}  # by the names of their links
+        self.shifts: dict[
+            int, Array
+        ] = {}  # by mechanism's body: how far off it is perceived, since it was last looked at
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
@@ -201,13 +204,14 @@ class Engine:
             position = position + self.rng.normal(0.0, self.noise, 3)
         return rotation, position
 
-    def reading(self, name: str) -> Array:
-        """Return a body's perceived position."""
-        return self.sense(name)[1]
+    def look(self) -> None:
+        """Look at the mechanisms anew: until the next look each is perceived to be as far off as now."""
+        if self.noise:
+            self.shifts = {mechanic.body: self.rng.normal(0.0, self.noise, 3) for mechanic in self.mechanics}
 
-    def blur(self) -> Array:
-        """Return by how much something is perceived to be elsewhere than it is."""
-        return self.rng.normal(0.0, self.noise, 3) if self.noise else np.zeros(3)
+    def shift(self, mechanic: Mechanic) -> Array:
+        """Return by how much a mechanism is perceived to be elsewhere than it is."""
+        return self.shifts.get(mechanic.body, np.zeros(3))
 
     def carrier(self, name: str) -> tuple[Array, Array]:
         """Return the frame of a link or body that carries places; that of the world for an empty name."""
@@ -289,10 +293,12 @@ class Engine:
         """
         solids = [box(fixture) for fixture in self.embodiment.fixtures]
         for mechanic in self.mechanics:
-            solids += mechanic.solids({**mechanic.values(), **(values or {})})
+            shift = self.shift(mechanic)
+            found = mechanic.solids({**mechanic.values(), **(values or {})})
+            solids += [replace(solid, center=solid.center + shift) for solid in found]
         for name, thing in self.bodies.items():
             if name != held:
-                rotation, base = self._taken_along(name, values) if values else self.sense(name)
+                rotation, base = self.taken_along(name, values) if values else self.sense(name)
                 for low, high, radius in cylinders(thing.shape):
                     size, center = (
                         np.array([radius, radius, (high - low) / 2]),
@@ -311,7 +317,7 @@ class Engine:
                 around = around.plus(name, Spheres(arm.at(other.posture[None])[0], arm.spheres.radii))
         return around
 
-    def _taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+    def taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return where a body will be perceived when links have moved to `values` and taken along what they carry."""
         rotation, base = self.sense(name)
         link = self.carried_by(name)

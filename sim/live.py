@@ -19,6 +19,7 @@ from reasoner.embodiment.values import Body, PerceiverUse
 from reasoner.symbols import Fact, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
 from sim.engine import Bead, Engine, Thing
+from sim.linkage import wide
 from sim.perception import tilt_of
 from sim.skills import perform
 from sim.staging import pour_in
@@ -151,7 +152,10 @@ class LiveWorld:
             self._add(intervention)
         else:
             for fact in intervention.facts:
-                if fact.symbol.arguments[0] in self.world.bodies:  # else somebody has taken it away
+                if fact.symbol.arguments[0] in (
+                    *self.world.bodies,
+                    *self.world.links,
+                ):  # else somebody has taken it away
                     self._make_true(fact)
 
     def _make_true(self, fact: Fact) -> None:
@@ -209,6 +213,22 @@ def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
         pour_in(world, symbol.arguments[0], value, world.perturb)
 
 
+def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
+    """Open or shut a link with what it carries; a hand that holds it lets it go."""
+    name = symbol.arguments[0]
+    mechanic = world.links[name]
+    for hand in world.hands.values():
+        if min(hand.pressing(mechanic.body, mechanic.joints[name])) > 0:
+            hand.open()
+    opened = value == use.values.get("opened", "true")
+    goal = {name: wide(mechanic.link(name)) if opened else 0.0}
+    along = {body: world.taken_along(body, goal)[1] for body in world.bodies if world.carried_by(body) == name}
+    mechanic.set(name, opened)
+    for body, base in along.items():
+        thing = world.bodies[body]
+        _set(world, thing.body, base + np.array([0.0, 0.0, center_height(thing.shape)]))
+
+
 def take_away(world: World, name: str) -> None:
     """Take an object, and what is in it, out of the world, unless somebody was faster."""
     if name not in world.bodies:
@@ -249,5 +269,6 @@ def _set(world: World, body: int, position: Array) -> None:
 DISTURBERS: Mapping[str, Callable[[World, PerceiverUse, Symbol, str], None]] = {
     "perceive_place": move,
     "perceive_content": fill,
+    "perceive_joint": push_joint,
 }
 """By the perceiver that reads a situation type off the world: how a person makes a value true."""

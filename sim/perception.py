@@ -16,6 +16,7 @@ from importlib.metadata import entry_points
 import numpy as np
 
 from reasoner.embodiment.values import PerceiverUse
+from sim.bodies import height_of
 from sim.engine import Engine
 from sim.urdf import Array
 
@@ -38,6 +39,16 @@ class Perceiver:
     code: str
 
 
+LOOKS = 6
+"""So often is looked at something of which a fact shall be told, while nothing moves; the mean is taken."""
+
+
+def steady(world: Engine, body: str) -> tuple[Array, Array]:
+    """Return a body's rotation and the mean of several perceived positions."""
+    looks = [world.sense(body) for _ in range(LOOKS if world.noise else 1)]
+    return looks[0][0], np.mean([position for _, position in looks], axis=0)
+
+
 def tilt_of(rotation: Array) -> float:
     """Return the angle in radians between a frame's z axis and up."""
     return float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
@@ -51,7 +62,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     body = arguments[0]
     if body not in world.bodies:
         return None
-    rotation, position = world.sense(body)
+    rotation, position = steady(world, body)
     place, distance = world.nearest_place(position)
     standing = abs(position[2] - world.place(place)[2]) < use.numbers["contact_height"]
     if standing and distance < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
@@ -103,15 +114,17 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
     """
     hand, numbers = arguments[0], use.numbers
     held = world.held(hand)
-    point = world.hands[hand].frame()[1] if held is None else world.sense(held)[1]
-    top = point if held is None else world.top(held)
+    point = top = world.hands[hand].frame()[1]
+    if held is not None:
+        rotation, point = steady(world, held)
+        top = point + rotation[:, 2] * height_of(world.bodies[held].shape)
     place, distance = world.nearest_place(point)
     height = min(point[2], top[2]) - world.place(place)[2]
     if height >= numbers["raised"]:
         return use.values["raised"]
     if held is not None and height < numbers["contact_height"]:
         return held
-    near = [(float(np.hypot(*(world.reading(body) - top)[:2])), body) for body in world.bodies if body != held]
+    near = [(float(np.hypot(*(steady(world, body)[1] - top)[:2])), body) for body in world.bodies if body != held]
     gap, body = min(near, default=(np.inf, ""))
     if gap < (numbers["beside"] if held is not None else numbers["between"]):
         return body

@@ -80,7 +80,6 @@ class Run:
     way: Ways | None = None
     gripped: str = ""
     seen: dict[tuple[str, str], Frame] = field(default_factory=dict)
-    blurs: dict[str, Array] = field(default_factory=dict)
 
     @property
     def world(self) -> Engine:
@@ -104,9 +103,8 @@ class Run:
         """Return where ``role.feature`` is perceived to be: looked at once in a skill, so that noise doesn't make it jump."""
         name, feature = self.who(target)
         if name in self.world.links:
-            shift = self.blurs.setdefault(name, self.world.blur())
             frame = locate(self.world, name, feature, values)
-            return Frame(frame.rotation, frame.point + shift, frame.low, frame.high)
+            return replace(frame, point=frame.point + self.world.shift(self.world.links[name]))
         if (name, feature) not in self.seen:
             self.seen[name, feature] = locate(self.world, name, feature)
         return self.seen[name, feature]
@@ -166,6 +164,7 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
         raise SkillError(
             "ill-defined", (), f"phase {phase.name} of the skill {use.skill}: '{word}' isn't told (confab validate)"
         )
+    world.look()
     run = Run(Attempt.begin(world, roles["hand"]), roles, use.numbers)
     phases = [phase for phase in use.phases if all(CONDITIONS[word](run) for word in phase.when)]
     for i, phase in enumerate(phases):

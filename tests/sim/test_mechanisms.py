@@ -11,13 +11,15 @@ import pytest
 
 import confab
 from confab.scene import Scene
+from planner.acting.episode import Change, Intervention
 from reasoner.embodiment.skill_checks import RULES
 from reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES
 from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
-from reasoner.symbols import Symbol
+from reasoner.symbols import Fact, Symbol
 from sim import phases
 from sim.faults import displaced
 from sim.linkage import read_mechanism, wide
+from sim.live import LiveWorld
 from sim.skills import perform
 from sim.staging import Perturbation
 from sim.verdict import CODES, SkillError
@@ -95,6 +97,18 @@ def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
         perform(world, skills["operate_back"], roles)
         assert np.linalg.norm(world.truth("jar")[1] - before) < 0.005
         assert world.observe()[Symbol("OPENED", ("drawer",))] == "false"
+
+
+def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
+    scene = kitchen()
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        before = world.truth("jar")[1]
+        opened = Symbol("OPENED", ("drawer",))
+        LiveWorld(world, {}).disturb(Intervention(Change.WORLD, (Fact(opened, "true"),)))
+        assert world.observe()[opened] == "true"
+        assert before[0] - world.truth("jar")[1][0] == pytest.approx(
+            world.links["drawer"].values()["drawer"], abs=0.003
+        )
 
 
 def test_a_button_latches_and_comes_out_when_it_is_pressed_again() -> None:
