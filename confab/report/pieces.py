@@ -22,6 +22,8 @@ Tile = tuple[str, str, str]
 COLORS = 8
 MOST_BARS, MOST_LANES = 1500, 40
 """So many bars and lanes are drawn; of what is left out it is said how much it is."""
+LAST = 0.04
+"""Of the axis, behind the last primitive."""
 MEANT = {True: ("✓", "ok"), False: ("✗", "bad")}
 
 
@@ -126,7 +128,9 @@ def timeline(course: Course, labels: Labels | None = None, speed: float | None =
     """
     if not course.bars:
         return Markup("")
-    end = course.end or 1.0
+    symbols = course.told()
+    late = any(phase.begin >= course.end for s in symbols for phase in course.phases[s])
+    end = (course.end or 1.0) * (1 + LAST if late else 1)  # what the last primitive gave is to be seen, too
     rows: list[Markup] = []
     by_path = course.by_path
     levels = sorted({step.level for step in course.plan.walk() if step.steps})
@@ -139,14 +143,15 @@ def timeline(course: Course, labels: Labels | None = None, speed: float | None =
         name = (labels.name(who) if labels else who) if who else "steps"
         those = [bar for bar in bars if bar in drawn] if len(drawn) < len(course.bars) else bars
         rows.append(_lane(name, [_bar(bar, end, labels, f"c{kinds[bar.step.behavior] % COLORS}") for bar in those]))
-    symbols = course.told()
     values = sorted({phase.value for s in symbols for phase in course.phases[s]} - {TRUE, FALSE})
     colors = {value: f"v{i % COLORS}" for i, value in enumerate(values)} | {TRUE: "v1", FALSE: "v0"}
     for symbol in symbols[:MOST_LANES]:
+        ends = [(p.begin, end if p.end >= course.end else p.end, p.value) for p in course.phases[symbol]]
+        last = len(ends) - 1
         phases = [
-            _phase(p.begin, p.end, p.value, end, labels, colors[p.value])
-            for p in course.phases[symbol]
-            if p.end > p.begin
+            _phase(begin, until if number == last else min(until, course.end), value, end, labels, colors[value])
+            for number, (begin, until, value) in enumerate(ends)
+            if until > begin
         ]
         rows.append(_lane(labels.about(symbol) if labels else str(symbol), phases, course.met(symbol), "fact"))
     marks = [
