@@ -47,7 +47,9 @@ if TYPE_CHECKING:
 
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
 CASES, ROUND, BATCH = 100_000, 1_000, 100
-SECONDS, MEGABYTES = 30, 4_000
+SECONDS, WAITING, MEGABYTES = 30, 600, 4_000
+"""Of CPU time, and by the clock: a machine may be busy with other things."""
+TIME_IS_OVER = {signal.SIGPROF: f"{SECONDS} s of CPU time", signal.SIGALRM: f"{WAITING} s"}
 KEPT, ALIKE = 2, 70
 """So many cases are kept that broke in the same words, by as many signs."""
 FEW_STATES, FEW_STEPS = 300, 60
@@ -94,16 +96,21 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
                 left.pop(0)
         _, state = os.waitpid(child, 0)
         if left:  # the process ended within a case
-            sign = os.WTERMSIG(state) if os.WIFSIGNALED(state) else 0
-            ended = f"killed by signal {sign}" if sign else f"the process ended with {os.WEXITSTATUS(state)}"
-            yield Failure(door, left.pop(0), f"no end within {SECONDS} s" if sign == signal.SIGALRM else ended)
+            if os.WIFSIGNALED(state):
+                sign = os.WTERMSIG(state)
+                over = {int(which): limit for which, limit in TIME_IS_OVER.items()}
+                ended = f"no end within {over[sign]}" if sign in over else f"killed by signal {sign}"
+            else:
+                ended = f"the process ended with {os.WEXITSTATUS(state)}"
+            yield Failure(door, left.pop(0), ended)
 
 
 def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep: bool) -> None:
     """In the child: run cases, write a line for each, and never come back."""
     code = 1
     try:
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        for sign in TIME_IS_OVER:
+            signal.signal(sign, signal.SIG_DFL)
         resource.setrlimit(resource.RLIMIT_AS, (MEGABYTES << 20, MEGABYTES << 20))
         gc.set_threshold(50_000, 20, 20)
         results = _recorded()
@@ -158,8 +165,10 @@ def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool
         before = _contents(case)
         os.chdir(case)
         results.clear()
-        signal.alarm(SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        signal.alarm(WAITING)
         code, wrong = _run(call, case, out, err, results)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.alarm(0)
         said, printed = (path.read_text(errors="replace") for path in (err, out))
         wrong = _judged(call, code, said, printed, before, _contents(case)) or wrong

@@ -88,5 +88,5 @@ def with_reach(scene: Scene) -> Scene:
             save_reach(path, graph, names, reached.pairs, reached.inputs)
             log.info("wrote %s", path)
         except OSError as error:
-            log.warning("%s: can't be written (%s); what was computed isn't kept", path, error.strerror)
+            log.warning("%s: %s; what was computed isn't kept", path, error.strerror)
     return Scene(graph, scene.seconds)

@@ -609,3 +609,29 @@ except PermissionError:
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "report.html").is_file()
     assert 'src="http' not in (tmp_path / "report.html").read_text()
+
+
+def test_ctrl_c_before_everything_is_imported_is_one_line() -> None:
+    code = """
+import os, signal, sys
+class Impatient:
+    def find_spec(self, name, path=None, target=None):
+        if name == "confab.cli":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Impatient())
+from confab.start import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (INTERRUPTED, "")
+    assert done.stderr == "confab: interrupted; every file is as it was before, or whole\n"
+
+
+def test_a_clock_that_goes_backwards_loses_no_episode(tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    memory = tearoom.with_name("m.ttl")
+    for year in (2040, 1990, 2026):
+        monkeypatch.setattr("time.time", lambda year=year: (year - 1970) * 365.25 * 86400.0)
+        if memory.is_file():
+            os.utime(memory, (year * 1e6, year * 1e6))
+        assert ask("learn", tearoom, "--memory", memory)[0] == YES
+    assert sum(Memory.load(memory).experience.episodes.values()) == 3

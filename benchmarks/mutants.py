@@ -1,0 +1,172 @@
+"""Mutation testing: how many small faults in a module its own fast tests notice.
+
+    python -m benchmarks.mutants               60 faults in each module, drawn by seed, going on where the last run ended
+    python -m benchmarks.mutants 20 validation so many in one
+    python -m benchmarks.mutants --table       what was noticed, as docs/promises.md has it
+
+The faults are cosmic-ray's (`pip install cosmic-ray`; no extra has it). Each is put into the module of a process of its own, which
+runs the module's tests until the first that fails. Faults in annotations and docstrings are none. What came of each stands in
+``mutants.json``.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import json
+import os
+import random
+import signal
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from importlib.abc import Loader
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_loader
+from itertools import islice
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).resolve().parents[1]
+RECORD = Path(__file__).with_name("mutants.json")
+MANY, SECONDS = 60, 120
+TESTS: dict[str, tuple[str, ...]] = {
+    "planner/language.py": ("tests/planner/test_one_language.py",),
+    "reasoner/symbols.py": ("tests/planner/test_validation.py", "tests/reasoner/test_reading.py"),
+    "planner/validation.py": ("tests/planner/test_validation.py",),
+    "planner/hierarchical/unsolvability.py": ("tests/planner/test_wants.py", "tests/planner/test_fast.py"),
+    "planner/grounded/unreachable.py": ("tests/planner/test_flat.py",),
+    "planner/acting/repair.py": ("tests/planner/test_repair.py",),
+    "planner/acting/schedule.py": ("tests/planner/test_schedule.py",),
+    "reasoner/memory/counts_file.py": ("tests/reasoner/test_experience.py", "tests/reasoner/test_remembering.py"),
+    "reasoner/memory/links_file.py": ("tests/reasoner/test_memory.py",),
+}
+SAME = ("Eq_Is", "Eq_IsNot")
+"""What is no fault here: names are interned, so that those that are equal are mostly identical."""
+Fault = tuple[str, int]
+"""An operator of cosmic-ray, and at which of the places that it fits."""
+
+
+def faults(source: str, draw: random.Random) -> Iterator[tuple[Fault, str]]:
+    """Yield faults of a module's text that change what it does, each with the text that has it, in an order that is drawn."""
+    import cosmic_ray.plugins
+    from cosmic_ray.ast import ast_nodes, get_ast
+    from cosmic_ray.mutating import mutate_code
+
+    nodes, plain = list(ast_nodes(get_ast(source))), meaning(source)
+    names = [name for name in sorted(cosmic_ray.plugins.operator_names()) if not name.endswith(SAME)]
+    operators = {name: cosmic_ray.plugins.get_operator(name) for name in names}
+    places: list[Fault] = []
+    for name, operator in operators.items():
+        with contextlib.suppress(TypeError):  # one that needs arguments
+            many = sum(1 for node in nodes for _ in operator().mutation_positions(node))
+            places += [(name, number) for number in range(many)]
+    draw.shuffle(places)
+    for name, number in places:
+        with contextlib.suppress(SyntaxError):
+            text = mutate_code(source, operators[name](), number)
+            if text is not None and meaning(text) != plain:
+                yield (name, number), text
+
+
+def meaning(source: str) -> str:
+    """Return what a module's text says without its annotations and docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.AnnAssign | ast.arg):
+            node.annotation = ast.Constant(None) if isinstance(node, ast.AnnAssign) else None
+        elif isinstance(node, ast.FunctionDef):
+            node.returns = None
+        if isinstance(body := getattr(node, "body", None), list):
+            kept = [s for s in body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
+            node.body = [  # type: ignore[attr-defined]
+                s for s in kept if not (isinstance(s, ast.If) and ast.unparse(s.test).endswith("TYPE_CHECKING"))
+            ]
+    return ast.dump(tree)
+
+
+def noticed(file: str, text: str) -> bool:
+    """Return whether a module's tests fail, or come to no end, with this text in its place."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            signal.setitimer(signal.ITIMER_PROF, SECONDS)
+            with open(os.devnull, "w") as nowhere:  # noqa: PTH123
+                os.dup2(nowhere.fileno(), 1)
+                os.dup2(nowhere.fileno(), 2)
+            sys.meta_path.insert(0, Instead(file, text))
+            import pytest
+
+            code = int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *TESTS[file]]))
+        finally:
+            os._exit(code)
+    _, state = os.waitpid(child, 0)
+    return not (os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0)
+
+
+class Instead(Loader):
+    """Finds one module, and gives it another text."""
+
+    def __init__(self, file: str, text: str) -> None:
+        self.name, self.file, self.text = file.removesuffix(".py").replace("/", "."), ROOT / file, text
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        """Return how the module is loaded, if it is this one."""
+        return spec_from_loader(name, self, origin=str(self.file)) if name == self.name else None
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave it to Python."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run the other text."""
+        module.__file__ = str(self.file)
+        exec(compile(self.text, str(self.file), "exec"), module.__dict__)
+
+
+def records() -> dict[str, dict[str, str]]:
+    """Return for each module what came of its faults: ``noticed``, or the line that survived."""
+    found: dict[str, dict[str, str]] = json.loads(RECORD.read_text("utf-8")) if RECORD.is_file() else {}
+    return found
+
+
+def try_out(file: str, many: int) -> None:
+    """Draw faults of a module, try those that weren't yet, and note what came of each as it goes."""
+    source = (ROOT / file).read_text("utf-8")
+    if noticed(file, source):
+        raise SystemExit(f"{file}: its tests fail without any fault: {' '.join(TESTS[file])}")
+    for (name, number), text in islice(faults(source, random.Random(file)), many):
+        key = f"{name.removeprefix('core/')}:{number}"
+        known = records()
+        if key in known.get(file, {}):
+            continue
+        line = next(new for old, new in zip(source.splitlines(), [*text.splitlines(), ""], strict=False) if old != new)
+        known.setdefault(file, {})[key] = "noticed" if noticed(file, text) else line.strip()
+        RECORD.write_text(json.dumps(known, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8")
+        print(file, key, known[file][key], flush=True)
+
+
+def table() -> None:
+    """Print the share that was noticed of each module."""
+    print("| module | faults tried | noticed | | survived |\n|---|---|---|---|---|")
+    for file, its in records().items():
+        survived = [line for line in its.values() if line != "noticed"]
+        share = 1 - len(survived) / len(its)
+        print(f"| `{file}` | {len(its)} | {len(its) - len(survived)} | {share:.0%} | {len(survived)} |")
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Try what is asked for."""
+    if "--table" in arguments:
+        table()
+        return
+    many = int(arguments[0]) if arguments else MANY
+    for file in TESTS:
+        if all(word in file for word in arguments[1:]):
+            try_out(file, many)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
