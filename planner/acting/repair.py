@@ -8,6 +8,8 @@ put off     if it can't be done yet; then so is what concerns the same individua
 
 What was put off is tried again as long as anything else succeeds. The goals that are open in the end are left to the fast
 planner, on the same table. A hand that stands in the middle of something first finishes it, or is brought to rest.
+
+Nothing leaves here to be followed that `planner.validation` doesn't accept.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from planner.hierarchical.subplans import Effort, LimitError
 from planner.hierarchical.unsolvability import unattainable
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from planner.transitions import Cell, arguments_of, key_of
+from planner.validation import validate
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)
@@ -86,6 +89,8 @@ def mend(
     begin = perf_counter()
     using = using or compiled(problem)
     repaired = repair(problem, rest, planned, using, in_progress, limits)
+    if repaired is not None and rejected(problem, repaired.steps):
+        repaired = None
     fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
@@ -107,6 +112,7 @@ def repair(
     touched = changed_individuals(planned, problem)
     call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
     call.proved = True  # what is impossible is proved by replanning
+    call.gone_back = True  # nor is anything kept undone here: beginning anew is replanning, too
     pending = list(rest)
     try:
         if not _at_rest(call):
@@ -155,7 +161,7 @@ def replan(
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
     """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
     first: tuple[Step, ...] = ()
-    call = _call(problem, using, limits)
+    now, call = problem, _call(problem, using, limits)
     if not _at_rest(call):
         try:
             settle(call)
@@ -165,7 +171,18 @@ def replan(
     outcome = planner(problem) if planner is not None else fast_plan(problem, limits=limits, using=using)
     if outcome.plan is None:
         return None, outcome
-    return renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps, outcome
+    steps = renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps
+    reason = rejected(now, steps)
+    return (None, replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason)) if reason else (steps, outcome)
+
+
+def rejected(problem: Problem, steps: Sequence[Step]) -> Reason | None:
+    """Return what the independent checker has against following some steps; None if they can be followed from here to the goal.
+
+    Their primitives are checked: the first step may be under way, so that what its parents ask held before.
+    """
+    faults = validate(problem, Plan(renumbered(Plan(tuple(steps)).primitives)))
+    return Reason(f"the steps that were found can't be followed: {faults[0].text}") if faults else None
 
 
 def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:

@@ -5,7 +5,7 @@ from functools import cache
 
 import pytest
 
-from planner.acting.repair import CLOSE, cost, difference, mend, replan, vanished
+from planner.acting.repair import CLOSE, cost, difference, mend, rejected, replan, vanished
 from planner.hierarchical.planner import plan
 from planner.hierarchical.serialization import Compiled, compiled
 from planner.plan import Limits, Plan, Step
@@ -13,6 +13,7 @@ from planner.validation import successor
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.symbols import Problem, State, Symbol
+from worlds.families import tabletop
 
 
 @cache
@@ -95,3 +96,12 @@ def test_what_is_not_there_is_named() -> None:
 def test_done_in_another_order_counts_as_dropped_and_added() -> None:
     first, second, *others = planned().steps
     assert sum(difference(planned().steps, (second, first, *others))) == 12
+
+
+def test_steps_that_the_checker_rejects_are_not_followed() -> None:
+    problem = tabletop()
+    outcome = plan(problem)
+    assert outcome.plan is not None
+    assert rejected(problem, outcome.plan.steps) is None
+    assert rejected(problem, outcome.plan.steps[:-1]) is not None
+    assert rejected(problem, outcome.plan.steps[0].steps[1:]) is not None
