@@ -88,11 +88,13 @@ class Attempt:
 
     # ------------------------------------------------------------------------------------------------- where to
 
-    def reacher(self, *ignored: str, margin: float = MARGIN, opening: float | None = None) -> Reacher:
+    def reacher(
+        self, *ignored: str, margin: float = MARGIN, opening: float | None = None, whole: bool = False
+    ) -> Reacher:
         """Return the arm, with what it holds, maybe fingers at another `opening`, among its surroundings less the `ignored`."""
         mover = self.hand.mover(opening)
         if self.held is not None:
-            mover = mover.holding(self.world.load_spheres(self.hand, self.held))
+            mover = mover.holding(self.world.load_spheres(self.hand, self.held, whole))
         around = self.world.surroundings(self.hand.hand.name, self.held).without(*ignored)
         return Reacher(mover, around, margin)
 
@@ -116,7 +118,10 @@ class Attempt:
                     missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
                     raise SkillError("unreachable", objects, beyond_m=missing)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
-            return [int(left[i]) for i in _free(reacher, self.hand.mover(THIN), stages, solved, order, objects)]
+            return [
+                int(left[i])
+                for i in _free(reacher, self.hand.mover(THIN), self.hand.mover(opening), stages, solved, order, objects)
+            ]
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
         """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""
@@ -159,7 +164,7 @@ class Attempt:
     def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None) -> int:
         """Move to the first goal pose that a free path leads to, maybe with fingers that go to an `opening`; return which it is."""
         with self.planning():
-            found, reacher = None, self.reacher(*ignored, opening=opening)
+            found, reacher = None, self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
             for attempts in (0, 150):
@@ -270,6 +275,7 @@ def _seen_from(world: Engine, carrier: str, body: str) -> Array:
 def _free(
     reacher: Reacher,
     closed: Mover,
+    bare: Mover,
     stages: Sequence[Stage],
     postures: Sequence[Array],
     order: NDArray[np.intp],
@@ -283,7 +289,7 @@ def _free(
     for start in range(0, len(order), BATCH):
         batch = order[start : start + BATCH]
         clear = np.full(len(batch), np.inf)
-        for name, gap in _gaps(reacher, closed, stages, [q[batch] for q in postures]).items():
+        for name, gap in _gaps(reacher, closed, bare, stages, [q[batch] for q in postures]).items():
             clear = np.minimum(clear, gap)
             blocked[name] += int(np.sum(gap <= reacher.margin))
             best[name] = max(best.get(name, -np.inf), float(gap.max()))
@@ -298,12 +304,14 @@ def _free(
     return chosen
 
 
-def _gaps(reacher: Reacher, closed: Mover, stages: Sequence[Stage], postures: Sequence[Array]) -> dict[str, Array]:
+def _gaps(
+    reacher: Reacher, closed: Mover, bare: Mover, stages: Sequence[Stage], postures: Sequence[Array]
+) -> dict[str, Array]:
     """Return how near to each thing the candidates come, at the stage where they come nearest."""
     nearest: dict[str, Array] = {}
     for stage, q in zip(stages, postures, strict=True):
         around = reacher.around if stage.around is None else stage.around
-        mover = reacher.mover if not stage.closed else closed
+        mover = closed if stage.closed else bare if stage.released else reacher.mover
         for name, gap in mover.clearances(q, around.without(*stage.ignored)).items():
             spare = MARGIN - CLOSE if stage.near else 0.0
             nearest[name] = np.minimum(gap + spare, nearest.get(name, np.inf))

@@ -15,7 +15,7 @@ import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Embodiment, Shape
-from sim.bodies import center_height, cylinders, height_of, inner_radius, outline, vessel_height
+from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
 from sim.collision import Solid, Surroundings, box, column
 from sim.mechanisms import Mechanic
 from sim.robot import Manipulator
@@ -352,9 +352,9 @@ class Engine:
         turned, base = self.sense(body)
         return rotation.T @ turned, rotation.T @ (base - point)
 
-    def load_spheres(self, hand: Manipulator, body: str) -> Spheres:
-        """Return spheres for a held body in the hand's frame; its lowest centimetres, which may touch the table, left out."""
+    def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
+        """Return spheres for a held body in its hand; its lowest centimetres, which may touch a table, only if `whole`."""
         shape = self.bodies[body].shape
         rotation, base = self.in_hand(hand, body)
-        spheres = column(*outline(shape), bottom=min(0.03, height_of(shape) / 3))
+        spheres = column(*outline(shape), bottom=outer_radius(shape) / 3 if whole else min(0.03, height_of(shape) / 3))
         return Spheres(spheres.centers @ rotation.T + base, spheres.radii)

@@ -337,16 +337,18 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
     way = ways(frame, swings)
     poses = np.repeat(run.attempt.hand.pose[None], len(way.first), axis=0)
     stages: list[Stage] = []
-    closed, around = False, None
+    closed, released, around = False, False, None
     for one in chain:
         ignored = run.free_of(one)
-        closed = closed or one.fingers == "grasp"
+        closed, released = closed or one.fingers == "grasp", released or (one is not phase and one.fingers == "open")
         if one.motion == "joint":
             with run.attempt.planning():
                 stages += _swing(run, one, poses, way, ignored)
             around = stages[-1].around
         elif one.motion:
-            stages.append(Stage(_poses(run, one, poses, way), ignored, around, closed, near=frame.low > -np.pi))
+            stages.append(
+                Stage(_poses(run, one, poses, way), ignored, around, closed, frame.low > -np.pi, released=released)
+            )
         closed = closed and one.fingers != "open"
         poses = stages[-1].poses
     return stages[0].poses, way, run.attempt.choose(stages, run.things(), run.spread)

@@ -23,6 +23,7 @@ class Stage:
 
     The fingers have by then `closed` around something, or are as the others' are. At a handle, which is `near` what it is on,
     a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits.
+    What the hand holds now is `released` by then.
     """
 
     poses: Array
@@ -31,6 +32,7 @@ class Stage:
     closed: bool = False
     near: bool = False
     slack: float = 0.0
+    released: bool = False
 
 
 def fan() -> tuple[Array, Array]:

@@ -83,6 +83,18 @@ def test_a_cup_is_brought_from_a_cupboard_that_is_opened_and_shut_and_a_lid_is_p
     assert seen["LOCATION", "lid"] == "pot_top"
 
 
+def test_tubes_are_put_into_a_centrifuge_that_is_started_with_its_lid_shut() -> None:
+    scene = confab.load("centrifuge")
+    plan = scene.plan().plan
+    assert plan is not None
+    expected = expectations(scene.problem, plan.primitives)
+    rollout = verify(scene.embodiment, scene.problem.initial, plan.primitives, expected)
+    assert rollout.failure is None
+    seen = {(symbol.situation, *symbol.arguments): value for symbol, value in rollout.state.items()}
+    assert (seen["OPENED", "cover"], seen["RUNNING", "start"]) == ("false", "true")
+    assert (seen["LOCATION", "tube1"], seen["LOCATION", "tube2"]) == ("slot1", "slot2")
+
+
 def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
     scene = kitchen()
     skills, roles = by_skill(scene.embodiment), {"hand": "right_hand", "object": "drawer"}
