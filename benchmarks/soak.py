@@ -17,7 +17,10 @@ from pathlib import Path
 from time import process_time
 
 import confab
+import sim  # noqa: F401 - imports PyBullet without its banner
 from confab.memory import Memory
+
+import pybullet  # isort: skip
 
 PAGE = 4096
 
@@ -35,10 +38,6 @@ def files() -> int:
 
 def clients() -> int:
     """Return how many physics servers this process is connected to."""
-    import sim  # noqa: F401 - imports PyBullet without its banner
-
-    import pybullet  # isort: skip
-
     return sum(bool(pybullet.isConnected(client)) for client in range(64))
 
 

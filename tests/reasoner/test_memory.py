@@ -11,6 +11,7 @@ from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_
 from reasoner.memory.links import Links
 from reasoner.memory.links_file import load_links, save_links
 from reasoner.reading.problem import Reading, read
+from reasoner.symbols import Symbol
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +30,24 @@ def test_links_survive_the_file(tmp_path: Path, serving: Reading, links: Links) 
     path = tmp_path / "memory.ttl"
     save_links(path, links, serving.names, serving.problem.scene)
     assert load_links(path, serving.names) == links
+
+
+def test_links_to_truth_values_survive_the_file(tmp_path: Path, serving: Reading) -> None:
+    move = ("B1_MOVE", ("cup1", "location7"))
+    links = Links({move: {Symbol("LOCATION", ("cup1",)): {"true": 0.75, "false": 0.25}}})
+    save_links(tmp_path / "m.ttl", links, serving.names, serving.problem.scene)
+    assert load_links(tmp_path / "m.ttl", serving.names) == links
+
+
+@pytest.mark.parametrize("share", ["-0.75", "1.5", "NaN"])
+def test_a_share_that_is_none_is_refused(tmp_path: Path, serving: Reading, share: str) -> None:
+    file, move = tmp_path / "m.ttl", ("B1_MOVE", ("cup1", "location7"))
+    links = Links({move: {Symbol("LOCATION", ("cup1",)): {"location2": 0.75, "location3": 0.25}}})
+    save_links(file, links, serving.names, serving.problem.scene)
+    assert "0.75" in file.read_text()
+    file.write_text(file.read_text().replace("0.75", share))
+    with pytest.raises(KnowledgeError):
+        load_links(file, serving.names)
 
 
 def test_links_survive_a_program_that_writes_the_file_anew(tmp_path: Path, serving: Reading, links: Links) -> None:
