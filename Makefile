@@ -1,7 +1,6 @@
 # Each target does its own set-up, in .venv, from python3 and make alone.
 #   make demo     the main job: plan, verify in physics, learn, report
-#   make test     every test; one that needs an optional library is skipped, with its reason
-#   make test-all every test, with all that the optional ones need
+#   make test     every test; one that needs an optional library is skipped, with its reason; with CI=true none is
 #   make check    what a change must pass: lint, format, types, tests
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
@@ -20,7 +19,7 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test test-all check bench figures vocabulary fuzz lock clean
+.PHONY: help demo test check bench figures vocabulary fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -28,10 +27,7 @@ help:
 demo: $(VENV)/installed
 	@$(BIN)/confab run --memory confab-out/run-memory.ttl
 
-test: $(VENV)/installed
-	@$(BIN)/python -m pytest -n auto
-
-test-all: $(VENV)/installed-bench
+test: $(VENV)/installed$(if $(CI),-bench)
 	@$(BIN)/python -m pytest -n auto
 
 check: $(VENV)/installed

@@ -12,7 +12,7 @@ settings.load_profile("same-every-time")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Let a run with CI=true fail if a test was skipped: something isn't installed that `make test-all` installs."""
+    """Let a run with CI=true fail if a test was skipped: something isn't installed that `make test` installs with it."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or os.environ.get("CI") != "true":
         return

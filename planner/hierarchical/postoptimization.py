@@ -37,7 +37,7 @@ LARGEST = 7
 """So many steps a cluster has at most."""
 OPERATORS, MOST_ROWS = 400, 20_000
 """The largest world in which steps are planned anew, in operators, and in rows of a join on the way to them."""
-STATES, WORK = 4_000, 10_000
+STATES, WORK = 4_000, 2_500
 """So many states are expanded for a cluster or a whole plan, and in all, for each cluster allowed."""
 WHOLE_BITS = 48
 """The largest world that is planned anew as a whole, in bits of a state if every symbol could take every value."""
