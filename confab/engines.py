@@ -15,6 +15,7 @@ from time import perf_counter
 
 from confab.pddl_commands import read_pddl_plan
 from planner.hierarchical.regrouping import under_the_levels_above
+from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Reason, Status
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
@@ -54,7 +55,8 @@ def plan_by_engine(
 
     def outcome(status: Status, plan: Plan | None = None, reason: str = "") -> Outcome:
         why = Reason(f"{name}: {reason}") if reason else None
-        return Outcome(status, plan, why, seconds=perf_counter() - began, engine=name)
+        left = tuple(levels_left(problem, plan)) if plan is not None else ()
+        return Outcome(status, plan, why, seconds=perf_counter() - began, engine=name, left=left)
 
     if said.startswith("UNSOLVABLE"):
         return outcome(Status.UNSOLVABLE, reason=f"no plan exists on level {level}")

@@ -441,6 +441,10 @@ class Scene:
             raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
         if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
             raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
+        if engine not in (None, NO_ENGINE) and not leave_levels:
+            raise KnowledgeError(
+                "an engine plans one level alone, so it may leave the others; leave out --levels strict"
+            )
         if optimal and mode not in (DEFAULT_MODE, "optimal"):
             raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {mode}; leave one out")
         optimal = optimal or mode == "optimal"

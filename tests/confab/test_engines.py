@@ -44,6 +44,13 @@ def test_an_engines_plan_stands_under_the_levels_above_and_is_valid() -> None:
     assert at_rest(problem, 3).keys() and not at_rest(problem, 1)
 
 
+def test_the_levels_that_an_engines_plan_leaves_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engines, "under_the_levels_above", lambda _, plan: plan)
+    outcome = plan_by_engine(confab.load(SCENE).problem, "stand-in")
+    assert outcome.plan is not None and {step.level for step in outcome.plan.steps} != {1}
+    assert {one.level for one in outcome.left} == {1, 2}
+
+
 def test_a_level_of_ones_choice_is_planned() -> None:
     outcome = plan_by_engine(confab.load(SCENE).problem, "stand-in", 2)
     assert outcome.plan is not None and 3 not in outcome.plan.length
@@ -84,6 +91,7 @@ def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.Mon
     [
         (["--level", "2"], "a level is chosen for an engine"),
         (["--engine", "e", "--optimal"], "an engine plans by itself"),
+        (["--engine", "e", "--levels", "strict"], "an engine plans one level alone"),
     ],
 )
 def test_options_that_exclude_each_other_are_misuse(options: list[str], message: str) -> None:
