@@ -124,7 +124,9 @@ def behavior(draw: st.DrawFn, name: str) -> str:
 
 def _determines(text: str, condition: str, term: str) -> bool:
     lines = [line for line in text.splitlines() if line.startswith(f"w:{condition} ")]
-    return any(":ValueCondition" in line and line.endswith(f":situationType w:AT ; :value w:{term} .") for line in lines)
+    return any(
+        ":ValueCondition" in line and line.endswith(f":situationType w:AT ; :value w:{term} .") for line in lines
+    )
 
 
 @st.composite
