@@ -51,6 +51,8 @@ def sentence(fact: str, value: str, labels: Labels, roles: Mapping[str, str]) ->
     if match := re.fullmatch(r"(.+) (\S+) how many", fact):
         return f"{path(match[1])} {labels.name(match[2])} {value}"
     if match := re.fullmatch(r"something (\S+) (\S+) and (.+)", fact):
+        if value == "none":
+            return f"nothing is {path(match[3])}"
         none = "nothing" if value == "no" else "something"
         return f"{none} {labels.name(match[1])} both {path(match[2])} and {path(match[3])}"
     if match := re.fullmatch(r"others of (\S+) · (\S+) is", fact):

@@ -9,6 +9,7 @@ from string import Template
 from typing import TYPE_CHECKING
 
 import ontology
+from confab.lifted import sentence
 from confab.report.course import Course, of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of, place_map
 from confab.report.markup import Markup, asset, joined, tag
@@ -76,7 +77,7 @@ def report_html(
     if course is not None:
         parts += [tag("h2", "Who did what when, and what that changed"), timeline(course, labels, speed)]
         parts += [tag("h2", "The plan, and why"), _plan(course, labels, report, execution)]
-    parts += [_wanted(course, problem, labels), _learned(learned)]
+    parts += [_wanted(course, problem, labels), _learned(learned, labels)]
     parts += [tag("h2", "Again"), tag("pre", again or _again(scene, report, execution)), *_small_print(outcome)]
     return Template(asset("page.html")).substitute(
         title=joined(title), style=asset("style.css"), body=joined(parts), script=asset("script.js")
@@ -270,14 +271,18 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
     return joined(tag("h2", "What was wanted"), table(columns, rows))
 
 
-def _learned(memory: Memory | None) -> Markup | None:
+def _learned(memory: Memory | None, labels: Labels) -> Markup | None:
     if memory is None:
         return None
-    counts = memory.counts(8)
+    columns = ("behaviour", "chosen", "passed over", "where this held", "relevance")
+    rows = [
+        (labels.name(str(behavior)), chosen, passed, sentence(str(fact), str(value), labels, {}), relevance)
+        for behavior, fact, value, chosen, passed, _, _, relevance in memory.counts(8)
+    ]
     return joined(
         tag("h2", "What was learned"),
         tag("p", memory.said()),
-        table(list(counts.columns), list(counts)) if len(counts) else None,
+        table(columns, rows) if rows else None,
     )
 
 

@@ -7,6 +7,8 @@ from click.testing import CliRunner
 
 import confab
 from confab.cli import app
+from confab.labels import labels_of
+from confab.lifted import sentence
 from planner.contrast import cost_of
 from planner.validation import validate
 
@@ -55,6 +57,17 @@ def test_reasons_are_sentences_and_name_no_id(serving: confab.Result) -> None:
     said = str(serving.explain())
     assert "“place cup 1 in left hand to location 7” (L2#1) asks that left hand holds cup 1" in said
     assert not {"HOLDS", "LOCATION", "B2_PICK", "left_hand"} & set(said.replace("(", " ").split())
+
+
+@pytest.mark.parametrize("name", ["beverage-serving", "house-small"])
+def test_each_value_of_a_lifted_fact_has_a_sentence_of_its_own(name: str) -> None:
+    scene = confab.load(name)
+    memory = confab.Memory.of(scene)
+    memory.learn(scene, scene.plan())
+    labels = labels_of(scene.knowledge, scene.names, scene.problem)
+    told = {(str(fact), str(value)) for _, fact, value, *_ in memory.counts()}
+    assert any(fact.startswith("something ") and value == "none" for fact, value in told)
+    assert len({(fact, sentence(fact, value, labels, {})) for fact, value in told}) == len(told)
 
 
 @pytest.mark.parametrize(
