@@ -498,6 +498,7 @@ class Scene:
             grounds = {level: quantify(self.knowledge, seen, level) for level in seen.problem.domain.levels}
         else:
             seen = self._seen(self.reading, observed) if observed else recognise(self.knowledge, goals)
+        self.knowledge.confirm()
         problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
         quantified = perf_counter() - begin
         self._check_goal(problem)
@@ -519,6 +520,7 @@ class Scene:
             # A "no" is worth a look at the whole world, whatever task recognition left out of it.
             if "reading" not in self.__dict__:
                 self.reading = read(self.knowledge, seen.schema)
+                self.knowledge.confirm()
             whole = replace(self.problem, goal=problem.goal)
             if whole != problem:
                 problem, outcome = whole, search(whole)

@@ -255,7 +255,9 @@ def standing_alone(graph: KnowledgeGraph, query: str) -> str:
 
 
 def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> Answer:
-    answer = graph.query(query)
+    assert graph.remote is not None
+    graph.round_trips += 1
+    answer = graph.remote.query(query, graph.prefixes, {}, noted=False)
     if isinstance(answer, ox.QueryBoolean):
         return "truth", [], bool(answer)
     rows: list[Row] = []

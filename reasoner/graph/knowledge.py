@@ -45,8 +45,11 @@ Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
 class Remote(Protocol):
     """A store elsewhere that answers SPARQL 1.1, as `reasoner.graph.stores.Endpoint` is."""
 
-    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
-        """Return what a query answers."""
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
+        """Return what a query answers; `confirm` asks it again if it is noted."""
+
+    def confirm(self) -> None:
+        """Raise `KnowledgeError` if what was noted is answered otherwise now."""
 
 
 class KnowledgeError(ValueError):
@@ -159,6 +162,12 @@ class KnowledgeGraph:
             )
         except SyntaxError as error:
             raise KnowledgeError(f"the query is not SPARQL 1.1: {error}") from error
+
+    def confirm(self) -> None:
+        """Raise `KnowledgeError` if a remote store says something else now than when it was read."""
+        if self.remote:
+            self.deadline.check("asking the knowledge graph again")
+            self.remote.confirm()
 
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
         """Add triples of IRIs to one of the named graphs."""

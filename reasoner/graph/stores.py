@@ -6,12 +6,16 @@ queries. It shows either one default graph with everything in it, or a named gra
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlencode, urlsplit, urlunsplit
 
 import pyoxigraph as ox
@@ -28,6 +32,9 @@ RETRIES = 3
 BACKOFF = 0.2
 BUSY = (429, 502, 503, 504)
 RESULTS = "application/sparql-results+json"
+LARGEST = 2_000_000_000
+"""Bytes of an answer; of a table of 20,000 objects the whole scene has 20 million."""
+CHUNK = 1 << 16
 FORM = re.compile(r"\b(SELECT|ASK|CONSTRUCT|DESCRIBE)\b", re.IGNORECASE)
 PROLOGUE = re.compile(r"#[^\n]*|\bPREFIX\s+\S*\s*<[^>]*>|\bBASE\s*<[^>]*>", re.IGNORECASE)
 STAMP = "urn:confab:file"
@@ -59,6 +66,11 @@ class Endpoint:
         How often a question is asked again after a lost connection or a busy server, each time after twice the pause.
     graphs : tuple of str
         IRIs of the named graphs whose union is asked; the endpoint's default graph if empty.
+
+    Attributes
+    ----------
+    noted : mapping of query, as it is sent, to digest of its answer
+        What was read so far; `confirm` asks it again.
     """
 
     url: str
@@ -66,6 +78,7 @@ class Endpoint:
     timeout: float = TIMEOUT
     retries: int = RETRIES
     graphs: tuple[str, ...] = ()
+    noted: dict[tuple[bytes, str], bytes] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         try:
@@ -93,7 +106,7 @@ class Endpoint:
             retries=retry, timeout=urllib3.Timeout(connect=min(5.0, self.timeout), read=self.timeout)
         )
 
-    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
         """Return what a SPARQL 1.1 query answers.
 
         Parameters
@@ -102,47 +115,100 @@ class Endpoint:
         prefixes : mapping of prefix to namespace
         bindings : mapping of variable to IRI
             Of variables that the query selects.
+        noted : bool
+            Whether `confirm` asks it again.
 
         Raises
         ------
         KnowledgeError
-            Nothing answers there, or too slowly; it wants authentication; it is no endpoint; the query isn't SPARQL.
+            Nothing answers there, or too slowly or too much; it wants authentication; it is no endpoint; the query isn't
+            SPARQL.
         """
         form = FORM.search(PROLOGUE.sub(" ", query))
         rows = form is None or form.group().upper() in ("SELECT", "ASK")
-        response = self._post(_complete(query, prefixes, bindings), RESULTS if rows else "application/n-triples")
+        accept = RESULTS if rows else "application/n-triples"
+        fields = [
+            ("query", _complete(query, prefixes, bindings)),
+            *(("default-graph-uri", graph) for graph in self.graphs),
+        ]
+        body = urlencode(fields).encode()
+        answer, kind = self._post(body, accept)
+        if noted:
+            self.noted[body, accept] = _digest(answer)
         try:
             if rows:
-                return ox.parse_query_results(response, format=ox.QueryResultsFormat.JSON)
+                results = ox.QueryResultsFormat.from_media_type(kind) or ox.QueryResultsFormat.JSON
+                return ox.parse_query_results(answer, format=results)
             triples = ox.Store()
-            triples.load(response, format=ox.RdfFormat.N_TRIPLES)
+            triples.load(answer, format=ox.RdfFormat.from_media_type(kind) or ox.RdfFormat.N_TRIPLES)
         except (SyntaxError, ValueError) as error:
             raise KnowledgeError(
-                f"{self.url}: the answer is no SPARQL 1.1 result ({error}); is it an endpoint?"
+                f"{self.url}: the answer, said to be {kind or 'of no media type'}, is no SPARQL 1.1 result ({error}); "
+                "is it an endpoint?"
             ) from error
         return triples.query("CONSTRUCT WHERE { ?s ?p ?o }")
 
-    def _post(self, query: str, accept: str) -> bytes:
-        fields = [("query", query), *(("default-graph-uri", graph) for graph in self.graphs)]
+    def confirm(self) -> None:
+        """Ask again what was read so far, so that no two versions of the data get into one plan.
+
+        Raises
+        ------
+        KnowledgeError
+            Something is answered otherwise now; or as `query`.
+        """
+        for (body, accept), digest in self.noted.items():
+            if _digest(self._post(body, accept)[0]) != digest:
+                raise KnowledgeError(f"{self.url}: the data changed since it was read; open the scene anew")
+
+    def _post(self, body: bytes, accept: str) -> tuple[bytes, str]:
+        """Return an answer and its media type."""
         headers = {"Accept": accept, "Content-Type": "application/x-www-form-urlencoded"}
         if self.authorization:
             headers["Authorization"] = self.authorization
-        try:
-            response = self._pool.request("POST", self.url, body=urlencode(fields), headers=headers)
-        except (MaxRetryError, TimeoutError) as error:
-            cause = error.reason if isinstance(error, MaxRetryError) else error
-            if isinstance(cause, ReadTimeoutError):
+        slow = f"{self.url}: no answer within {self.timeout:g} s; the store is too slow for this, or the limit too low"
+        for again in reversed(range(self.retries + 1)):
+            end = time.monotonic() + 2 * self.timeout  # the first byte may take one timeout, all others another
+            try:
+                response = self._pool.request("POST", self.url, body=body, headers=headers, preload_content=False)
+                answer = bytearray()
+                while part := response.read1(CHUNK):
+                    answer += part
+                    if time.monotonic() > end:
+                        raise KnowledgeError(slow)
+                    if len(answer) > LARGEST:
+                        raise KnowledgeError(
+                            f"{self.url}: an answer of more than {LARGEST:,} bytes; is it a SPARQL endpoint?"
+                        )
+                break
+            except (MaxRetryError, TimeoutError) as error:
+                cause = error.reason if isinstance(error, MaxRetryError) else error
+                if isinstance(cause, ReadTimeoutError):
+                    raise KnowledgeError(slow) from None
                 raise KnowledgeError(
-                    f"{self.url}: no answer within {self.timeout:g} s; the store is too slow for this, or the limit too low"
+                    f"{self.url}: nothing answers there ({_short(cause)}); is the server running?"
                 ) from None
-            raise KnowledgeError(
-                f"{self.url}: nothing answers there ({_short(cause)}); is the server running?"
-            ) from None
-        except HTTPError as error:
-            raise KnowledgeError(f"{self.url}: {_short(error)}") from None
+            except HTTPError as error:  # the connection was lost in the middle of an answer
+                if not again:
+                    raise KnowledgeError(f"{self.url}: {_short(error)}") from None
         if response.status == 200:
-            return response.data
-        raise KnowledgeError(f"{self.url}: {_refusal(response.status, response.data.decode('utf-8', 'replace'))}")
+            return bytes(answer), response.headers.get("Content-Type", "").partition(";")[0].strip()
+        raise KnowledgeError(f"{self.url}: {_refusal(response.status, answer.decode('utf-8', 'replace'))}")
+
+
+def _digest(answer: bytes) -> bytes:
+    """Return what two answers have in common that say the same: neither the order of rows nor the names of blank nodes count."""
+    try:
+        said = json.loads(answer)
+        rows = said["results"]["bindings"]
+    except (ValueError, KeyError, TypeError):
+        lines: list[Any] = sorted(re.sub(rb"_:\w+", b"_:", line) for line in answer.splitlines())
+        return sha256(b"\n".join(lines)).digest()
+    for row in rows:
+        for term in row.values():
+            if term.get("type") == "bnode":
+                term["value"] = ""
+    lines = sorted(json.dumps(row, sort_keys=True) for row in rows)
+    return sha256("\n".join(lines).encode()).digest()
 
 
 def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, retries: int = RETRIES) -> KnowledgeGraph:

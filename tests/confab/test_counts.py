@@ -68,7 +68,7 @@ class Counting:
     graph: KnowledgeGraph
     counts: Counter[str] = field(default_factory=Counter)
 
-    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
         """Answer a query."""
         looked = Looked(self.graph.store)
         if query == SCHEMA:
@@ -83,6 +83,9 @@ class Counting:
             looked=looked.count,
         )
         return ox.parse_query_results(data, format=ox.QueryResultsFormat.JSON)
+
+    def confirm(self) -> None:
+        """Nothing changes here."""
 
 
 def counted(path: Path, goals: tuple[str, ...] = ()) -> Counter[str]:

@@ -8,6 +8,8 @@ from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from urllib.parse import urlencode
+from urllib.request import Request, urlopen
 
 import pytest
 
@@ -18,6 +20,7 @@ from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
 from reasoner.graph.stores import Endpoint, connect, on_disk
 from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise
+from reasoner.vocabulary import CORE
 from tests.reasoner.servers import free_port, oxigraph, rdflib_endpoint
 
 PAPER = "https://w3id.org/confab/beverage-serving"
@@ -135,8 +138,13 @@ def stub(reply: Reply) -> Iterator[str]:
         def do_POST(self) -> None:
             self.rfile.read(int(self.headers["Content-Length"]))
             seen.append(self.path)
-            status, body = reply(self, len(seen))
+            try:
+                status, body = reply(self, len(seen))
+            except BrokenPipeError:  # it has answered by itself
+                self.close_connection = True
+                return
             self.send_response(status)
+            self.send_header("Content-Type", getattr(self, "kind", ""))
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
             with suppress(BrokenPipeError):  # who asked may have stopped waiting
@@ -206,6 +214,88 @@ def test_a_server_that_is_down_or_slow_is_said_to_be() -> None:
 def test_a_wrong_answer_is_explained(status: int, body: bytes, message: str) -> None:
     with stub(lambda *_: (status, body)) as url, pytest.raises(KnowledgeError, match=message):
         ask(url)
+
+
+def test_an_answer_in_another_form_of_results_is_read_by_its_media_type() -> None:
+    xml = b"""<?xml version="1.0"?><sparql xmlns="http://www.w3.org/2005/sparql-results#"><head><variable name="x"/></head>
+    <results><result><binding name="x"><uri>https://example.org/a</uri></binding></result></results></sparql>"""
+
+    def says(kind: str, body: bytes) -> Reply:
+        def reply(request: BaseHTTPRequestHandler, _: int) -> tuple[int, bytes]:
+            request.kind = kind  # type: ignore[attr-defined]
+            return 200, body
+
+        return reply
+
+    with stub(says("application/sparql-results+xml", xml)) as url:
+        assert len(ask(url)) == 1
+    for kind, body in (("application/sparql-results+xml", GOOD), ("text/html", b"<html>"), ("no type;;", xml)):
+        with stub(says(kind, body)) as url, pytest.raises(KnowledgeError, match=r"no SPARQL 1.1 result"):
+            ask(url)
+
+
+@pytest.mark.parametrize("drops", [1, 9])
+def test_an_answer_that_breaks_off_is_asked_for_again_and_then_said(drops: int) -> None:
+    def reply(request: BaseHTTPRequestHandler, number: int) -> tuple[int, bytes]:
+        if number <= drops:
+            request.send_response(200)
+            request.send_header("Content-Length", "1000000")
+            request.end_headers()
+            request.wfile.write(GOOD)
+            request.connection.shutdown(socket.SHUT_RDWR)
+            raise BrokenPipeError
+        return 200, GOOD
+
+    with stub(reply) as url:
+        if drops == 1:
+            assert ask(url) == []
+        else:
+            with pytest.raises(KnowledgeError, match=r"(?i)incomplete"):
+                ask(url, retries=2)
+
+
+def test_an_answer_that_trickles_ends_with_the_limit() -> None:
+    def reply(request: BaseHTTPRequestHandler, _: int) -> tuple[int, bytes]:
+        request.send_response(200)
+        request.end_headers()
+        with suppress(OSError):
+            for _ in range(600):
+                request.wfile.write(b" ")
+                time.sleep(0.05)
+        raise BrokenPipeError
+
+    begin = time.monotonic()
+    with stub(reply) as url, pytest.raises(KnowledgeError, match=r"no answer within 0.2 s"):
+        ask(url, timeout=0.2, retries=0)
+    assert time.monotonic() - begin < 5
+
+
+def test_data_that_change_while_they_are_read_are_never_planned_with(
+    scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import confab
+
+    with oxigraph({"": files_of(scene)}) as url:
+        steady = confab.load(url)
+        assert steady.plan().plan
+        steady.query("SELECT (RAND() AS ?x) {}")  # what people ask isn't asked again
+        assert steady.plan().plan
+        sent: list[bytes] = []
+        post = Endpoint._post
+
+        def meddled(self: Endpoint, body: bytes, accept: str) -> tuple[bytes, str]:
+            sent.append(body)
+            if len(sent) == 5:
+                change = f"DELETE WHERE {{ ?task <{CORE}goal> ?goal }}"
+                answer = urlopen(Request(url.replace("query", "update"), urlencode({"update": change}).encode()))
+                assert answer.status == 204
+            return post(self, body, accept)
+
+        monkeypatch.setattr(Endpoint, "_post", meddled)
+        with pytest.raises(KnowledgeError, match=r"changed since it was read; open the scene anew"):
+            confab.load(url).plan()
+        with pytest.raises(KnowledgeError, match="no task with goals"):
+            confab.load(url).plan()
 
 
 def test_authentication_is_sent_and_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
