@@ -19,7 +19,7 @@ import ontology
 from confab.accepting import AnyPlan, Facts, plan_of, several
 from confab.interchange import outcome_json
 from confab.table import Table
-from planner.plan import Limits, Outcome, Plan, Status
+from planner.plan import Limits, Outcome, Plan, Status, paused_collection
 from planner.solve import MODES, Request, solve
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
@@ -462,7 +462,7 @@ class Scene:
             time_limit = OPTIMAL_SECONDS
         self.knowledge.require_whole()
         deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
-        with self.knowledge.until(deadline):
+        with self.knowledge.until(deadline), paused_collection():
             how = "optimal" if optimal else mode
             return self._plan(
                 several(goals), self._memory(memory), how, deadline, observed, engine, level, leave_levels

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from planner.causal_links import on_level
+from planner.levels import lacking
 from planner.plan import Outcome, Plan, Reason, Step, renumbered
 from planner.validation import Bindings, Facts, Rules, successor, validate
 from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
@@ -165,7 +166,7 @@ def _lacking(
     """Return where a behaviour lacks the fewest conditions, and which."""
     best: Contrast | None = None
     for step, facts in places:
-        found, lacks = rules.lacking(behavior.preconditions, given, behavior.kinds, (facts,))
+        found, lacks = lacking(rules, behavior.preconditions, given, behavior.kinds, (facts,))
         if best is None or len(lacks) < len(best.lacks):
             arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
             best = Contrast(before, behavior.name, arguments, step, lacks)

@@ -10,7 +10,8 @@ level should have been applicable that makes this change, maybe together with th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import combinations
 
 from planner.plan import Broken, Left, Plan, Step
 from planner.validation import Bindings, Cell, Facts, Rules, stretches
@@ -27,7 +28,11 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
+
+MOST_LACKING = 4
+"""Conditions that are left out together where it is asked which of them a behaviour lacks."""
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
@@ -163,7 +168,32 @@ class _Watch:
     ) -> tuple[Bindings, tuple[Condition, ...]]:
         """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
         conditions = (*behavior.preconditions, *effect.when)
-        return self.rules.lacking(conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level]))
+        return lacking(self.rules, conditions, terms, behavior.kinds, (self.mixed(level, symbol), self.views[level]))
+
+
+def lacking(
+    rules: Rules, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
+) -> tuple[Bindings, tuple[Condition, ...]]:
+    """Return the fewest conditions without which the others hold in one of some states, with individuals put in.
+
+    Also returns with which individuals the others hold. More than `MOST_LACKING` are looked for one by one.
+    """
+
+    def gives(number: int) -> bool:
+        """Whether a condition gives a variable its value: without it the others hold of what isn't there."""
+        c = conditions[number]
+        return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
+
+    order = sorted(range(len(conditions)), key=gives)
+    for size in range(1, min(len(conditions), MOST_LACKING) + 1):
+        for without in combinations(order, size):
+            rest = [c for i, c in enumerate(conditions) if i not in without]
+            for facts in views:
+                found = rules.satisfied(rest, terms, kinds, facts)
+                if found is not None:
+                    return found, tuple(substituted(conditions[i], found) for i in sorted(without))
+    alone = [c for c in conditions if all(rules.satisfied([c], terms, kinds, facts) is None for facts in views)]
+    return terms, tuple(substituted(condition, terms) for condition in alone)
 
 
 def _seen(problem: Problem, level: int) -> dict[Symbol, str]:

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, groupby
+from itertools import groupby
+from operator import contains, itemgetter
 from typing import TypeAlias
 
 from planner.plan import Plan, Step
@@ -28,23 +29,18 @@ from reasoner.symbols import (
     State,
     Symbol,
     ValueCondition,
-    ValueEffect,
     Witness,
-    substituted,
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Bindings: TypeAlias = "dict[str, str]"
 Cell: TypeAlias = "tuple[str, Arguments]"
 """A symbol as its situation type and arguments."""
-Test: TypeAlias = "Callable[[Facts, Bindings], bool]"
-Choice: TypeAlias = "tuple[str, frozenset[str], Callable[[Facts, Bindings], Iterable[str]]]"
-"""A variable, the individuals of its class, and those of which one can be it."""
-Part: TypeAlias = "Test | Choice"
+Values: TypeAlias = "list[str]"
+"""What the terms of some conditions stand for, by their places."""
+Test: TypeAlias = "Callable[[Facts, Values], bool]"
+Candidates: TypeAlias = "Callable[[Facts, Values], Iterable[str]]"
 Change: TypeAlias = "tuple[str, Arguments, str]"
-
-MOST_LACKING = 4
-"""Conditions that are left out together where it is asked which of them a behaviour lacks."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +93,7 @@ class _Check:
         self.faults.append(Fault(path, text))
 
     def carried_out(
-        self, steps: Sequence[Step], above: int, path: tuple[int, ...], name: str, inside: bool = False
+        self, steps: Sequence[Step], above: int, path: tuple[int, ...], what: object, inside: bool = False
     ) -> bool:
         """Carry out steps that together refine one of level `above`, or the task (level 0); whether all could be done.
 
@@ -106,25 +102,35 @@ class _Check:
         Among the steps of the next level may be stretches of lower ones, each of which stands in the place of such a step.
         """
         level = next((level for level in self.levels if level > above), above)
-        touched: dict[Cell, None] = {}
+        marks = []
         for part in stretches(steps, level):
-            mark = len(self.facts.log)
+            marks.append(len(self.facts.log))
             if part[0].level > level:
-                done = self.carried_out(part, level, part[0].path, f"the stretch from {part[0]} to {part[-1]}", inside)
+                stretch = f"the stretch from {part[0]} to {part[-1]}"
+                done = self.carried_out(part, level, part[0].path, stretch, inside)
             else:
                 done = self.step(part[0])
             if not done:
                 return False
-            touched.update(dict.fromkeys(self.facts.since(mark)))
-        for situation, arguments in touched:
-            rest = self.rests.get(situation)
-            if rest is None or self.facts.value(situation, arguments) == rest:
-                continue
-            symbol = Symbol(situation, arguments)
+        for symbol, got, rest in self.restless(marks):
             if above < self.problem.first_level(symbol) <= level and (inside or symbol not in self.problem.goal):
-                got = self.facts.value(situation, arguments)
-                self.fault(path, f"{name} touches {symbol} and leaves it {got}; at rest it is {rest}")
+                self.fault(path, f"{what} touches {symbol} and leaves it {got}; at rest it is {rest}")
         return True
+
+    def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
+        """Yield what isn't at rest and changed between some marks of the log or since, with its value and that at rest."""
+        first, now = marks[0] if marks else len(self.facts.log), self.facts.value
+        changed = {
+            (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
+        }
+        course: dict[Cell, list[tuple[int, str]]] = {cell: [] for cell in changed if now(*cell) != self.rests[cell[0]]}
+        for i, (situation, arguments, old) in enumerate(self.facts.log[first:], first) if course else ():
+            if (situation, arguments) in course:
+                course[situation, arguments].append((i, old))
+        for cell, olds in sorted(course.items()):
+            got = now(*cell) or FALSE
+            if any(next((old for i, old in olds if i >= mark), got) != got for mark in marks):
+                yield Symbol(*cell), got, self.rests[cell[0]]
 
     def step(self, step: Step) -> bool:
         """Carry out one step with its refinement; whether all of it could be done."""
@@ -147,10 +153,10 @@ class _Check:
                 self.fault(step.path, f"{step}: it isn't refined, and other steps are")
             return True
         wanted = {(situation, arguments): value for situation, arguments, value in changes}
-        if not self.carried_out(step.steps, behavior.level, step.path, str(step), inside=True):
+        if not self.carried_out(step.steps, behavior.level, step.path, step, inside=True):
             return False
         said = {**self.facts.since(mark), **wanted}  # what isn't named stays as it was before
-        for cell in sorted(cell for cell, value in said.items() if self.facts.value(*cell) != value):
+        for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
             if cell in wanted or self.problem.sees(behavior.level, symbol, said[cell]):
                 self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
@@ -229,128 +235,51 @@ class Rules:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self._read: dict[str, tuple[list[Part], list[tuple[list[Part], ValueEffect]]]] = {}
+        self._read: dict[str, _Behavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
+
+    def read(self, behavior: Behavior) -> _Behavior:
+        """Return how a behaviour is read."""
+        if behavior.name not in self._read:
+            self._read[behavior.name] = _Behavior(self, behavior)
+        return self._read[behavior.name]
 
     def fits(self, behavior: Behavior, arguments: Arguments) -> bool:
         """Whether the arguments are of the classes of the behaviour's parameters."""
-        if len(arguments) != len(behavior.parameters):
-            return False
-        for parameter, argument in zip(behavior.parameters, arguments, strict=True):
-            if argument not in self.problem.members(parameter.kind):
-                return False
-        return True
+        members = self.read(behavior).members
+        return len(arguments) == len(members) and all(map(contains, members, arguments))
 
     def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[Change] | None:
         """Return the values that a behaviour gives to arguments that fit, in order; None if it isn't applicable."""
-        if behavior.name not in self._read:
-            self._read[behavior.name] = self._behavior(behavior)
-        preconditions, effects = self._read[behavior.name]
-        terms = {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
-        satisfied = _first(preconditions, facts, terms)
-        if satisfied is None:
+        read = self.read(behavior)
+        values = [*arguments, *read.terms[len(arguments) :]]
+        if not _hold(read.preconditions, facts, values):
             return None
         found = []
-        for when, effect in effects:
-            inner = _first(when, facts, satisfied) if when else satisfied
-            if inner is not None:
-                key = tuple([inner.get(a, a) for a in effect.arguments])
-                if facts.exists(effect.situation, key):
-                    found.append((effect.situation, key, inner.get(effect.value, effect.value)))
+        for when, situation, key, value in read.effects:
+            inner = values
+            if when:
+                inner = values.copy()
+                if not _hold(when, facts, inner):
+                    continue
+            about = key(inner)
+            if facts.exists(situation, about):
+                found.append((situation, about, inner[value]))
         return found
 
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
         """Return a way to put individuals in for the other variables of conditions with which all hold, or None."""
-        return _first(self.conjunction(conditions, set(terms), kinds), facts, terms)
+        reading, bound = _Reading(self, terms), set(terms)
+        tests = reading.conjunction(conditions, bound, kinds)
+        values = [terms.get(term, term) for term in reading.places]
+        if not _hold(tests, facts, values):
+            return None
+        return {term: value for term, value in zip(reading.places, values, strict=True) if term in bound}
 
-    def lacking(
-        self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], views: Sequence[Facts]
-    ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return the fewest conditions without which the others hold in one of some states, with individuals put in.
-
-        Also returns with which individuals the others hold. More than `MOST_LACKING` are looked for one by one.
-        """
-
-        def gives(number: int) -> bool:
-            """Whether a condition gives a variable its value: without it the others hold of what isn't there."""
-            c = conditions[number]
-            return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
-
-        order = sorted(range(len(conditions)), key=gives)
-        for size in range(1, min(len(conditions), MOST_LACKING) + 1):
-            for without in combinations(order, size):
-                rest = [c for i, c in enumerate(conditions) if i not in without]
-                for facts in views:
-                    found = self.satisfied(rest, terms, kinds, facts)
-                    if found is not None:
-                        return found, tuple(substituted(conditions[i], found) for i in sorted(without))
-        alone = [c for c in conditions if all(self.satisfied([c], terms, kinds, facts) is None for facts in views)]
-        return terms, tuple(substituted(condition, terms) for condition in alone)
-
-    def _behavior(self, behavior: Behavior) -> tuple[list[Part], list[tuple[list[Part], ValueEffect]]]:
-        kinds = {p.name: p.kind for p in (*behavior.parameters, *behavior.variables)}
-        bound = {p.name for p in behavior.parameters}
-        preconditions = self.conjunction(behavior.preconditions, bound, kinds)
-        # What becomes true wins, as in PDDL.
-        effects = sorted(behavior.effects, key=lambda effect: effect.value != FALSE)
-        return preconditions, [(self.conjunction(e.when, set(bound), kinds), e) for e in effects]
-
-    def conjunction(self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str]) -> list[Part]:
-        """Return conditions as tests and choices; `bound` grows by what is chosen.
-
-        What only nested conditions (`AnyOf`, `Witness`) mention is their own.
-        """
-        waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
-        parts: list[Part] = []
-        while waiting:
-            condition = min(waiting, key=lambda c: (len(_plain(c) - bound), _breadth(c, bound)))
-            unknown = sorted(_plain(condition) - bound)
-            if not unknown:
-                waiting.remove(condition)
-                parts.append(self.test(condition, bound, kinds))
-                continue
-            bound.add(unknown[0])
-            parts.append(self.choice(condition, unknown, kinds))
-        nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
-        return parts + [self.test(condition, bound, kinds) for condition in nested]
-
-    def choice(self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str]) -> Choice:
-        """Return a choice of the first unknown variable of a condition: the individuals that could satisfy it."""
-        variable, kind = unknown[0], kinds[unknown[0]]
-        members = self.problem.members(kind)
-        match condition:
-            case ValueCondition(situation, arguments, value, False) if value == variable and variable not in arguments:
-                if len(unknown) == 1:
-
-                    def had(facts: Facts, terms: Bindings) -> Iterable[str]:
-                        found = facts.value(situation, tuple([terms.get(a, a) for a in arguments]))
-                        return () if found is None else (found,)
-
-                    return variable, members, had
-            case ValueCondition(situation, arguments, value, False) if value not in unknown:
-                position = arguments.index(variable)
-
-                def having(facts: Facts, terms: Bindings) -> Iterable[str]:
-                    wanted = terms.get(value, value)
-                    if wanted == FALSE:  # which is seldom stated
-                        return self.problem.classes.get(kind, ())
-                    return (found[position] for found in facts.holders(situation, wanted))
-
-                return variable, members, having
-            case RelationCondition(relation, arguments, False) if len(unknown) < len(set(arguments)):
-                position = arguments.index(variable)
-                known = next(i for i, a in enumerate(arguments) if a not in unknown)
-
-                def related(facts: Facts, terms: Bindings) -> Iterable[str]:
-                    rows = self._related(relation, known).get(terms.get(arguments[known], arguments[known]), ())
-                    return dict.fromkeys([row[position] for row in rows])
-
-                return variable, members, related
-        return variable, members, lambda facts, terms: self.problem.classes.get(kind, ())
-
-    def _related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
+    def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
+        """Return the tuples of a relation, by what stands at a position."""
         if (relation, position) not in self._rows:
             found: dict[str, list[Arguments]] = {}
             for row in sorted(self.problem.relations.get(relation, ())):
@@ -358,59 +287,164 @@ class Rules:
             self._rows[relation, position] = found
         return self._rows[relation, position]
 
+
+class _Behavior:
+    """A behaviour as it is read: its terms by their places, its preconditions, and its effects with what each asks."""
+
+    def __init__(self, rules: Rules, behavior: Behavior) -> None:
+        reading, bound = _Reading(rules, [p.name for p in behavior.parameters]), {p.name for p in behavior.parameters}
+        kinds = {p.name: p.kind for p in (*behavior.parameters, *behavior.variables)}
+        self.preconditions = reading.conjunction(behavior.preconditions, bound, kinds)
+        self.effects = [
+            (
+                reading.conjunction(e.when, set(bound), kinds),
+                e.situation,
+                reading.key(e.arguments),
+                reading.place(e.value),
+            )
+            # What becomes true wins, as in PDDL.
+            for e in sorted(behavior.effects, key=lambda effect: effect.value != FALSE)
+        ]
+        self.terms = tuple(reading.places)
+        self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
+
+
+class _Reading:
+    """Conditions that share their terms, each of which has a place: there stands what it is, at first the term itself."""
+
+    def __init__(self, rules: Rules, terms: Iterable[str]) -> None:
+        self.rules, self.problem = rules, rules.problem
+        self.places = {term: i for i, term in enumerate(terms)}
+
+    def place(self, term: str) -> int:
+        """Return the place of a term."""
+        return self.places.setdefault(term, len(self.places))
+
+    def key(self, terms: Sequence[str]) -> Callable[[Values], Arguments]:
+        """Return a function to what some terms stand for."""
+        places = [self.place(term) for term in terms]
+        if len(places) > 1:
+            return itemgetter(*places)
+        if not places:
+            return lambda values: ()
+        (only,) = places
+        return lambda values: (values[only],)
+
+    def conjunction(self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str]) -> list[Test]:
+        """Return conditions as tests, the last of which may choose and test the rest; `bound` grows by what is chosen.
+
+        What only nested conditions (`AnyOf`, `Witness`) mention is their own.
+        """
+        waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
+        nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
+        tests: list[Test] = []
+        while waiting:
+            condition = min(waiting, key=lambda c: (len(_plain(c) - bound), _breadth(c, bound)))
+            unknown = sorted(_plain(condition) - bound)
+            bound.update(unknown[:1])
+            if not unknown:
+                waiting.remove(condition)
+                tests.append(self.test(condition, bound, kinds))
+            elif isinstance(condition, ValueCondition) and _breadth(condition, bound - {unknown[0]}) == 0:
+                waiting.remove(condition)
+                tests.append(self.given(condition, kinds[condition.value]))
+            else:
+                rest = self.conjunction([*waiting, *nested], bound, kinds)
+                return [*tests, self.choice(condition, unknown, kinds, rest)]
+        return tests + [self.test(condition, bound, kinds) for condition in nested]
+
+    def given(self, condition: ValueCondition, kind: str) -> Test:
+        """Return the choice of a value where the state leaves none."""
+        key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
+
+        def given(facts: Facts, values: Values) -> bool:
+            found = facts.value(condition.situation, key(values))
+            if found is None or found not in members:
+                return False
+            values[place] = found
+            return True
+
+        return given
+
+    def choice(
+        self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str], rest: Sequence[Test]
+    ) -> Test:
+        """Return whether the rest holds with one of those for the first unknown variable that could satisfy a condition."""
+        place, members = self.place(unknown[0]), self.problem.members(kinds[unknown[0]])
+        candidates = self.candidates(condition, unknown, kinds)
+
+        def some(facts: Facts, values: Values) -> bool:
+            for candidate in candidates(facts, values):
+                if candidate in members:
+                    values[place] = candidate
+                    if _hold(rest, facts, values):
+                        return True
+            return False
+
+        return some
+
+    def candidates(self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str]) -> Candidates:
+        """Return those that the first unknown variable of a condition could be."""
+        variable, kind = unknown[0], kinds[unknown[0]]
+        match condition:
+            case ValueCondition(situation, arguments, value, False) if value not in unknown:
+                position, at = arguments.index(variable), self.place(value)
+
+                def having(facts: Facts, values: Values) -> Iterable[str]:
+                    if values[at] == FALSE:  # which is seldom stated
+                        return self.problem.classes.get(kind, ())
+                    return (found[position] for found in facts.holders(situation, values[at]))
+
+                return having
+            case RelationCondition(relation, arguments, False) if len(unknown) < len(set(arguments)):
+                position = arguments.index(variable)
+                known = next(i for i, a in enumerate(arguments) if a not in unknown)
+                at = self.place(arguments[known])
+
+                def related(facts: Facts, values: Values) -> Iterable[str]:
+                    rows = self.rules.related(relation, known).get(values[at], ())
+                    return dict.fromkeys([row[position] for row in rows])
+
+                return related
+        return lambda facts, values: self.problem.classes.get(kind, ())
+
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
-        """Return a condition as a test."""
+        """Return a condition as a test; what is chosen inside of it is forgotten."""
         match condition:
             case ValueCondition(situation, arguments, value, negated):
-
-                def equal(facts: Facts, b: Bindings) -> bool:
-                    got = facts.value(situation, tuple([b.get(a, a) for a in arguments]))
-                    return (got == b.get(value, value)) is not negated
-
-                return equal
+                key, at = self.key(arguments), self.place(value)
+                return lambda facts, values: (facts.value(situation, key(values)) == values[at]) is not negated
             case RelationCondition(relation, arguments, negated):
-                rows = self.problem.relations.get(relation, frozenset())
-                return lambda facts, b: (tuple([b.get(a, a) for a in arguments]) in rows) is not negated
+                rows, key = self.problem.relations.get(relation, frozenset()), self.key(arguments)
+                return lambda facts, values: (key(values) in rows) is not negated
             case ClassCondition(term, kind, negated):
-                members = self.problem.members(kind)
-                return lambda facts, b: (b.get(term, term) in members) is not negated
+                members, at = self.problem.members(kind), self.place(term)
+                return lambda facts, values: (values[at] in members) is not negated
             case EqualityCondition(left, right, negated):
-                return lambda facts, b: (b.get(left, left) == b.get(right, right)) is not negated
+                one, other = self.place(left), self.place(right)
+                return lambda facts, values: (values[one] == values[other]) is not negated
             case Witness(variable, kind, conditions, negated):
                 wanted = (*conditions, ClassCondition(variable, kind))
                 inner = self.conjunction(wanted, bound - {variable}, {**kinds, variable: kind})
-                return lambda facts, b: (_first(inner, facts, _without(b, variable)) is not None) is not negated
+                return lambda facts, values: _hold(inner, facts, values.copy()) is not negated
             case AnyOf(alternatives, negated):
                 groups = [self.conjunction(group, set(bound), kinds) for group in alternatives]
-                return lambda facts, b: any(_first(group, facts, b) is not None for group in groups) is not negated
+                return lambda facts, values: any(_hold(g, facts, values.copy()) for g in groups) is not negated
 
 
-def _first(parts: Sequence[Part], facts: Facts, terms: Bindings, start: int = 0) -> Bindings | None:
-    """Return the first way to make all choices with which all tests hold."""
-    for i in range(start, len(parts)):
-        part = parts[i]
-        if isinstance(part, tuple):
-            variable, members, candidates = part
-            for candidate in candidates(facts, terms):
-                if candidate in members:
-                    found = _first(parts, facts, {**terms, variable: candidate}, i + 1)
-                    if found is not None:
-                        return found
-            return None
-        if not part(facts, terms):
-            return None
-    return terms
-
-
-def _without(terms: Bindings, variable: str) -> Bindings:
-    return {name: value for name, value in terms.items() if name != variable} if variable in terms else terms
+def _hold(tests: Sequence[Test], facts: Facts, values: Values) -> bool:
+    """Whether tests hold; the first choices with which they do are put into `values`."""
+    for test in tests:  # noqa: SIM110 - a generator takes twice as long
+        if not test(facts, values):
+            return False
+    return True
 
 
 def _breadth(condition: Condition, bound: set[str]) -> int:
     """Rank conditions with unknown variables: 0 where the state leaves one individual, 1 where few could do, 2 for others."""
-    if isinstance(condition, ValueCondition | RelationCondition) and not condition.negated:
-        return not (isinstance(condition, ValueCondition) and _plain(condition) - bound == {condition.value})
-    return 2
+    if isinstance(condition, ValueCondition) and not condition.negated:
+        return not (_plain(condition) - bound == {condition.value} and condition.value not in condition.arguments)
+    return 1 if isinstance(condition, RelationCondition) and not condition.negated else 2
 
 
 def _plain(condition: Condition) -> set[str]:

@@ -15,9 +15,7 @@ flat search             the rest, both ways, until a limit comes        `planner
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
@@ -27,7 +25,7 @@ from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
 from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.levels import levels_left
-from planner.plan import Limits, Outcome, Plan, Reason, Status
+from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection
 from reasoner.symbols import FALSE, Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
@@ -71,18 +69,6 @@ def plan(
     """
     with paused_collection():
         return _plan(problem, limits, improve, using, watch, leave_levels)
-
-
-@contextmanager
-def paused_collection() -> Iterator[None]:
-    """Pause the garbage collector: what planning makes has no cycles, and going through it all took a third of the time."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def _plan(
