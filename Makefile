@@ -5,6 +5,7 @@
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
 #   make vocabulary  docs/vocabulary.md from the ontology files
+#   make notebooks  execute the book of notebooks anew, and keep what they show
 #   make fuzz     100,000 broken inputs at every door, going on where the last run ended
 #   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
 #   make clean    remove .venv, caches and results
@@ -19,7 +20,7 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test check bench figures vocabulary fuzz lock clean
+.PHONY: help demo test check bench figures vocabulary notebooks fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -41,6 +42,9 @@ vocabulary: $(VENV)/installed
 
 fuzz: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.fuzz
+
+notebooks: $(VENV)/installed
+	@$(BIN)/python -m benchmarks.notebooks
 
 bench: $(VENV)/installed-bench
 	@$(BIN)/python -m benchmarks.figures all

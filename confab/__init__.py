@@ -7,7 +7,9 @@
 `scene.plan(…)`   plan in it: a `Result`
 `scene.verify(…)` carry a plan out in physics: a `Report`
 `scene.execute(…)`  act in a closed loop, and be interrupted: an `Execution`
-`Memory`          what was learned from all this
+`Memory`          what was learned from all this; `practise(…)` learns, and shows what it is worth
+`new_domain(name)`  begin a domain of your own; `validate(file)` says what is wrong with it
+`generate(…)`     a scene for trials, as large as wanted
 `KnowledgeError`  what was given can't be used; the message says what, where, and what to do
 ================  =========================================================================================
 
@@ -24,6 +26,8 @@ import sys as _sys
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 if _TYPE_CHECKING:
+    from confab.authoring import generate, new_domain, validate
+    from confab.curve import Curve, practise
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
@@ -32,9 +36,25 @@ if _TYPE_CHECKING:
     from reasoner.graph.knowledge import KnowledgeError
 
 __version__ = "0.1.0"
-__all__ = ["Execution", "KnowledgeError", "Memory", "Report", "Result", "Scene", "Table", "load", "scenes"]
+__all__ = [
+    "Curve",
+    "Execution",
+    "KnowledgeError",
+    "Memory",
+    "Report",
+    "Result",
+    "Scene",
+    "Table",
+    "generate",
+    "load",
+    "new_domain",
+    "practise",
+    "scenes",
+    "validate",
+]
 
 _HOMES = {
+    "Curve": "confab.curve",
     "Execution": "confab.execution",
     "KnowledgeError": "reasoner.graph.knowledge",
     "Memory": "confab.memory",
@@ -42,8 +62,12 @@ _HOMES = {
     "Result": "confab.scene",
     "Scene": "confab.scene",
     "Table": "confab.table",
+    "generate": "confab.authoring",
     "load": "confab.scene",
+    "new_domain": "confab.authoring",
+    "practise": "confab.curve",
     "scenes": "confab.scene",
+    "validate": "confab.authoring",
 }
 
 

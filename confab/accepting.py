@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from numbers import Real
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+import ontology
 from confab.interchange import read_plan
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import nearest
 from reasoner.symbols import Problem
 
 
@@ -51,5 +54,56 @@ def several(given: Facts) -> list[str]:
 
     >>> several("cup2 LOCATION location8"), several(("a", "b"))
     (['cup2 LOCATION location8'], ['a', 'b'])
+
+    Raises
+    ------
+    KnowledgeError
+        It is no text, or holds what is none.
     """
-    return [given] if isinstance(given, str) else list(given)
+    texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    for text in texts:
+        if not isinstance(text, str):
+            raise KnowledgeError(f"wanted a text like 'cup2 LOCATION location8', or several; got {text!r}")
+    return texts
+
+
+def number(name: str, given: object, wanted: str = "a number") -> None:
+    """Raise `KnowledgeError` if what was given for a parameter is no number; None is none given.
+
+    >>> number("time_limit", 2.5)
+    >>> number("time_limit", "5", "seconds as a number")
+    Traceback (most recent call last):
+    reasoner.graph.knowledge.KnowledgeError: time_limit='5' is no number; wanted seconds as a number
+    """
+    if given is not None and (isinstance(given, bool) or not isinstance(given, Real) or given != given):
+        raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")
+
+
+def sparql_of(given: str) -> str:
+    """Return a query, or what the file of that name, or the shipped query of that name, holds.
+
+    >>> sparql_of("where-is-everything").splitlines()[-1]
+    'SELECT ?object ?place WHERE { ?object k:location ?place } ORDER BY ?object'
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such file, or no such query.
+    """
+    if not isinstance(given, str):
+        raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a ready query; got {given!r}")
+    if any(sign in given for sign in "{}?\n"):
+        return given
+    path = Path(given)
+    if path.is_dir():
+        raise KnowledgeError(f"{given}: is a folder; wanted SPARQL text or a .rq file")
+    if path.is_file():
+        return path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix or "/" in given:
+        raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
+    ready = {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
+    if given in ready:
+        return ready[given].read_text(encoding="utf-8")
+    if given.replace("-", "").isalpha() and " " not in given:
+        raise KnowledgeError(f"no ready query '{given}'{nearest(given, ready)} (ready: {', '.join(ready)})")
+    return given

@@ -13,6 +13,7 @@ import pyoxigraph as ox
 
 import ontology
 from confab.memory import Memory
+from confab.table import Table
 from planner.paper.transitions import ground
 from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
@@ -35,11 +36,17 @@ WORDS = [CORE + name for name in ("facts", "asks", "answer")]
 ROLES = [CORE + name for name in ARGUMENTS]
 
 
-def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
+def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False) -> list[Path]:
     """Write a commented skeleton that validates: a domain, a scene, a catalog. Return the files.
 
-    With `bodies`, also a table, shapes and skills, so that physics can carry the scene's plan out. The catalog has the places of
-    the shipped ontologies, too, so that Protégé finds them.
+    The folder is called like the domain if none is given. With `bodies`, also a table, shapes and skills, so that physics can
+    carry the scene's plan out. The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     files = new_domain("plates", folder)
+    ...     [file.name for file in files], len(validate(folder + "/plates-scene.ttl"))
+    (['plates-scene.ttl', 'plates.ttl', 'catalog-v001.xml'], 0)
 
     Raises
     ------
@@ -49,6 +56,7 @@ def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
     if not re.fullmatch(r"[A-Za-z][\w-]*", name):
         raise KnowledgeError(f"'{name}' can't be a domain's name: wanted a letter, then letters, digits, _ or -")
     templates = sorted((ontology.ROOT / "skeleton" / ("bodies" if bodies else "")).glob("*.ttl"))
+    folder = Path(name if folder is None else folder)
     texts = {
         template.name.replace(PLACEHOLDER, name): template.read_text(encoding="utf-8").replace(PLACEHOLDER, name)
         for template in templates
@@ -64,6 +72,57 @@ def new_domain(name: str, folder: Path, bodies: bool = False) -> list[Path]:
     for file, text in files.items():
         write_whole(file, text)
     return list(files)
+
+
+def validate(*files: str | Path, deep: bool = False) -> Table:
+    """Return what is wrong with ontology files and what they import: a row for each finding, with what to do about it.
+
+    `deep` asks HermiT as well, which needs Java.
+
+    >>> len(validate("beverage-serving"))
+    0
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such file, or no Java for what is deep.
+    """
+    from reasoner.validation.validate import validate as check
+
+    columns = ("severity", "place", "rule", "what", "why", "do")
+    rows = (
+        (f.severity, f"{Path(f.file).name}:{f.line}" if f.line else Path(f.file).name, f.rule, f.what, f.why, f.remedy)
+        for f in check(files, deep=deep)
+    )
+    return Table(columns, tuple(rows))
+
+
+def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> Scene:
+    """Write a scene for trials as an ordinary ontology file, and return it, loaded (docs/quantification.md has the families).
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     generate("served", folder + "/table.ttl", objects=10).plan().plan.length[1]
+    11
+
+    Raises
+    ------
+    KnowledgeError
+        No such family, no table of it for these numbers, or the path doesn't end in ``.ttl``.
+    """
+    from confab.scene import load
+    from reasoner.generate import write_scene
+
+    write_scene(turtle_path(path), family, objects, hands, clutter, seed)
+    return load(path)
+
+
+def turtle_path(given: str | Path) -> Path:
+    """Return the path of a scene to write, if a scene can be read from there again."""
+    path = Path(given)
+    if path.suffix.lower() != ".ttl":
+        raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
+    return path
 
 
 # ------------------------------------------------------------------------------------------------ what did my edit change?

@@ -494,10 +494,10 @@ def query(
     if out is not None and out.suffix.lower() == ".ttl":
         if sparql is None:
             raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
-        print(f"{out}: {loaded.construct(_sparql(sparql), out, limits)} triples")
+        print(f"{out}: {loaded.construct(sparql, out, limits)} triples")
         return
     with progress("asking"):
-        table = loaded.affordances(affords) if sparql is None else loaded.query(_sparql(sparql), limits)
+        table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
     form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
     if form is None or form not in FORMS.values():
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
@@ -593,9 +593,9 @@ def learn(
 @click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
 def new(domain: str, folder: Path | None, bodies: bool) -> None:
     """Begin a domain of your own with a commented skeleton."""
-    from confab.authoring import new_domain
+    from confab import authoring
 
-    files = new_domain(domain, folder or Path(domain), bodies)
+    files = authoring.new_domain(domain, folder, bodies)
     scene = next(file for file in files if file.stem.endswith("-scene"))
     then = "run" if bodies else "plan"
     show_result(
@@ -833,9 +833,10 @@ def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
 @SEED
 def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
     """Write a scene for trials as an ordinary ontology file."""
+    from confab.authoring import turtle_path
     from reasoner.generate import write_scene
 
-    write_scene(_turtle(out), family, objects, hands, clutter, seed)
+    write_scene(turtle_path(out), family, objects, hands, clutter, seed)
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
@@ -848,9 +849,10 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
 )
 def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
     """Turn a PDDL problem into a scene."""
+    from confab.authoring import turtle_path
     from confab.pddl_commands import import_pddl
 
-    imported = import_pddl(domain, problem, _turtle(out), level)
+    imported = import_pddl(domain, problem, turtle_path(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
     print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
@@ -941,39 +943,10 @@ def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -
     print(f"{out}: {len(table)} rows")
 
 
-def _sparql(given: str) -> str:
-    """Return a query, or what the file of that name, or the shipped query of that name, holds."""
-    import ontology
-    from reasoner.names import nearest
-
-    if any(sign in given for sign in "{}?\n"):
-        return given
-    path = Path(given)
-    if path.is_dir():
-        raise KnowledgeError(f"{given}: is a folder; wanted SPARQL text or a .rq file")
-    if path.is_file():
-        return path.read_text(encoding="utf-8", errors="replace")
-    if path.suffix or "/" in given:
-        raise KnowledgeError(f"{given}: no such file; wanted SPARQL text or a .rq file")
-    ready = {file.stem: file for file in sorted((ontology.ROOT / "questions").rglob("*.rq"))}
-    if given in ready:
-        return ready[given].read_text(encoding="utf-8")
-    if given.replace("-", "").isalpha() and " " not in given:
-        raise KnowledgeError(f"no ready query '{given}'{nearest(given, ready)} (ready: {', '.join(ready)})")
-    return given
-
-
 def _json(path: Path) -> Path:
     """Return the path of a plan or of verdicts to write, if it says that it is JSON."""
     if path.suffix.lower() != ".json":
         raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
-    return path
-
-
-def _turtle(path: Path) -> Path:
-    """Return the path of a scene to write, if a scene can be read from there again."""
-    if path.suffix.lower() != ".ttl":
-        raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
     return path
 
 

@@ -91,16 +91,19 @@ class View:
 
 
 @contextmanager
-def spectator() -> Iterator[Tell | None]:
-    """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither."""
-    if _in_notebook():
+def spectator(watch: bool = True, other: Tell | None = None) -> Iterator[Tell | None]:
+    """Show an episode while it happens: in a terminal, in a notebook, or nowhere if the output goes to neither.
+
+    `other` is told, too.
+    """
+    if watch and _in_notebook():
         with in_notebook() as tell:
-            yield tell
-    elif sys.stderr.isatty():
+            yield both(other, tell)
+    elif watch and sys.stderr.isatty():
         with in_terminal() as tell:
-            yield tell
+            yield both(other, tell)
     else:
-        yield None
+        yield other
 
 
 def both(one: Tell | None, other: Tell) -> Tell:

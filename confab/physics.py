@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from confab.accepting import number
 from confab.labels import Labels, labels_of
 from confab.progress import progress
+from confab.table import Table
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Fact, State
@@ -89,6 +91,18 @@ class Report:
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return what the first rollout that failed, else the first, says of each step, by the step's path."""
         return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in self.shown.steps}
+
+    def table(self) -> Table:
+        """Return a row for each primitive of the first rollout that failed, else of the first: how it went, what was measured."""
+        rows = (
+            (
+                str(report.step),
+                "yes" if report.verdict.ok else f"no: {report.verdict}",
+                ", ".join(f"{name} {value:.3g}" for name, value in report.verdict.measured.items()),
+            )
+            for report in self.shown.steps
+        )
+        return Table(("primitive", "done", "measured"), tuple(rows))
 
     def summary(self) -> str:
         """Return one line that says how it went."""
@@ -176,6 +190,8 @@ def verify(
     KnowledgeError
         The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers or no screen.
     """
+    number("rollouts", rollouts, "how often, e.g. 3")
+    number("seed", seed, "an integer")
     if rollouts < 1:
         raise KnowledgeError(f"{rollouts} rollouts judge nothing; wanted 1 or more")
     video = None if video is None else Path(video)

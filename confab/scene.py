@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any, overload
 import pyoxigraph as ox
 
 import ontology
-from confab.accepting import AnyPlan, Facts, plan_of, several
+from confab.accepting import AnyPlan, Facts, number, plan_of, several, sparql_of
 from confab.interchange import outcome_json
 from confab.table import Table
-from planner.plan import Limits, Outcome, Plan, Status, paused_collection
+from planner.plan import Limits, Outcome, Plan, Status, paused_collection, renumbered
 from planner.solve import MODES, Request, solve
+from planner.validation import validate
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.graph.knowledge import load as load_graph
@@ -270,6 +271,8 @@ class Scene:
     def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
         """Return what a SPARQL 1.1 query answers, as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
 
+        The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
+
         Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
         no such name. It is answered in a process of its own: see `reasoner.graph.apart`.
 
@@ -288,6 +291,7 @@ class Scene:
         """
         from reasoner.graph.apart import ask, unheard_of
 
+        sparql = sparql_of(sparql)
         kind, columns, found = ask(self._asked(sparql), sparql, limits)
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
@@ -338,6 +342,7 @@ class Scene:
         KnowledgeError, LimitError
             As `query`; the query gives no triples but rows.
         """
+        sparql = sparql_of(sparql)
         if path is not None:
             from reasoner.graph.construct import write_construct
 
@@ -455,6 +460,8 @@ class Scene:
                 else "compares plans of the lowest level, so it may leave the others"
             )
             raise KnowledgeError(f"the optimal search {what}; leave one option out")
+        if not isinstance(time_limit, Deadline):
+            number("time_limit", time_limit, "seconds as a number, e.g. 5")
         self._settle()
         if mode not in MODES:
             raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
@@ -565,14 +572,21 @@ class Scene:
         mode: str = DEFAULT_MODE,
         seed: int = 0,
         tell: Callable[[Moment], None] | None = None,
+        watch: bool = False,
         **options: Any,
     ) -> Execution:
         """Carry the task out in a closed loop: see `confab.execution.execute`.
 
         `plan` is what to begin with: a plan, a result, or the name of a file that ``confab plan --json`` wrote. Plans from
-        scratch are made with `memory`; `Memory.live` learns from what came of it.
+        scratch are made with `memory`; `Memory.live` learns from what came of it. `watch` shows what happens while it
+        happens, in a notebook or a terminal; `tell` is a display of one's own.
+
+        >>> run = load("beverage-serving").execute(interventions="after=28 cup2 LOCATION location8")
+        >>> run.reached, [change.kind for change in run.episode.replans]
+        (True, ['repair'])
         """
         from confab.execution import execute, planner_of
+        from confab.live import spectator
 
         self._settle()
         problem = plan.problem if isinstance(plan, Result) else with_goals(self.reading, several(goals))
@@ -583,7 +597,40 @@ class Scene:
             from planner.experience.portfolio import planner_with
 
             planner = planner_with(memory.advisor, mode)
-        return execute(self, problem, begun, several(interventions), world, planner, seed, tell, **options)
+        number("seed", seed, "an integer")
+        texts = several(interventions)
+        with spectator(watch, tell) as heard:
+            return execute(self, problem, begun, texts, world, planner, seed, heard, **options)
+
+    @contextmanager
+    def serve(self, port: int = 0, limits: QueryLimits | None = None) -> Iterator[str]:
+        """Serve this scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block, whose URL is given.
+
+        >>> with load("beverage-serving").serve() as url:
+        ...     load(url).plan().plan.length
+        {1: 4, 2: 10, 3: 32}
+
+        Raises
+        ------
+        KnowledgeError
+            The port is taken, or the scene is at an endpoint already.
+        """
+        from confab.serving import serving
+
+        with serving(self, port, limits) as server:
+            yield f"{server.url}sparql"
+
+    def export(self, folder: str | Path, level: int | None = None) -> tuple[Path, Path]:
+        """Write one level, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder, and return where.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no such level, or the folder can't be written.
+        """
+        from confab.pddl_commands import export_pddl
+
+        return export_pddl(self.problem, level, Path(folder))
 
     def explain(self, goals: Facts = (), **options: Any) -> Account:
         """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes."""
@@ -620,6 +667,29 @@ class Result:
             reason = self.outcome.reason.text if self.outcome.reason else ""
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
         return self.outcome.plan
+
+    def in_order(self, *ids: int) -> Plan:
+        """Return the plan with its steps of the first level in another order, as somebody may have shown it.
+
+        >>> [step.id for step in load("beverage-serving").plan().in_order(22, 34, 28, 39).steps]
+        [22, 34, 28, 39]
+
+        Raises
+        ------
+        KnowledgeError
+            These aren't the IDs of the steps of the first level, each once; or the plan can't be done in that order.
+        """
+        waiting = list(self.plan.steps)
+        there = [step.id for step in waiting]
+        if sorted(there) != sorted(ids):
+            raise KnowledgeError(
+                f"wanted {', '.join(map(str, there))} in another order; got {', '.join(map(str, ids)) or 'nothing'}"
+            )
+        steps = [waiting.pop(next(i for i, step in enumerate(waiting) if step.id == wanted)) for wanted in ids]
+        plan = Plan(renumbered(steps))
+        if faults := validate(self.problem, plan):
+            raise KnowledgeError(f"the plan can't be done in that order: {faults[0].text}")
+        return plan
 
     def verify(self, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
         """Carry out the plan in PyBullet: see `confab.physics.verify`."""
@@ -678,6 +748,7 @@ class Result:
         """
         from confab.why import find_step, why_not
 
+        number("seconds", seconds, "seconds as a number, e.g. 5")
         labels = self.labels
 
         def ask(problem: Problem) -> Outcome:

@@ -123,9 +123,11 @@ class Table(Sequence[tuple[str | None, ...]]):
         return table
 
     def _repr_html_(self) -> str:
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in self.columns)
+        left = "style='text-align: left'"
+        head = "".join(f"<th {left}>{html.escape(name)}</th>" for name in self.columns)
         body = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(cell or '')}</td>" for cell in row) + "</tr>" for row in self.rows
+            "<tr>" + "".join(f"<td {left}>{html.escape(cell or '')}</td>" for cell in row) + "</tr>"
+            for row in self.rows
         )
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

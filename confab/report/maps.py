@@ -24,6 +24,8 @@ MOST_NAMES = 2
 """So many things at one place have their names on the map."""
 STRETCH = 1.7
 """A page is wider than high, and names are, too."""
+LINE, NAME = 13.0, 90.0
+"""How high and how wide a name is, about."""
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,15 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
     crowd = min(2.2, max(1.0, len(ground.spots) / 12))
     scale = 440 * crowd / max(wide, 1.6 * high)
 
+    size = _size({name: (x * scale, y * scale) for name, (x, y) in ground.spots.items()})
+    stretch = _stretch([(x * scale, y * scale) for x, y in ground.spots.values()], size, _most_together(moves))
+
     def at(point: tuple[float, float]) -> tuple[float, float]:
-        return 52 + (point[0] - min(xs)) * scale, 50 + (point[1] - min(ys)) * scale
+        return 52 + (point[0] - min(xs)) * scale, 50 + (point[1] - min(ys)) * scale * stretch
 
     spots = {name: at(point) for name, point in ground.spots.items()}
-    size = _size(spots)
     width = 104 + wide * scale
-    height = 100 + high * scale + (46 if ground.robots else 0)
+    height = 100 + high * scale * stretch + (46 if ground.robots else 0)
 
     def name(of: str) -> str:
         return labels.name(of) if labels else of
@@ -121,9 +125,8 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
     for a, b in ground.ways:
         (x1, y1), (x2, y2) = spots[a], spots[b]
         drawn.append(tag("line", x1=f"{x1:.1f}", y1=f"{y1:.1f}", x2=f"{x2:.1f}", y2=f"{y2:.1f}", class_="way"))
-    for spot, (x, y) in spots.items():
+    for x, y in spots.values():
         drawn.append(tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=f"{size:.1f}", class_="spot"))
-        drawn.append(_text(x, y + size + 12, name(spot), "place"))
     together: dict[str, list[str]] = {}
     for number, (thing, before, after, away) in enumerate(moves):
         color, (x, y) = f"v{number % 8}", spots[after]
@@ -141,6 +144,7 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
                 **dot,
             )
         )
+    drawn += [_text(x, y + size + 12, name(spot), "place") for spot, (x, y) in spots.items()]
     for after, things in together.items():
         more = [f"+ {len(things) - MOST_NAMES} more"] if len(things) > MOST_NAMES else []
         for up, words in enumerate([*more, *things[:MOST_NAMES]]):
@@ -155,6 +159,7 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
         "svg", drawn, viewBox=f"0 0 {width:.0f} {height:.0f}", role="img", aria_label=f"Map: {said or 'nothing moved'}"
     )
     legend = "dashed: before; filled: after" if said else "nothing changed its place"
+    legend += f"; depth drawn {stretch:.1f} times as large" if ground.boxes and stretch > 1 else ""
     return tag("figure", svg, tag("figcaption", legend), class_="map")
 
 
@@ -178,6 +183,24 @@ def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str, str]]:
             last = phases[-1].value
             found[thing] = long, places[0].value, places[-1].value, "" if last in ground.spots else last
     return [(thing, before, after, away) for thing, (_, before, after, away) in sorted(found.items())]
+
+
+def _most_together(moves: Sequence[tuple[str, str, str, str]]) -> int:
+    """Return how many names stand above one place in the end, at most."""
+    places = [after for _, _, after, _ in moves]
+    return max((min(places.count(place), MOST_NAMES + 1) for place in places), default=0)
+
+
+def _stretch(points: Sequence[tuple[float, float]], size: float, names: int) -> float:
+    """Return how much longer depth has to be drawn, so that a place's name and those of things behind it don't meet."""
+    needed = 2 * size + LINE * (names + 1) + 8
+    near = [
+        abs(a[1] - b[1])
+        for i, a in enumerate(points)
+        for b in points[:i]
+        if abs(a[0] - b[0]) < NAME and abs(a[1] - b[1]) > size
+    ]
+    return min(3.0, max(1.0, needed / min(near, default=needed)))
 
 
 def _size(spots: Spots) -> float:

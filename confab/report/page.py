@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 LARGEST_FILM = 40_000_000
 """Bytes of a film that is put into the page; a larger one is linked."""
+LEARNED = 8
+"""So many sentences tell what was learned."""
 MOST_STEPS = 4000
 """Steps of a plan whose reasons are worked out for the page."""
 
@@ -274,11 +276,12 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
 def _learned(memory: Memory | None, labels: Labels) -> Markup | None:
     if memory is None:
         return None
-    columns = ("behaviour", "chosen", "passed over", "where this held", "relevance")
+    columns = ("behaviour", "where this held", "chosen", "passed over", "relevance")
     rows = [
-        (labels.name(str(behavior)), chosen, passed, sentence(str(fact), str(value), labels, {}), relevance)
-        for behavior, fact, value, chosen, passed, _, _, relevance in memory.counts(8)
+        (labels.name(str(behavior)), sentence(str(fact), str(value), labels, {}), chosen, passed, relevance)
+        for behavior, fact, value, chosen, passed, _, _, relevance in memory.counts(LEARNED * LEARNED)
     ]
+    rows = sorted(rows, key=lambda row: (-float(row[-1] or 0), len(row[1])))[:LEARNED]  # of equals the plainest
     return joined(
         tag("h2", "What was learned"),
         tag("p", memory.said()),

@@ -137,12 +137,14 @@ def timeline(course: Course, labels: Labels | None = None, speed: float | None =
     kinds = {name: i for i, name in enumerate(dict.fromkeys(bar.step.behavior for bar in course.bars))}
     for level in levels:
         steps = [by_path[s.path] for s in course.plan.walk() if s.level == level and s.steps and s.path in by_path]
-        rows.append(_lane(f"level {level}", [_bar(bar, end, labels, "level") for bar in steps]))
+        rows.append(_lane(f"level {level}", [_bar(bar, end, labels, "level") for bar in steps], kind="level"))
     drawn = course.bars[:MOST_BARS]
     for who, bars in course.lanes().items():
         name = (labels.name(who) if labels else who) if who else "steps"
         those = [bar for bar in bars if bar in drawn] if len(drawn) < len(course.bars) else bars
-        rows.append(_lane(name, [_bar(bar, end, labels, f"c{kinds[bar.step.behavior] % COLORS}") for bar in those]))
+        rows.append(
+            _lane(name, [_bar(bar, end, labels, f"c{kinds[bar.step.behavior] % COLORS}") for bar in those], kind="hand")
+        )
     values = sorted({phase.value for s in symbols for phase in course.phases[s]} - {TRUE, FALSE})
     colors = {value: f"v{i % COLORS}" for i, value in enumerate(values)} | {TRUE: "v1", FALSE: "v0"}
     for symbol in symbols[:MOST_LANES]:
@@ -161,7 +163,7 @@ def timeline(course: Course, labels: Labels | None = None, speed: float | None =
     left_out = [f"{len(course.bars) - len(drawn)} more primitives" if len(drawn) < len(course.bars) else ""]
     left_out += [f"{len(symbols) - MOST_LANES} more lanes" if len(symbols) > MOST_LANES else ""]
     said = ", ".join(filter(None, left_out))
-    width = f"min-width:min({max(40, round(0.75 * len(drawn)))}rem, 400rem)"
+    width = f"min-width:min({max(40, round(12 + 1.2 * len(drawn)))}rem, 400rem)"
     inner = tag("div", rows, _axis(end, course.unit), tag("div", marks, tag("div", class_="cursor"), class_="over"),
                 class_="lanes", style=width)  # fmt: skip
     hint = "click a bar to see it in the film" if speed else "a click leads to the step in the plan"
@@ -193,7 +195,7 @@ def _bar(bar: Bar, end: float, labels: Labels | None, kind: str) -> Markup:
     bad = " failed" if bar.ok is False else ""
     note = f": {bar.note}" if bar.ok is False and bar.note else ""
     return tag(
-        "a", "✗ " if bad and not bar.step.steps else None, words,
+        "a", tag("span", "✗ " if bad and not bar.step.steps else None, words),
         class_=f"bar {kind}{bad}", href=f"#{anchor(bar.step.path)}", title=words + note, data_t=f"{bar.begin:.3f}",
         style=f"left:{_share(bar.begin, end)};width:{_share(bar.end - bar.begin, end)}",
     )  # fmt: skip
@@ -203,7 +205,7 @@ def _phase(begin: float, until: float, value: str, end: float, labels: Labels | 
     words = labels.name(value) if labels else value
     return tag(
         "span",
-        words,
+        tag("span", words),
         class_=f"bar {color}",
         title=words,
         style=f"left:{_share(begin, end)};width:{_share(until - begin, end)}",

@@ -1,6 +1,7 @@
 """What a user types first works: names that the Tab key offers, facts as text, results where plans are wanted, edits that count."""
 
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -130,3 +131,40 @@ def test_what_is_edited_in_the_rdflib_graph_is_asked_and_planned_with() -> None:
 def test_a_picture_is_an_image_in_a_notebook_and_a_file_where_one_is_named(tmp_path: Path, scene: confab.Scene) -> None:
     assert scene.picture(classes=True).size[0] > 100
     assert scene.picture(tmp_path / "card.png", behavior="B2_PICK").is_file()
+
+
+def test_what_is_no_number_is_refused_in_words(scene: confab.Scene, result: confab.Result) -> None:
+    with pytest.raises(confab.KnowledgeError, match=r"time_limit='5' is no number; wanted seconds as a number, e.g. 5"):
+        scene.plan(time_limit="5")  # type: ignore[arg-type]
+    with pytest.raises(confab.KnowledgeError, match="rollouts='3' is no number"):
+        result.verify(rollouts="3")  # type: ignore[arg-type]
+    with pytest.raises(confab.KnowledgeError, match=r"wanted a text like 'cup2 LOCATION location8', or several; got 7"):
+        scene.plan(7)  # type: ignore[arg-type]
+
+
+def test_a_plan_is_put_in_another_order_only_where_it_can_be_done(result: confab.Result) -> None:
+    assert [step.id for step in result.in_order(22, 34, 28, 39).steps] == [22, 34, 28, 39]
+    with pytest.raises(confab.KnowledgeError, match="wanted 22, 28, 34, 39 in another order; got 22"):
+        result.in_order(22)
+    with pytest.raises(confab.KnowledgeError, match="can't be done in that order"):
+        confab.load("towers-small").plan().in_order(
+            *reversed([s.id for s in confab.load("towers-small").plan().plan.steps])
+        )
+
+
+def test_a_ready_query_is_asked_by_its_name(scene: confab.Scene) -> None:
+    assert ("cup1", "location2") in scene.query("where-is-everything")
+    with pytest.raises(confab.KnowledgeError, match="did you mean 'where-is-everything'"):
+        scene.query("where-is-everythin")
+
+
+def test_names_of_neighbours_do_not_meet_on_a_map(scene: confab.Scene) -> None:
+    """Words as wide as they are drawn, lines as high: of no two the boxes overlap."""
+    for name in ("beverage-serving", "beverage-serving-moved", "cereal-serving", "kitchen-corner", "house-small"):
+        other = confab.load(name)
+        words = re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)" class="(\w+)">([^<]+)</text>', other._repr_html_())
+        assert len(words) > 5, name
+        boxes = [(float(x), float(y), len(said) * 5.6, said) for x, y, _, said in words]
+        for i, (x, y, wide, said) in enumerate(boxes):
+            for x2, y2, wide2, said2 in boxes[:i]:
+                assert abs(y - y2) >= 9 or abs(x - x2) >= (wide + wide2) / 2, (name, said, said2)
