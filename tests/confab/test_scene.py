@@ -23,7 +23,7 @@ def test_a_query_gives_rows_a_table_and_a_dataframe(scene: confab.Scene) -> None
     table = scene.query("SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o")
     assert list(table)[:2] == [("bottle1", "location4"), ("bottle2", "location3")]
     assert table.dataframe().shape == (4, 2)
-    assert "<td>bottle1</td>" in table._repr_html_()
+    assert ">bottle1</td>" in table._repr_html_()
     assert repr(table).splitlines()[0] == "o        l"
 
 
