@@ -18,6 +18,8 @@ from confab.progress import quiet
 from reasoner.graph.knowledge import KnowledgeError
 
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
+EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
+"""What the status of an outcome is as an exit code."""
 LONGEST = 2_000
 """Signs of a message: it quotes what others wrote, which may be of any length."""
 

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -43,12 +44,19 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CliRunner:
     return CliRunner()
 
 
+def commands(group: Any = app, before: str = "") -> dict[str, click.Command]:
+    """Return the commands of a group, and of the groups in it, by all words of their names."""
+    found: dict[str, click.Command] = {}
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        within = commands(command, f"{name} ") if isinstance(command, click.Group) else {before + name: command}
+        found |= within
+    return found
+
+
 def test_every_command_has_examples_in_its_help(run: CliRunner) -> None:
-    group: Any = app
-    names = {name for name in group.commands if name != "memory"} | {
-        f"memory {n}" for n in group.commands["memory"].commands
-    }
-    assert set(EXAMPLES) == names
+    assert set(EXAMPLES) == set(commands())
     for name, lines in EXAMPLES.items():
         told = run.invoke(app, [*name.split(), "--help"])
         assert all(line in told.stdout for line in lines), told.stdout
@@ -58,18 +66,15 @@ def test_every_command_has_examples_in_its_help(run: CliRunner) -> None:
 def test_every_example_is_a_call_that_can_be_made(run: CliRunner, line: str) -> None:
     words = shlex.split(line)[1:]
     if any(word in line for word in SLOW):
-        command: Any = app
-        while words and words[0] in getattr(command, "commands", {}):
-            command = command.commands[words.pop(0)]
-        command.make_context("confab", words)
+        name = next(name for name in commands() if f"{line} ".startswith(f"confab {name} "))
+        commands()[name].make_context("confab", words[len(name.split()) :])
     else:
         assert run.invoke(app, words).exit_code == 0, line
 
 
 @pytest.mark.parametrize("option", ["-o", "--output"])
 def test_output_means_the_same_everywhere(run: CliRunner, option: str) -> None:
-    group: Any = app
-    for name, command in {**group.commands, **group.commands["memory"].commands}.items():
+    for name, command in commands().items():
         for parameter in command.params:
             if {"--out", "--folder", "--into", "--save", "-o", "--output"} & {*parameter.opts}:
                 assert option in parameter.opts, name

@@ -45,7 +45,7 @@ def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None
     ],
 )
 def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch, replaced: str, what: str) -> None:
-    monkeypatch.setattr("confab.cli._load", lambda *_: exec(replaced + "\nimport sys; sys.exit(0)"))
+    monkeypatch.setattr("confab.commands.planning.load_scene", lambda *_: exec(replaced + "\nimport sys; sys.exit(0)"))
     monkeypatch.setattr(fuzz, "SECONDS", 1 if "while" in replaced else 30)
     monkeypatch.setattr(fuzz, "WAITING", 1 if "sleep" in replaced else 600)
     monkeypatch.setitem(

@@ -1,0 +1,1 @@
+"""The commands by their purpose; `confab.cli` has the table of them."""

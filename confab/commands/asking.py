@@ -1,0 +1,160 @@
+"""Scenes asked in SPARQL, here or as an endpoint."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.exceptions import Exit
+
+from confab.commands.given import load_scene
+from confab.commands.options import (
+    AS_JSON,
+    PATH,
+    QUERY_ROWS,
+    QUERY_SECONDS,
+    QUIET,
+    SCENE,
+    SCENE_IRI,
+)
+from confab.examples import examples
+from confab.progress import progress
+from confab.terminal import NO, YES, show_result
+from reasoner.graph.knowledge import KnowledgeError
+
+if TYPE_CHECKING:
+    from confab.table import Table
+
+
+@click.command(epilog=examples("serve"))
+@SCENE
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=7879, metavar="N", help="On 127.0.0.1; 0 is any free one."
+)
+@QUERY_SECONDS
+@QUERY_ROWS
+@QUIET
+def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
+    """Serve a scene as a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
+    from threading import Event
+
+    from confab.serving import serving
+    from reasoner.graph.apart import QueryLimits
+
+    with serving(load_scene(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
+        show_result(f"{server.url}sparql answers SPARQL 1.1, {server.url} shows the scene; Ctrl-C ends it")
+        sys.stdout.flush()
+        Event().wait()
+
+
+FORMS = {
+    ".ttl": "turtle",
+    ".txt": "table",
+    ".csv": "csv",
+    ".json": "json",
+    ".tsv": "tsv",
+    ".srj": "sparql-json",
+    ".srx": "sparql-xml",
+}
+
+
+@click.command(epilog=examples("query"))
+@SCENE
+@click.argument(
+    "sparql", required=False, metavar="[QUERY]", help="SPARQL text, a .rq file, or a ready query: where-was-it."
+)
+@click.option(
+    "--episodes", multiple=True, type=PATH, metavar="FILE", help="Ask this saved episode as well; repeatable."
+)
+@click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies it.")
+@click.option("--applicable", is_flag=True, help="With --show: the query with its preconditions, where it can be done.")
+@click.option("--affords", metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
+@click.option("--format", "form", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
+@click.option("--iris", is_flag=True, help="Whole IRIs in place of short names.")
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    type=PATH,
+    metavar="FILE",
+    help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology.",
+)
+@QUERY_SECONDS
+@QUERY_ROWS
+@click.option("--service", is_flag=True, help="Let the query ask other endpoints (SERVICE).")
+@SCENE_IRI
+@AS_JSON
+@QUIET
+def query(
+    scene: str,
+    sparql: str | None,
+    episodes: tuple[Path, ...],
+    show: str | None,
+    applicable: bool,
+    affords: str | None,
+    form: str | None,
+    iris: bool,
+    out: Path | None,
+    time_limit: float,
+    rows: int,
+    service: bool,
+    iri: str | None,
+    as_json: bool,
+) -> None:
+    """Ask a scene in SPARQL, or what its objects afford."""
+    from reasoner.graph.apart import QueryLimits
+
+    limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
+    asked = {"QUERY": sparql, "--show": show, "--affords": affords}
+    given = [name for name, value in asked.items() if value is not None]
+    if len(given) > 1:
+        raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
+    if applicable and show is None:
+        raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
+    loaded = load_scene(scene, iri).with_episodes(*episodes)
+    if show is not None:
+        print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
+        return
+    if sparql is None and affords is None:
+        raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
+    if out is not None and out.suffix.lower() == ".ttl":
+        if sparql is None:
+            raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
+        print(f"{out}: {loaded.construct(sparql, out, limits)} triples")
+        return
+    with progress("asking"):
+        table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
+    form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
+    if form is None or form not in FORMS.values():
+        wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"
+        raise KnowledgeError(f"unknown format '{form or out}'; {wanted}")
+    _rows(table.iris() if iris else table, form, out, loaded.knowledge.spoken)
+    raise Exit(NO if table.truth is False else YES)
+
+
+def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -> None:
+    """Print the rows of a query, or write them into a file."""
+    if form == "table" and out is None:
+        show_result("true" if table.truth else table if table.truth is None else "false")
+        return
+    if form == "table":
+        text = f"{table!r}\n"
+    elif form == "csv":
+        text = table.csv()
+    elif form == "json":
+        data = table.records() if table.truth is None else table.truth
+        text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+    elif form == "turtle":
+        text = table.turtle(prefixes)
+    else:
+        text = table.standard(form).decode("utf-8").rstrip("\n") + "\n"
+    if out is None:
+        print(text, end="")
+        return
+    from reasoner.files import write_whole
+
+    write_whole(out, text)
+    print(f"{out}: {len(table)} rows")

@@ -1,0 +1,175 @@
+"""Scenes and domains: begun, fetched, drawn, checked, generated, and PDDL in and out."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.exceptions import Exit
+
+from confab.commands.options import (
+    AS_JSON,
+    PATH,
+    QUIET,
+    SCENE,
+    SEED,
+    scene_names,
+)
+from confab.examples import examples
+from confab.progress import progress
+from confab.terminal import NO, YES, remark, show_result
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command(epilog=examples("new"))
+@click.argument("domain", metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")
+@click.option(
+    "-o",
+    "--output",
+    "--folder",
+    "folder",
+    type=PATH,
+    metavar="DIR",
+    help="Folder to write into; default: DOMAIN.",
+)
+@click.option("--bodies", is_flag=True, help="With shapes, a table and skills, so that 'confab run' can carry it out.")
+def new(domain: str, folder: Path | None, bodies: bool) -> None:
+    """Begin a domain of your own with a commented skeleton."""
+    from confab import authoring
+
+    files = authoring.new_domain(domain, folder, bodies)
+    scene = next(file for file in files if file.stem.endswith("-scene"))
+    then = "run" if bodies else "plan"
+    show_result(
+        "\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"])
+    )
+
+
+@click.command(epilog=examples("fetch"))
+@click.argument("url", metavar="URL", help="IRI of an ontology that lies on the web.")
+@click.option(
+    "-o",
+    "--output",
+    "--into",
+    "folder",
+    type=PATH,
+    default=Path(),
+    metavar="DIR",
+    help="Folder of the file that imports it.",
+)
+def fetch(url: str, folder: Path) -> None:
+    """Fetch an ontology that is imported by URL."""
+    from reasoner.graph.fetching import fetch as fetch_ontology
+
+    fetched = fetch_ontology(url, folder)
+    show_result(
+        "\n".join([f"{fetched.file}, named in {fetched.catalog}", *(f"it imports {iri}" for iri in fetched.imports)])
+    )
+
+
+@click.command(epilog=examples("picture"))
+@SCENE
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FILE.png", help="File to draw into.")
+@click.option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
+@click.option("--classes", is_flag=True, help="Draw the classes of objects instead.")
+def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
+    """Draw the table with its places, a behaviour, or the classes."""
+    from confab.picturing import draw
+    from confab.scene import load
+
+    print(draw(load(scene), out, behavior, classes))
+
+
+@click.command(epilog=examples("validate"))
+@click.argument(
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="FILE…",
+    shell_complete=scene_names,
+    help="Ontology files, or names of shipped scenes.",
+)
+@click.option("--deep", is_flag=True, help="Ask HermiT for contradictions as well; needs Java.")
+@click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
+@click.option("--watch", is_flag=True, help="Check again whenever one of the files changes, until Ctrl-C.")
+@AS_JSON
+@QUIET
+def validate(files: tuple[str, ...], deep: bool, strict: bool, watch: bool, as_json: bool) -> None:
+    """Check ontologies: what is wrong where, why, and what to do."""
+    from confab.watching import again_and_again
+
+    code = _validated(files, deep, strict, as_json)
+    for _ in again_and_again(files) if watch else ():
+        code = _validated(files, deep, strict, as_json)
+    raise Exit(code)
+
+
+def _validated(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> int:
+    """Check some files, print what was found, and return the exit code."""
+    from reasoner.validation.findings import ERROR, WARNING
+    from reasoner.validation.validate import STAGES
+    from reasoner.validation.validate import validate as check
+
+    with progress("validating", len(files) * STAGES) as advance:
+        findings = check(files, deep=deep, done=lambda what: advance(what, 1))
+    errors, warnings = (sum(finding.severity == kind for finding in findings) for kind in (ERROR, WARNING))
+    if as_json:
+        show_result([finding.as_dict() for finding in findings])
+    else:
+        show_result("\n".join([*map(str, findings), *([] if errors or warnings else ["nothing is wrong"])]))
+        if errors or warnings:
+            from confab.memory import counted
+
+            remark(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}")
+    sys.stdout.flush()
+    return NO if errors or (strict and warnings) else YES
+
+
+@click.command(epilog=examples("generate"))
+@click.argument("family", metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable.")
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option("--objects", type=int, default=4, metavar="N", help="Objects, half of them cups.")
+@click.option("--hands", type=int, default=2, metavar="H", help="Hands.")
+@click.option("--clutter", type=int, default=0, metavar="K", help="Irrelevant objects in other rooms.")
+@SEED
+def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
+    """Write a scene for trials as an ordinary ontology file."""
+    from confab.authoring import turtle_path
+    from reasoner.generate import write_scene
+
+    write_scene(turtle_path(out), family, objects, hands, clutter, seed)
+    print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
+
+
+@click.command("import", epilog=examples("import"))
+@click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
+@click.argument("problem", type=PATH, metavar="PROBLEM.pddl")
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option(
+    "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
+)
+def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
+    """Turn a PDDL problem into a scene."""
+    from confab.authoring import turtle_path
+    from confab.pddl_commands import import_pddl
+
+    imported = import_pddl(domain, problem, turtle_path(out), level)
+    behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
+    print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
+
+
+@click.command(epilog=examples("export"))
+@SCENE
+@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
+@click.option("--level", type=int, help="Level to export; the lowest if not given.")
+def export(scene: str, out: Path, level: int | None) -> None:
+    """Write one level of a scene as PDDL, for other planners."""
+    from confab.pddl_commands import export_pddl
+    from confab.scene import load
+
+    for path in export_pddl(load(scene).problem, level, out):
+        print(path)

@@ -1,0 +1,86 @@
+"""What a command line names, read: scenes, memories, plans, and files to write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import ontology
+from confab.progress import progress
+from confab.terminal import remark
+from reasoner.graph.knowledge import KnowledgeError
+
+if TYPE_CHECKING:
+    from confab.memory import Memory
+    from confab.scene import Scene
+    from planner.plan import Plan
+    from reasoner.limits import Deadline
+
+
+def load_scene(source: str, iri: str | None = None, deadline: Deadline | None = None) -> Scene:
+    """Load a scene, with what its hands reach if it has a body."""
+    from confab.reaching import with_current_reach
+    from confab.scene import load
+
+    with progress(f"reading {source}"):
+        scene = load(source, iri, deadline)
+    return with_current_reach(scene, remark)
+
+
+def doubt(scene: Scene) -> None:
+    """Say in one line if `confab validate` would find errors in a scene of the user's own."""
+    path = scene.knowledge.path
+    if path is None or path.is_relative_to(ontology.ROOT):
+        return
+    from reasoner.validation.validate import quick_errors
+
+    errors = quick_errors(scene.knowledge)
+    if errors:
+        more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
+        remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
+
+
+def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
+    """Return the memory to plan with, if one was asked for."""
+    if path is not None and none:
+        raise KnowledgeError("--memory and --no-memory exclude each other; give one")
+    if path is None:
+        return None
+    from confab.memory import Memory
+
+    try:
+        lines = None
+        if path.is_file():
+            from confab.authoring import unknown_terms
+            from reasoner.memory.links_file import memory_lines
+
+            lines = memory_lines(path)
+            if unknown := unknown_terms(lines, scene.knowledge):
+                remark(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
+        return Memory.load(path, scene, lines=lines)
+    except KnowledgeError as error:
+        if not path.is_file():
+            raise
+        remark(f"{error}; planning goes on without memory")
+        return None
+
+
+def json_file(path: Path) -> Path:
+    """Return the path of a plan or of verdicts to write, if it says that it is JSON."""
+    if path.suffix.lower() != ".json":
+        raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
+    return path
+
+
+def plan_in(path: Path, scene: Scene) -> Plan:
+    """Return the plan in a file: JSON of ours, else a list of actions as PDDL planners write it for our export."""
+    if path.suffix.lower() in (".json", ""):
+        from confab.interchange import read_plan
+
+        return read_plan(path, scene.problem)
+    from confab.pddl_commands import read_pddl_plan
+
+    try:
+        return read_pddl_plan(scene.problem, None, path.read_text(encoding="utf-8"), regroup=True)
+    except (KnowledgeError, UnicodeDecodeError) as error:
+        raise KnowledgeError(f"{path}: {error}") from error

@@ -1,0 +1,167 @@
+"""Memories: learned, shown, merged, trusted, renamed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.exceptions import Exit
+
+from confab.commands.given import load_scene
+from confab.commands.options import (
+    AS_JSON,
+    PATH,
+    QUIET,
+    scene_names,
+)
+from confab.examples import examples
+from confab.progress import progress
+from confab.terminal import EXIT, YES, remark, show_result
+
+if TYPE_CHECKING:
+    from confab.memory import Memory
+
+
+@click.command(epilog=examples("learn"))
+@click.argument(
+    "scenes",
+    nargs=-1,
+    required=True,
+    metavar="SCENE…",
+    shell_complete=scene_names,
+    help="Scenes to gather experience in.",
+)
+@click.option("--memory", type=PATH, required=True, metavar="FILE", help="Memory file to learn into; made if missing.")
+@click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
+@click.option("--plot", type=PATH, metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF.")
+@click.option(
+    "--rounds",
+    type=click.IntRange(1),
+    metavar="N",
+    help="How often all scenes are gone through.",
+)
+@AS_JSON
+@QUIET
+def learn(
+    scenes: tuple[str, ...],
+    memory: Path,
+    demonstration: Path | None,
+    plot: Path | None,
+    rounds: int | None,
+    as_json: bool,
+) -> None:
+    """Learn how scenes are best solved, or from a demonstration."""
+    from confab.curve import Curve, require_drawable
+    from confab.interchange import read_plan
+    from confab.memory import MOST_LINKS, Memory, undisturbed
+
+    remembered: Memory | None = None
+    status, curve = YES, Curve()
+    if plot is not None:
+        require_drawable(plot)
+    scenes *= rounds or (6 if plot is not None and len(scenes) == 1 else 1)
+    with undisturbed(memory), progress("learning", 2 * len(scenes)) as advance:
+        for name in scenes:
+            advance(f"planning in {name}", 0)
+            loaded = load_scene(name)
+            if remembered is None:
+                remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+            if plot is not None:
+                curve.measure(name, loaded, remembered)
+            links = remembered.links
+            if demonstration:
+                remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+                advance(f"learned {name}", 2)
+            else:
+                result = loaded.plan()
+                if not result.solved:
+                    status = EXIT[result.outcome.status.value]
+                    why = result.outcome.reason.text if result.outcome.reason else ""
+                    remark(f"{name}: nothing to learn, {result.outcome.status.value}: {why}")
+                    advance(name, 2)
+                    continue
+                advance(f"learning {name}", 1)
+                remembered.teach(loaded, result.plan)
+                advance(f"learned {name}", 1)
+            if remembered.links is links:
+                remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned")
+        assert remembered is not None
+        if remembered.experience.episodes:
+            remembered.save(memory)
+    if plot is not None:
+        curve.save(plot)
+    data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}
+    show_result(data if as_json else f"{memory}: {remembered!r}")
+    raise Exit(status)
+
+
+class InOrder(click.Group):
+    """A group whose help lists its commands as they stand here, the main one first."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return their names."""
+        return list(self.commands)
+
+
+@click.group("memory", cls=InOrder)
+def memory_app() -> None:
+    """Look after a memory file."""
+
+
+@memory_app.command(epilog=examples("memory migrate"))
+@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
+def migrate(memory: Path, renames: tuple[str, ...]) -> None:
+    """Rename terms in a memory, so that what was learned of them isn't lost."""
+    from confab.authoring import migrate as rename
+
+    show_result(f"{memory}: {rename(memory, renames)} statements changed")
+
+
+@memory_app.command(epilog=examples("memory show"))
+@click.argument("memory", metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
+@click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="So many rows.")
+@AS_JSON
+def show(memory: str, most: int, as_json: bool) -> None:
+    """Show what a memory has counted, what discriminates first."""
+    from confab.memory import Memory
+
+    loaded = Memory.load(memory)
+    if as_json:
+        show_result({"memory": memory, "summary": repr(loaded), "counts": loaded.counts(most).records()})
+    else:
+        show_result(repr(loaded))
+        show_result(loaded.counts(most))
+
+
+@memory_app.command(epilog=examples("memory merge"))
+@click.argument("memories", nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge.")
+@click.option(
+    "-o", "--output", "out", type=PATH, required=True, metavar="FILE", help="The merged memory; may be one of them."
+)
+@click.option("--trust", is_flag=True, help="Let what they have counted lead; else it runs in strict mode.")
+def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
+    """Merge memories: the counts of each replica, in any order, once or many times."""
+    from confab.memory import Memory, undisturbed
+
+    with undisturbed(out):
+        merged = Memory.load(memories[0])
+        for source in memories[1:]:
+            merged.merge(Memory.load(source), trust)
+        merged.save(out)
+    show_result(f"{out}: {merged!r}")
+
+
+@memory_app.command("trust", epilog=examples("memory trust"))
+@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
+def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
+    """Let what other replicas have counted lead the search, too."""
+    from confab.memory import Memory, undisturbed
+
+    with undisturbed(memory):
+        loaded = Memory.load(memory)
+        loaded.trust(sorted(loaded.experience.episodes) if replicas == ("all",) else replicas)
+        loaded.save(memory)
+    show_result(f"{memory}: leads with {len(loaded.trusted | {loaded.experience.replica})} of its replicas")

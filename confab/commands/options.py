@@ -1,0 +1,81 @@
+"""What several commands take, declared once."""
+
+from __future__ import annotations
+
+import glob
+import logging
+from pathlib import Path
+
+import click
+
+import ontology
+
+PATH = click.Path(path_type=Path)
+
+
+def _quiet(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    if wanted or context.parent is None:
+        logging.disable(logging.WARNING if wanted else logging.NOTSET)
+
+
+def scene_names(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
+    """Return what a scene's name can go on with: shipped names, and files of ontologies."""
+    folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
+    found = sorted(folder.glob(f"{glob.escape(begun.rpartition('/')[2])}*"))
+    files = [str(path) + "/" * path.is_dir() for path in found if path.is_dir() or path.suffix in ontology.SUFFIXES]
+    return [*(name for name in ontology.scenes() if name.startswith(begun)), *files]
+
+
+QUIET = click.option(
+    "-q", "--quiet", is_flag=True, expose_value=False, callback=_quiet, help="Say nothing but results and errors."
+)
+SCENE = click.argument(
+    "scene", metavar="SCENE", shell_complete=scene_names, help="Shipped name, file, or URL of a SPARQL endpoint."
+)
+SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="Which scene of an endpoint, if it holds several.")
+GOALS = click.option(
+    "--goal",
+    multiple=True,
+    metavar="FACT",
+    help="A goal that replaces that symbol's, e.g. 'cup2 LOCATION location8'; repeatable.",
+)
+MEMORY_FILE = click.option(
+    "--memory", type=PATH, metavar="FILE", help="The only place where memory is read or written."
+)
+NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan without memory, in so many words.")
+MODE = click.option(
+    "--mode",
+    default="guarded",
+    metavar="MODE",
+    shell_complete=lambda *_: ["guarded", "leading", "strict", "optimal", "paper"],
+    help="guarded, leading, strict, optimal, or paper (eq. 5).",
+)
+TIME_LIMIT = click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0),
+    metavar="S",
+    help="Seconds from the start on after which it gives up (exit 3).",
+)
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+GUI = click.option("--gui", is_flag=True, help="Show the first rollout in a window; needs a screen.")
+OUT = click.option(
+    "-o",
+    "--output",
+    "--out",
+    "out",
+    type=PATH,
+    default=Path("confab-out"),
+    metavar="DIR",
+    help="Folder to write into.",
+)
+QUERY_SECONDS = click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0),
+    default=60.0,
+    metavar="S",
+    help="Seconds after which a query ends (exit 3).",
+)
+QUERY_ROWS = click.option(
+    "--rows", type=click.IntRange(min=1), default=100000, metavar="N", help="More rows than this end it, too."
+)

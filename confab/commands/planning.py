@@ -1,0 +1,360 @@
+"""Plans: made, checked in physics, carried out, explained."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.exceptions import Exit
+
+from confab.commands.given import doubt, json_file, load_scene, memory_for, plan_in
+from confab.commands.options import (
+    AS_JSON,
+    GOALS,
+    GUI,
+    MEMORY_FILE,
+    MODE,
+    NO_MEMORY,
+    OUT,
+    PATH,
+    QUIET,
+    SCENE,
+    SCENE_IRI,
+    SEED,
+    TIME_LIMIT,
+    scene_names,
+)
+from confab.examples import examples
+from confab.progress import progress
+from confab.terminal import EXIT, GAVE_UP, NO, YES, remark, show_result
+from reasoner.graph.knowledge import KnowledgeError
+
+if TYPE_CHECKING:
+    from confab.explaining import Explanation
+    from confab.memory import Memory
+    from confab.scene import Result
+
+
+@click.command(epilog=examples("plan"))
+@SCENE
+@GOALS
+@MEMORY_FILE
+@NO_MEMORY
+@MODE
+@TIME_LIMIT
+@click.option(
+    "--optimal", is_flag=True, help="--mode optimal: improve until proved or the limit (10 s); tell the bound."
+)
+@click.option(
+    "--levels",
+    default="free",
+    metavar="free|strict",
+    help="Strict: no steps of a lower level where a level has no plan that can be refined.",
+)
+@click.option(
+    "--from-observed", "observed", type=PATH, metavar="FILE", help="Start from what was seen, not from the scene."
+)
+@click.option("--diff", metavar="OLD_SCENE", help="Say what changed since that scene instead.")
+@click.option(
+    "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
+)
+@click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write the plan and its reasons as a page.")
+@click.option("-o", "--output", "out", type=PATH, metavar="PLAN.json", help="Write the plan into this file.")
+@SCENE_IRI
+@AS_JSON
+@QUIET
+def plan(
+    scene: str,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    no_memory: bool,
+    mode: str,
+    time_limit: float | None,
+    optimal: bool,
+    levels: str,
+    observed: Path | None,
+    diff: str | None,
+    engine: str | None,
+    level: int | None,
+    report: Path | None,
+    out: Path | None,
+    iri: str | None,
+    as_json: bool,
+) -> None:
+    """Plan in a scene: a tree of behaviours down to primitives."""
+    from confab.show import summary
+    from reasoner.limits import Deadline
+
+    deadline = Deadline.after(time_limit)
+    if out is not None:
+        json_file(out)
+    loaded = load_scene(scene, iri, deadline)
+    if diff is not None:
+        from confab.authoring import difference
+
+        changed = difference(load_scene(diff), loaded, mode)
+        show_result(changed.json() if as_json else str(changed))
+        raise Exit(YES)
+    remembered = memory_for(memory, no_memory, loaded)
+    if levels not in ("free", "strict"):
+        raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
+    limit = None if time_limit is None else deadline
+    with progress("planning"):
+        result = loaded.plan(
+            goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
+        )
+    if report is not None:
+        result.report(report)
+    if out is not None:
+        show_result(f"{result.save(out)}: {summary(result.outcome)}")
+    else:
+        show_result(result.json() if as_json else result)
+    doubt(loaded)
+    raise Exit(EXIT[result.outcome.status.value])
+
+
+@click.command(epilog=examples("run"))
+@click.argument(
+    "scene",
+    required=False,
+    default="beverage-serving",
+    metavar="[SCENE]",
+    shell_complete=scene_names,
+    help="Shipped name, file, or URL of a SPARQL endpoint.",
+)
+@MEMORY_FILE
+@MODE
+@SEED
+@OUT
+@click.option("--no-video", is_flag=True, help="Don't film: faster.")
+@GUI
+@QUIET
+def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_video: bool, gui: bool) -> None:
+    """Validate, plan, verify in physics, learn and report."""
+    from confab.running import run as run_all
+
+    raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
+
+
+@click.command(epilog=examples("verify"))
+@SCENE
+@click.argument(
+    "plan", type=PATH, metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form."
+)
+@click.option("--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="How often, with seeds S, S+1, …")
+@SEED
+@click.option("--workers", default="1", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option("--video", type=PATH, metavar="OUT.mp4", help="Film the first rollout.")
+@GUI
+@click.option("-o", "--output", "out", type=PATH, metavar="VERDICTS.json", help="Write the verdicts into this file.")
+@AS_JSON
+@QUIET
+def verify(
+    scene: str,
+    plan: Path,
+    rollouts: int,
+    seed: int,
+    workers: str,
+    perturb: bool,
+    video: Path | None,
+    gui: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Carry a plan out in physics and check every primitive."""
+    from confab.physics import counted
+
+    if out is not None:
+        json_file(out)
+    loaded = load_scene(scene)
+    with counted(rollouts) as done:
+        report = loaded.verify(
+            plan_in(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
+        )
+    if out is not None:
+        from reasoner.files import write_whole
+
+        write_whole(out, json.dumps(report.json(), indent=1) + "\n")
+        show_result(f"{out}: {report.summary()}")
+    else:
+        show_result(report.json() if as_json else report)
+    raise Exit(YES if report.verified else NO)
+
+
+@click.command(epilog=examples("execute"))
+@SCENE
+@click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
+@click.option(
+    "--intervene", multiple=True, metavar="'WHEN WHAT'", help="e.g. 'after=28 cup2 LOCATION location8'; or a file."
+)
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="What to begin with.")
+@GOALS
+@MEMORY_FILE
+@NO_MEMORY
+@MODE
+@SEED
+@click.option(
+    "-o",
+    "--output",
+    "--save",
+    "save",
+    type=PATH,
+    metavar="EPISODE.ttl",
+    help="Write the episode into this file.",
+)
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write what happened as a page.")
+@SCENE_IRI
+@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
+@click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
+@click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
+@click.option(
+    "--serve",
+    "serve_at",
+    type=click.IntRange(0, 65535),
+    metavar="PORT",
+    help="Meanwhile show it on a page, and answer SPARQL, at this port.",
+)
+@AS_JSON
+@QUIET
+def execute(
+    scene: str,
+    world: str,
+    intervene: tuple[str, ...],
+    plan: Path | None,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    no_memory: bool,
+    mode: str,
+    seed: int,
+    save: Path | None,
+    report: Path | None,
+    iri: str | None,
+    perturb: bool,
+    both_hands: bool,
+    learn: bool,
+    serve_at: int | None,
+    as_json: bool,
+) -> None:
+    """Act in a closed loop: watch, be interrupted, repair, replan."""
+    from confab.live import both, spectator
+    from confab.memory import Memory, undisturbed
+
+    loaded = load_scene(scene, iri)
+    remembered = memory_for(memory, no_memory, loaded)
+    if learn and (memory is None or remembered is None):
+        raise KnowledgeError("--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)")
+    with ExitStack() as stack:
+        tell = stack.enter_context(spectator())
+        if serve_at is not None:
+            from confab.serving import serving
+
+            server = stack.enter_context(serving(loaded, serve_at))
+            remark(f"{server.url} shows what happens, {server.url}sparql answers SPARQL 1.1")
+            tell = both(tell, server.service.take)
+        execution = loaded.execute(
+            plan,
+            intervene or (),
+            world,
+            goal or (),
+            remembered,
+            mode,
+            seed,
+            tell,
+            perturb=perturb,
+            both_hands=both_hands,
+        )
+    if learn and memory is not None:
+        with undisturbed(memory):  # others may have learned meanwhile
+            newest = Memory.load(memory, loaded)
+            newest.live(loaded.problem, execution.episode)
+            newest.save(memory)
+    if save is not None:
+        execution.save(save)
+    if report is not None:
+        execution.report(report)
+    show_result(execution.json() if as_json else execution)
+    raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
+
+
+@click.command(epilog=examples("explain"))
+@SCENE
+@click.argument(
+    "which", required=False, metavar="[STEP]", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."
+)
+@click.option(
+    "--not",
+    "instead",
+    metavar="WHAT",
+    help="Why not this: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
+)
+@GOALS
+@MEMORY_FILE
+@click.option(
+    "--step", type=click.IntRange(min=0), default=0, metavar="N", help="Which step of the level, counted from 0."
+)
+@click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
+@click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
+@click.option("--plot", type=PATH, metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
+@AS_JSON
+@QUIET
+def explain(
+    scene: str,
+    which: str | None,
+    instead: str | None,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    step: int,
+    level: int,
+    against: str | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Say why each step is there, why not another one, or why no plan."""
+    loaded = load_scene(scene)
+    remembered = memory_for(memory, False, loaded)
+    with progress("planning"):
+        result = loaded.plan(goal or (), remembered)
+    if not result.solved:
+        show_result(result.json() if as_json else result)
+        raise Exit(EXIT[result.outcome.status.value])
+    if level not in result.problem.domain.levels:
+        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
+    if which is None and (step, level) != (0, 1):
+        which = f"L{level}#{step}"
+    if instead is not None:
+        told: Any = result.why_not(instead, which)
+    elif remembered is not None:
+        told = _by_memory(result, remembered, which or "L1#0", against, plot)
+    else:
+        if against is not None or plot is not None:
+            raise KnowledgeError(
+                "--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT"
+            )
+        told = result.explain() if which is None else result.why(which)
+    show_result(told.json() if as_json else told)
+
+
+def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
+    """Return why memory prefers a step of a plan to another one, and draw it."""
+    from confab.explaining import explain as explain_step
+    from confab.interchange import ground_named
+    from confab.why import find_step
+
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise KnowledgeError(f"{plot}: can't draw into '{plot.suffix}'; wanted .png, .svg or .pdf")
+    asked = find_step(result.plan, which, result.labels)
+    on = result.plan.at_level(asked.level)
+    steps = [(s.behavior, s.arguments) for s in on]
+    other = ground_named(result.problem, against) if against else None
+    found = explain_step(result.problem, memory, steps, on.index(asked), other, result.labels)
+    if not found.note and not any(counts.evaluated for counts in result.outcome.search.values()):
+        found = replace(found, note="the planner found this plan before memory was asked: so memory sees its choices")
+    if plot is not None:
+        found.plot(plot)
+    return found
