@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from reasoner.amounts import terms_of
 from reasoner.symbols import (
     AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     RelationCondition,
@@ -50,6 +52,8 @@ def terms(condition: Condition) -> tuple[str, ...]:
             return (term,)
         case EqualityCondition(left, right):
             return (left, right)
+        case Comparison(one, _, other):
+            return (*terms_of(one), *terms_of(other))
     return ()
 
 

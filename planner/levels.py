@@ -15,10 +15,12 @@ from itertools import combinations
 
 from planner.plan import Broken, Left, Plan, Step
 from planner.validation import Bindings, Cell, Facts, Rules, stretches
+from reasoner.amounts import Amount, Calculation, Expression, Measure, written
 from reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Fact,
@@ -229,3 +231,22 @@ def said(condition: Condition, words: Words = str) -> str:
             return f"there is {'no' if negated else 'a'} {words(kind)} {words(variable)} with {all_(conditions)}"
         case AnyOf(alternatives, negated):
             return ("not " if negated else "") + f"({' or '.join(map(all_, alternatives))})"
+        case Comparison(left, sign, right, negated):
+            return ("not " if negated else "") + f"{counted(left, words)} {sign} {counted(right, words)}"
+
+
+def counted(expression: Expression, words: Words = str) -> str:
+    """Return an amount as people write it.
+
+    >>> counted(Calculation("-", Amount("SERVINGS", ("bottle1",)), Fraction(1, 2)))
+    '(bottle1 SERVINGS - 0.5)'
+    """
+    match expression:
+        case Amount(situation, arguments):
+            return words(Fact(Symbol(situation, arguments), "")).strip()
+        case Measure(relation, arguments):
+            return " ".join(map(words, (*arguments[:1], relation, *arguments[1:])))
+        case Calculation(sign, left, right):
+            return f"({counted(left, words)} {sign} {counted(right, words)})"
+        case number:
+            return written(number)

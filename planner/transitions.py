@@ -19,12 +19,27 @@ from types import CodeType
 from typing import Any, TypeAlias
 
 from planner.language import DomainError, needs, nothing_determines
+from reasoner.amounts import (
+    NOTHING,
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+    Number,
+    Quantity,
+    divided,
+    done,
+    number,
+    terms_of,
+)
+from reasoner.amounts import written as amount_written
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -162,8 +177,46 @@ class Writer:
             when += self._exists(effect.situation, effect.arguments, kinds)
             change = f"changes.append(({effect.situation!r}, {key_written(effect.arguments)}, {written(effect.value)}))"
             yield f"    if {' and '.join(when)}: {change}" if when else f"    {change}"
+        yield from self._amounts(behavior, bound) if behavior.amounts else ()
         yield f"    return {tuple_written(map(written, variables))}, changes"
         yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
+
+    def _amounts(self, behavior: Behavior, bound: set[str]) -> Iterator[str]:
+        """Yield the lines that change amounts, or return None where one would come to be what it can't be."""
+        quantities = {s.name: s.quantity for s in self.problem.domain.situations.values() if s.quantity}
+        self.constants |= {"changed": changed, "settled": settled, "quantities": quantities}
+        yield "    amounts = {}"
+        for effect in behavior.amounts:
+            inner, cells, key = set(bound), identifier("now", effect.situation), key_written(effect.arguments)
+            when = self.conjunction(effect.when, inner, behavior.kinds, behavior.name)
+            free = {t for t in (*effect.arguments, *terms_of(effect.amount)) if t.startswith("?")} - inner
+            if free:
+                raise DomainError(
+                    f"{behavior.name}: nothing determines {', '.join(sorted(free))}, which an effect names"
+                )
+            by = self.amount(effect.amount)
+            change = f"changed(amounts, {effect.situation!r}, {key}, {cells}[{key}], {effect.operation!r}, {by})"
+            yield f"    if {' and '.join([*when, f'{key} in {cells}'])}: {change}"
+        yield "    if not settled(amounts, quantities, changes): return None"
+
+    def amount(self, expression: Expression) -> str:
+        """Return an amount as a Python expression; what has none is `NOTHING`."""
+        match expression:
+            case Amount(situation, arguments):
+                self.constants["number"] = number
+                return f"number({identifier('now', situation)}.get({key_written(arguments)}))"
+            case Measure(relation, arguments):
+                rows = self.problem.relations.get(relation, ())
+                table = self.constant(("measure", relation), {row[:-1]: number(row[-1]) for row in rows})
+                return (
+                    f"{table}.get({tuple_written(map(written, arguments))}, {self.constant(('no', 'amount'), NOTHING)})"
+                )
+            case Calculation("/", left, right):
+                return f"{self.constant(('amounts', 'divided'), divided)}({self.amount(left)}, {self.amount(right)})"
+            case Calculation(sign, left, right):
+                return f"({self.amount(left)} {sign} {self.amount(right)})"
+            case constant:
+                return self.constant(("number", amount_written(constant)), constant)
 
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
@@ -202,6 +255,9 @@ class Writer:
             case AnyOf(alternatives, negated):
                 groups = [" and ".join(self.conjunction(g, set(bound), kinds, where)) or "True" for g in alternatives]
                 return ("not " if negated else "") + "(" + " or ".join(f"({g})" for g in groups) + ")"
+            case Comparison(one, sign, other, negated):
+                test = f"({self.amount(one)} {'==' if sign == '=' else sign} {self.amount(other)})"
+                return f"not {test}" if negated else test
 
     def satisfying(
         self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
@@ -278,7 +334,30 @@ class Writer:
         return name
 
 
-_COST = {ClassCondition: 0, EqualityCondition: 0, ValueCondition: 1, RelationCondition: 2, AnyOf: 3, Witness: 4}
+_COST: Mapping[type[Condition], int] = {
+    ClassCondition: 0,
+    EqualityCondition: 0,
+    ValueCondition: 1,
+    RelationCondition: 2,
+    Comparison: 3,
+    AnyOf: 4,
+    Witness: 5,
+}
+
+
+def changed(amounts: dict[Cell, Number], situation: str, key: Key, old: str, operation: str, by: Number) -> None:
+    """Change an amount, as earlier effects of the same behaviour left it."""
+    cell = situation, key
+    amounts[cell] = done(operation, amounts[cell] if cell in amounts else number(old), by)
+
+
+def settled(amounts: Mapping[Cell, Number], quantities: Mapping[str, Quantity], changes: list[Change]) -> bool:
+    """Add amounts to the changes; whether all are such as they can be."""
+    for (situation, key), amount in amounts.items():
+        if not quantities[situation].allows(amount):
+            return False
+        changes.append((situation, key, amount_written(amount)))
+    return True
 
 
 def ready_condition(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:

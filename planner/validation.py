@@ -12,16 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import groupby
 from operator import contains, itemgetter
 from typing import TypeAlias
 
 from planner.plan import Plan, Step
+from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, meets, terms_of, written
 from reasoner.symbols import (
     FALSE,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -39,6 +42,8 @@ Cell: TypeAlias = "tuple[str, Arguments]"
 Values: TypeAlias = "list[str]"
 """What the terms of some conditions stand for, by their places."""
 Test: TypeAlias = "Callable[[Facts, Values], bool]"
+Worth: TypeAlias = "Callable[[Facts, Values], Fraction | None]"
+"""What an amount comes to; None if it comes to nothing."""
 Candidates: TypeAlias = "Callable[[Facts, Values], Iterable[str]]"
 Change: TypeAlias = "tuple[str, Arguments, str]"
 
@@ -62,7 +67,7 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
     if check.carried_out(plan.steps, 0, (), "the plan"):
         for symbol, wanted in problem.goal.items():
             got = check.facts.value(symbol.situation, symbol.arguments) or FALSE
-            if got != wanted:
+            if not meets(got, wanted):
                 check.fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
     return check.faults
 
@@ -265,7 +270,28 @@ class Rules:
             about = key(inner)
             if facts.exists(situation, about):
                 found.append((situation, about, inner[value]))
-        return found
+        more = self.amounts(read, values, facts) if read.amounts else []
+        return None if more is None else found + more
+
+    def amounts(self, read: _Behavior, values: Values, facts: Facts) -> list[Change] | None:
+        """Return the amounts after a behaviour, each changed by what held before; None if one can't be what it would be."""
+        after: dict[Cell, Fraction | None] = {}
+        for when, situation, key, operation, amount in read.amounts:
+            inner = values.copy()
+            if not _hold(when, facts, inner) or (said := facts.value(situation, key(inner))) is None:
+                continue
+            cell = situation, key(inner)
+            by, old = amount(facts, inner), after.get(cell, Fraction(said))
+            if by is None or old is None:
+                after[cell] = None
+            else:
+                new = {"assign": by, "scale": old * by, "increase": old + by, "decrease": old - by}
+                after[cell] = new[operation]
+        for (situation, _), result in after.items():
+            quantity = self.problem.domain.situations[situation].quantity
+            if result is None or quantity is None or not quantity.allows(result):
+                return None
+        return [(*cell, written(result)) for cell, result in after.items() if result is not None]
 
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
@@ -304,6 +330,18 @@ class _Behavior:
             )
             # What becomes true wins, as in PDDL.
             for e in sorted(behavior.effects, key=lambda effect: effect.value != FALSE)
+        ]
+        self.amounts = [
+            (
+                reading.conjunction(e.when, set(bound), kinds),
+                e.situation,
+                reading.key(e.arguments),
+                e.operation,
+                reading.worth(e.amount),
+            )
+            for operations in (("assign",), ("scale",), ("increase", "decrease"))
+            for e in behavior.amounts
+            if e.operation in operations
         ]
         self.terms = tuple(reading.places)
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
@@ -408,6 +446,36 @@ class _Reading:
                 return related
         return lambda facts, values: self.problem.classes.get(kind, ())
 
+    def worth(self, expression: Expression) -> Worth:
+        """Return a function to the amount that an expression comes to."""
+        match expression:
+            case Amount(situation, arguments):
+                key = self.key(arguments)
+
+                def has(facts: Facts, values: Values) -> Fraction | None:
+                    said = facts.value(situation, key(values))
+                    return None if said is None else Fraction(said)
+
+                return has
+            case Measure(relation, arguments):
+                about = self.key(arguments)
+                numbers = {row[:-1]: Fraction(row[-1]) for row in self.problem.relations.get(relation, ())}
+                return lambda facts, values: numbers.get(about(values))
+            case Calculation(sign, one, other):
+                of_left, of_right = self.worth(one), self.worth(other)
+
+                def comes_to(facts: Facts, values: Values) -> Fraction | None:
+                    left, right = of_left(facts, values), of_right(facts, values)
+                    if left is None or right is None or (sign == "/" and not right):
+                        return None
+                    if sign == "/":
+                        return left / right
+                    return {"+": left + right, "-": left - right, "*": left * right}[sign]
+
+                return comes_to
+            case number:
+                return lambda facts, values: number
+
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
         """Return a condition as a test; what is chosen inside of it is forgotten."""
         match condition:
@@ -430,6 +498,14 @@ class _Reading:
             case AnyOf(alternatives, negated):
                 groups = [self.conjunction(group, set(bound), kinds) for group in alternatives]
                 return lambda facts, values: any(_hold(g, facts, values.copy()) for g in groups) is not negated
+            case Comparison(one, sign, other, negated):
+                of_left, of_right = self.worth(one), self.worth(other)
+
+                def compares(facts: Facts, values: Values) -> bool:
+                    left, right = of_left(facts, values), of_right(facts, values)
+                    return (left is not None and right is not None and COMPARING[sign](left, right)) is not negated
+
+                return compares
 
 
 def _hold(tests: Sequence[Test], facts: Facts, values: Values) -> bool:
@@ -458,6 +534,8 @@ def _plain(condition: Condition) -> set[str]:
             terms = {term}
         case EqualityCondition(left, right):
             terms = {left, right}
+        case Comparison(one, _, other):
+            terms = {*terms_of(one), *terms_of(other)}
         case _:
             terms = set()
     return {term for term in terms if term.startswith("?")}

@@ -18,10 +18,12 @@ quantified behaviour          ground action                              `Ground
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import prod
 from typing import TypeAlias
+
+from reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
 
 TRUE = "true"
 FALSE = "false"
@@ -61,7 +63,8 @@ class SituationType:
 
     `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
     value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
-    `level` on; `rest` is the value that a refinement must restore; `default` is assumed where a scene says nothing.
+    `level` on; `rest` is the value that a refinement must restore; `default` is assumed where a scene says nothing. With a
+    `quantity` the values are numbers (`reasoner.amounts`), and only those symbols exist that a scene gives one.
     """
 
     name: str
@@ -71,6 +74,7 @@ class SituationType:
     rest: str | None = None
     default: str | None = None
     boolean: bool = False
+    quantity: Quantity | None = None
 
 
 # ---------------------------------------------------------------------------------------------------------- conditions
@@ -137,7 +141,19 @@ class AnyOf:
     negated: bool = False
 
 
-Condition: TypeAlias = "ValueCondition | RelationCondition | ClassCondition | EqualityCondition | Witness | AnyOf"
+@dataclass(frozen=True)
+class Comparison:
+    """Two amounts compare as `operator` (a key of `reasoner.amounts.COMPARING`) says; what has no amount does so with none."""
+
+    left: Expression
+    operator: str
+    right: Expression
+    negated: bool = False
+
+
+Condition: TypeAlias = (
+    "ValueCondition | RelationCondition | ClassCondition | EqualityCondition | Witness | AnyOf | Comparison"
+)
 
 
 @dataclass(frozen=True)
@@ -147,6 +163,20 @@ class ValueEffect:
     situation: str
     arguments: tuple[str, ...]
     value: str
+    when: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True)
+class AmountEffect:
+    """The amount of ``situation(arguments)`` is assigned, increased, decreased or scaled, if all of `when` held before.
+
+    What it is changed by is worked out in the situation before; changes of one symbol add up.
+    """
+
+    situation: str
+    arguments: tuple[str, ...]
+    operation: str
+    amount: Expression
     when: tuple[Condition, ...] = ()
 
 
@@ -166,7 +196,8 @@ class Behavior:
     """A lifted behaviour.
 
     Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
-    binding makes both false and true is true, as in PDDL.
+    binding makes both false and true is true, as in PDDL. It can't be done where an amount that it changes would come to be
+    one that its situation type doesn't allow.
     """
 
     name: str
@@ -176,10 +207,25 @@ class Behavior:
     preconditions: tuple[Condition, ...] = ()
     effects: tuple[ValueEffect, ...] = ()
     cost: float = 1.0
+    amounts: tuple[AmountEffect, ...] = ()
 
     def __post_init__(self) -> None:
         """Put the effects in order."""
         object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda effect: effect.value != FALSE)))
+        if self.amounts:
+            ordered = sorted(self.amounts, key=lambda effect: OPERATIONS.index(effect.operation))
+            object.__setattr__(self, "amounts", tuple(ordered))
+
+    @cached_property
+    def changes(self) -> frozenset[str]:
+        """The situation types that it changes."""
+        return frozenset([e.situation for e in self.effects] + [e.situation for e in self.amounts])
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Its preconditions, and the conditions of its effects."""
+        whens = [e.when for e in self.effects] + [e.when for e in self.amounts]
+        return (*self.preconditions, *(condition for when in whens for condition in when))
 
     @cached_property
     def kinds(self) -> Mapping[str, str]:
@@ -328,3 +374,30 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
             return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
         case AnyOf(alternatives, negated):
             return AnyOf(tuple(tuple(substituted(c, terms) for c in group) for group in alternatives), negated)
+        case Comparison(one, sign, other, negated):
+            return Comparison(put_in(one, terms), sign, put_in(other, terms), negated)
+
+
+def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
+    """Return what a behaviour asks because an amount that it changes has bounds, as far as conditions can say that.
+
+    What must not be is said, since an effect on what has no amount does nothing.
+    """
+    found: list[Condition] = []
+    changed = [effect.situation for effect in behavior.amounts]
+    for effect in behavior.amounts:
+        quantity, before = situations[effect.situation].quantity, Amount(effect.situation, effect.arguments)
+        if quantity is None or changed.count(effect.situation) > 1:
+            continue
+        sign = {"increase": "+", "decrease": "-", "scale": "*"}.get(effect.operation)
+        if sign == "*" and situations_in(effect.amount):
+            continue
+        after = effect.amount if sign is None else Calculation(sign, before, effect.amount)
+        there = [Comparison(before, "=", before)] if sign is None else []
+        for wrong, limit in (("<", quantity.least), (">", quantity.most)):
+            if limit is not None:
+                refused = (*effect.when, *there, Comparison(after, wrong, limit))
+                found.append(
+                    replace(refused[0], negated=True) if len(refused) == 1 else AnyOf((refused,), negated=True)
+                )
+    return tuple(found)

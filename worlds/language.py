@@ -6,15 +6,19 @@ something that has none), special values (`nowhere`), and variables that only a 
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import product
 from random import Random
 
+from reasoner.amounts import COMPARING, OPERATIONS, Amount, Calculation, Expression, Measure, Quantity, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     Domain,
     EqualityCondition,
@@ -42,6 +46,13 @@ SITUATIONS = {
     "FULL": SituationType("FULL", ("Thing",), "Truth", boolean=True),
     "NEAR": SituationType("NEAR", ("Cup", "Shelf"), "Truth", boolean=True),
 }
+AMOUNTS = {
+    "SERVINGS": SituationType("SERVINGS", ("Thing",), "SERVINGS", quantity=Quantity("serving", least=Fraction(0))),
+    "WEIGHT": SituationType(
+        "WEIGHT", ("Cup", "Shelf"), "WEIGHT", quantity=Quantity("", True, Fraction(-2), Fraction(4))
+    ),
+}
+MEASURES = {"size": ("Thing",), "way": ("Cup", "Shelf")}
 RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 
@@ -69,12 +80,17 @@ class Writer:
             value = {TRUE: FALSE, FALSE: TRUE}.get(one.value) or rng.choice(CLASSES[SITUATIONS[one.situation].range])
             own = [t for t in (*one.arguments, one.value) if t.startswith("?") and t not in bound]
             effects.append(ValueEffect(one.situation, one.arguments, value, one.when if own else ()))
+        amounts = []
+        for _ in range(rng.choice((0, 0, 1, 1, 2, 3))):
+            inner = list(bound)
+            when = self.conditions(inner, 1, 1) if rng.random() < 0.3 else []
+            amounts.append(self.amount_effect(inner, tuple(when)))
         rng.shuffle(conditions)
         rng.shuffle(effects)
         terms = [Parameter(term, self.kinds[term]) for term in self.kinds]
         return Behavior(
             name, level, tuple(t for t in terms if t.name in parameters), tuple(t for t in terms if t.name not in parameters),
-            tuple(conditions), tuple(effects),
+            tuple(conditions), tuple(effects), amounts=tuple(amounts),
         )  # fmt: skip
 
     def fresh(self, kind: str) -> str:
@@ -95,7 +111,7 @@ class Writer:
         """Return a random condition, with others nested in it to some depth; `bound` grows by what it determines."""
         rng = self.rng
         negated = rng.random() < 0.4
-        match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any")):
+        match rng.choice(("value", "value", "binding", "relation", "class", "equal", "witness", "any", "amount")):
             case "binding":
                 situation = rng.choice(("PLACE", "COLOR"))
                 arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
@@ -109,6 +125,8 @@ class Writer:
                 return ClassCondition(self.term(bound), rng.choice(("Cup", "Shelf", "COLOR")), negated)
             case "equal":
                 return EqualityCondition(self.term(bound), self.term(bound), negated)
+            case "amount":
+                return Comparison(self.amount(bound, 1), rng.choice(sorted(COMPARING)), self.amount(bound, 1), negated)
             case "witness" if depth:
                 variable = self.fresh(kind := rng.choice(("Cup", "Shelf", "Thing")))
                 del self.kinds[variable]  # it isn't one of the behaviour's
@@ -120,6 +138,31 @@ class Writer:
         situation = rng.choice(sorted(SITUATIONS))
         arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
         return ValueCondition(situation, arguments, rng.choice(CLASSES[SITUATIONS[situation].range]), negated)
+
+    def amount(self, bound: list[str], depth: int) -> Expression:
+        """Return an amount of terms that are bound, sometimes one that isn't there; linear in what changes."""
+        rng = self.rng
+        match rng.choice(
+            ("constant", "amount", "amount", "measure", "sum", "product") if depth else ("constant", "amount")
+        ):
+            case "amount":
+                situation = rng.choice(sorted(AMOUNTS))
+                return Amount(situation, tuple(self.term(bound) for _ in AMOUNTS[situation].arguments))
+            case "measure":
+                relation = rng.choice(sorted(MEASURES))
+                return Measure(relation, tuple(self.term(bound) for _ in MEASURES[relation]))
+            case "sum":
+                return Calculation(rng.choice("+-"), self.amount(bound, depth - 1), self.amount(bound, depth - 1))
+            case "product":
+                size = rng.choice((Fraction(2), Fraction(-1, 2), Fraction(0), Measure("size", (self.term(bound),))))
+                return Calculation(rng.choice("*/"), self.amount(bound, depth - 1), size)
+        return Fraction(rng.randint(-2, 6), rng.choice((1, 1, 2, 3)))
+
+    def amount_effect(self, bound: list[str], when: tuple[Condition, ...]) -> AmountEffect:
+        """Return a random effect on an amount."""
+        situation = self.rng.choice(sorted(AMOUNTS))
+        arguments = tuple(self.term(bound) for _ in AMOUNTS[situation].arguments)
+        return AmountEffect(situation, arguments, self.rng.choice(OPERATIONS), self.amount(bound, 1), when)
 
     def effect(self, bound: list[str], when: tuple[Condition, ...]) -> ValueEffect:
         """Return a random effect on terms that are bound."""
@@ -146,4 +189,15 @@ def language(seed: int, behaviors: int = 2) -> Problem:
             value = rng.choice(CLASSES[situation.range])
             if value != FALSE:
                 initial[Symbol(situation.name, arguments)] = value
-    return Problem("random", Domain(SITUATIONS, {b.name: b for b in made}), CLASSES, relations, initial, {})
+    for name, kinds in (*((s.name, s.arguments) for s in AMOUNTS.values()), *MEASURES.items()):
+        rows = {
+            row: written(Fraction(rng.randint(0, 4), rng.choice((1, 2)) if name in ("SERVINGS", "size") else 1))
+            for row in product(*(CLASSES[kind] for kind in kinds))
+            if rng.random() < 0.8
+        }
+        if name in AMOUNTS:
+            initial |= {Symbol(name, row): value for row, value in rows.items()}
+        else:
+            relations[name] = frozenset((*row, value) for row, value in rows.items())
+    domain = Domain(SITUATIONS | AMOUNTS, {b.name: b for b in made})
+    return Problem("random", domain, CLASSES, relations, initial, {})

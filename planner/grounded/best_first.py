@@ -25,6 +25,7 @@ from typing import TypeAlias
 
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate
+from planner.grounded.hff_amounts import heuristic as with_amounts
 from planner.grounded.hff_dense import effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
@@ -120,10 +121,14 @@ def search(
     counts = Counts()
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
-    work, by_arrays = effort(task)
-    arrays = evaluate is None and by_arrays < work
-    evaluate = evaluate or automatic(task)
-    often, quick = (dense(task), by_arrays) if arrays else (evaluate, work)
+    if task.amounts is not None:
+        evaluate = often = evaluate or with_amounts(task)
+        work = quick = len(task.needs.items) + len(task.adds.items)
+    else:
+        work, by_arrays = effort(task)
+        arrays = evaluate is None and by_arrays < work
+        evaluate = evaluate or automatic(task)
+        often, quick = (dense(task), by_arrays) if arrays else (evaluate, work)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     tree = successors(task)
@@ -225,7 +230,7 @@ def _best_first(
             ranks.append((marks & ~met[state]).bit_count() + (goal & met[state] & ~state).bit_count())
         number += 1
         possible = set(applicable)
-        preferred = [operator for operator in relaxed_plan if operator in possible]
+        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
         rest = sorted(possible.difference(preferred), reverse=True)
         for i, rank in enumerate(ranks):
             if applicable:
@@ -257,7 +262,18 @@ def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
                     found[bit][owner] = None
         return found
 
-    set_by = cache(lambda operator: reduce(or_, (set_ for _, _, set_ in task.known(operator)[1]), 0))
+    @cache
+    def set_by(operator: int) -> int:
+        found = reduce(or_, (set_ for _, _, set_ in task.known(operator)[1]), 0)
+        return found if task.amounts is None else found | task.amounts.compared & moved()[operator]
+
+    @cache
+    def moved() -> list[int]:
+        found = [0] * len(task)
+        for bits, owner in zip(task.adds.lists(), task.owners, strict=True):
+            if owner >= 0:
+                found[owner] |= sum(1 << bit for bit in bits)
+        return found
 
     def replaced(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
         needed = [task.goal]  # by the goal and, from the last on, by the operators behind

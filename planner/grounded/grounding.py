@@ -21,6 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from planner.grounded.amounts import Amounts, Linear, Move, pushes
 from planner.grounded.joins import Ints, Table
 from planner.grounded.reachability import Flags, Formulas, Literals, Reached
 from planner.grounded.schemas import Schema
@@ -162,6 +163,8 @@ class _Assembly:
                     self.constants[symbol] = value
                 else:
                     self.facts.append(Fact(symbol, value))
+        amounts = reached.amounts
+        self.constants |= {symbol: amounts.text(symbol) for symbol in amounts.now if symbol not in amounts.place}
         self.formulas.size = len(self.facts)
 
     def _true_at_first(self, name: str) -> int:
@@ -214,9 +217,7 @@ class _Assembly:
         return rows[keep], (new[row[held]], bit[held])
 
     def _goal(self, goal: State) -> Literals:
-        return self.formulas.all_of(
-            self.formulas.value(symbol.situation, symbol.arguments, value, False) for symbol, value in goal.items()
-        )
+        return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
     def _build(
         self,
@@ -248,7 +249,8 @@ class _Assembly:
             for symbol, bit in zip(self.symbol_of[name].tolist(), bits.tolist(), strict=True):
                 if bit >= 0:
                     symbol_bits[symbol].append(bit)
-        add = self._adds(effects, need, symbol_bits, count)
+        moves = self._moves(rows, first)
+        add = self._adds(effects, need, symbol_bits, count, self._pushed(moves))
         reached.check_time()
         by_owner = np.lexsort((effects[:, 1], owner[effects[:, 0]])) if len(effects) else np.empty(0, np.int64)
         ordered = effects[by_owner]
@@ -261,6 +263,33 @@ class _Assembly:
             for symbol, bits in symbol_bits.items()
         }
         initial = sum(1 << bit for bit in self._initial_bits())
+        table = reached.amounts
+        rows_of = defaultdict[int, list[int]](list)
+        for relaxed in moves:
+            rows_of[int(owner[relaxed])].append(relaxed)
+
+        def moved(operator: int) -> tuple[Move, ...]:
+            precondition, found = set(need[operator]), list[Move]()
+            for relaxed in rows_of.get(operator, ()):
+                when = 0 if relaxed == operator else sum(1 << b for b in need[relaxed] if b not in precondition)
+                found += [replace(move, when=when) for move in moves[relaxed]]
+            return tuple(sorted(found, key=lambda move: move.position))
+
+        quantities = [reached.problem.domain.situations[symbol.situation].quantity for symbol in table.place]
+        amounts = (
+            Amounts(
+                tuple(table.place),
+                table.first,
+                [quantity for quantity in quantities if quantity is not None],
+                table.bits,
+                formulas.size,
+                moved,
+            )
+            if table.place
+            else None
+        )
+        if amounts is not None:
+            initial = amounts.begun(initial)
 
         def change(operator: int) -> tuple[int, tuple[Change, ...]]:
             precondition = sum(1 << bit for bit in need[operator])
@@ -321,6 +350,7 @@ class _Assembly:
             derived=derived,
             change=change,
             describe=describe,
+            amounts=amounts,
         )
         return task if not derived else _completed(task)
 
@@ -358,10 +388,47 @@ class _Assembly:
                 parts.append(np.stack([at + begin, np.full(len(at), position), symbol, bit], axis=1))
         return np.concatenate(parts) if parts else np.empty((0, 4), np.int64)
 
-    def _adds(self, effects: Ints, need: Grouped, symbol_bits: Mapping[int, Sequence[int]], count: int) -> Grouped:
+    def _moves(self, rows: Mapping[int, Ints], first: Mapping[int, int]) -> dict[int, list[Move]]:
+        """Return the changes of amounts by each relaxed operator that has some."""
+        names, table = self.reached.individuals, self.reached.amounts
+        found = defaultdict[int, list[Move]](list)
+        for i, begin in first.items():
+            schema = self.reached.schemas[i]
+            for number, row in enumerate(rows[i].tolist() if schema.amounts else ()):
+                terms = dict(zip(schema.terms, (names[n] for n in row), strict=True))
+                for position, effect in schema.amounts:
+                    symbol = Symbol(effect.situation, tuple(terms.get(a, a) for a in effect.arguments))
+                    if symbol in table.place:
+                        by = table.linear(effect.amount, terms)
+                        found[begin + number].append(Move(position, 0, table.place[symbol], effect.operation, by))
+        return found
+
+    def _pushed(self, moves: Mapping[int, Sequence[Move]]) -> tuple[Ints, Ints]:
+        """Return pairs of a relaxed operator and the bit of a comparison that it may bring about."""
+        by_place = defaultdict[int, list[tuple[Linear, str]]](list)
+        for difference, sign in self.reached.amounts.bits:
+            for place, _ in difference.terms:
+                by_place[place].append((difference, sign))
+        pairs = [
+            (relaxed, self.reached.amounts.bits[key])
+            for relaxed, found in moves.items()
+            for key in dict.fromkeys(key for move in found for key in by_place.get(move.place, ()))
+            if (push := pushes(found, key[0])) is None or push > 0 or (push and key[1] == "=")
+        ]
+        both = np.array(pairs, np.int64).reshape(-1, 2)
+        return both[:, 0], both[:, 1]
+
+    def _adds(
+        self,
+        effects: Ints,
+        need: Grouped,
+        symbol_bits: Mapping[int, Sequence[int]],
+        count: int,
+        pushed: tuple[Ints, Ints],
+    ) -> Grouped:
         """Return the bits that each relaxed operator may set: complements only of values that the symbol may have had."""
         positive = effects[:, 3] >= 0
-        pairs = [(effects[positive, 0], effects[positive, 3])]
+        pairs = [(effects[positive, 0], effects[positive, 3]), pushed]
         complements = self.formulas.complements
         if complements:
             symbol_of = np.full(self.formulas.size, -1)

@@ -59,7 +59,8 @@ def by_novelty(
     plain: dict[int, tuple[int, int] | None] = {}
     seen: Seen = {task.initial: (task.initial, ())}
     most = MOST_BYTES // (STATE_BYTES + task.size // 4)
-    known: defaultdict[tuple[int, int], int] = defaultdict(int)  # of each distance, the facts that its states had
+    above = -1 << task.size if task.amounts else 0  # where the number of the amounts is, which is no fact
+    known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # of each distance, the facts of its states
     marks = marked() & ~(task.initial | goal) if marked else 0
     child = CHILD + task.size // 50
     number, step = 0, -1 if marked else 1
@@ -143,7 +144,7 @@ def landmarks(task: Task) -> int:
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:
     """Return what an operator leaves of a state, and what it sets; None if that depends on the state."""
     changes = task.known(operator)[1]
-    if task.barred:
+    if task.barred or (task.amounts is not None and task.amounts.moves(operator)):
         return None
     if task.derived or len(changes) != 1 or changes[0][0]:
         return (-1, 0) if not changes else None

@@ -46,8 +46,10 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     deadline : float, optional
         On the clock of `time.perf_counter`.
     """
-    windows = _Windows(task, work, deadline)
     best = shortened(task, plan, deadline)
+    if task.amounts is not None:
+        return best  # what a window leaves of an amount isn't told by bits
+    windows = _Windows(task, work, deadline)
     while True:
         before = len(best)
         for size in SIZES:

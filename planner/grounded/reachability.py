@@ -11,15 +11,18 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.grounded.amounts import AmountTable
 from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
 from planner.language import mentions
 from planner.plan import OutOfTimeError, TooLargeError
+from reasoner.amounts import Amount, bounds
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -53,10 +56,12 @@ class Reached:
 
     def __init__(self, problem: Problem, level: int, initial: State, most: int, deadline: float | None) -> None:
         self.problem, self.level, self.most, self.deadline = problem, level, most, deadline
-        self.situations = {s.name: s for s in problem.domain.situations.values() if s.level <= level}
+        known = (s for s in problem.domain.situations.values() if s.level <= level and s.quantity is None)
+        self.situations = {s.name: s for s in known}
+        self.amounts = AmountTable(problem, level, initial)
         self.initial = {symbol: value for symbol, value in initial.items() if symbol.situation in self.situations}
         behaviors = problem.domain.at_level(level)
-        changed = frozenset(effect.situation for behavior in behaviors for effect in behavior.effects)
+        changed = frozenset[str]().union(*(behavior.changes for behavior in behaviors))
         situations, members = problem.domain.situations, problem.members
         self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
         self.individuals = tuple(dict.fromkeys(self._individuals()))
@@ -286,7 +291,7 @@ class Reached:
         """Return whether a fact is reachable if nothing ever becomes false."""
         situation = self.situations.get(symbol.situation)
         if situation is None:
-            return False
+            return symbol in self.amounts.now
         if situation.boolean and value == FALSE:
             return True
         return self.find(situation, symbol.arguments, value) >= 0
@@ -349,6 +354,10 @@ class Formulas:
                 return self._any(groups, inner, {**kinds, variable: kind}, flipped is not negated)
             case AnyOf(alternatives, flipped):
                 return self._any(alternatives, terms, kinds, flipped is not negated)
+            case Comparison(left, sign, right, flipped):
+                amounts = self.reached.amounts
+                one, other = amounts.linear(left, terms), amounts.linear(right, terms)
+                return self.any_of(amounts.comparison(one, sign, other, flipped is not negated, self.fresh))
         return () if holds is not (flipped is not negated) else None
 
     def _any(
@@ -435,9 +444,20 @@ class Formulas:
     def complement(self, bit: int) -> int:
         """Return the bit that says that a fact doesn't hold."""
         if bit not in self.complements:
-            self.complements[bit] = self.size
-            self.size += 1
+            self.complements[bit] = self.fresh()
         return self.complements[bit]
+
+    def fresh(self) -> int:
+        """Return a bit that nothing has yet."""
+        self.size += 1
+        return self.size - 1
+
+    def wanted(self, symbol: Symbol, value: str) -> Literals:
+        """Return what must hold for a symbol to be as a goal wants it."""
+        if self.reached.problem.domain.situations[symbol.situation].quantity is None:
+            return self.value(symbol.situation, symbol.arguments, value, False)
+        amount = Amount(symbol.situation, symbol.arguments)
+        return self.all_of(self.condition(Comparison(amount, sign, limit), {}, {}) for sign, limit in bounds(value))
 
     def all_of(self, parts: Iterable[Literals]) -> Literals:
         """Return the conjunction."""
@@ -460,6 +480,5 @@ class Formulas:
         if len(alternatives) < 2:
             return alternatives[0] if alternatives else None
         if alternatives not in self.derived:
-            self.derived[alternatives] = self.size
-            self.size += 1
+            self.derived[alternatives] = self.fresh()
         return (self.derived[alternatives],)

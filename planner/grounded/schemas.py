@@ -15,18 +15,22 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from planner.language import DomainError, is_variable, mentions, terms, walk
+from reasoner.amounts import put_in, situations_in, terms_of
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     RelationCondition,
     SituationType,
     ValueCondition,
     ValueEffect,
     Witness,
+    allowed,
     substituted,
 )
 
@@ -46,7 +50,7 @@ class Schema:
 
     `terms` are what tells one operator from another; other variables are joined over and dropped. A conditional
     effect has the terms of its behaviour first. `effects` are pairs of position and effect, in the order in which
-    they are made.
+    they are made; so are `amounts`.
     """
 
     behavior: Behavior
@@ -57,6 +61,7 @@ class Schema:
     kinds: Mapping[str, str]
     effects: tuple[tuple[int, ValueEffect], ...]
     conditional: bool = False
+    amounts: tuple[tuple[int, AmountEffect], ...] = ()
 
 
 def schemas(
@@ -82,19 +87,31 @@ def schemas(
     """
     kinds = dict(behavior.kinds)
     parameters = tuple(parameter.name for parameter in behavior.parameters)
-    effects = list(enumerate(behavior.effects))
+    preconditions = (*behavior.preconditions, *allowed(behavior, situations))
+    effects, amounts = list(enumerate(behavior.effects)), list(enumerate(behavior.amounts))
     compile_ = _Compiler(situations, changed, members, kinds)
-    base = compile_.schema(behavior, parameters, behavior.preconditions, tuple(e for e in effects if not e[1].when))
+    base = compile_.schema(
+        behavior,
+        parameters,
+        preconditions,
+        tuple(e for e in effects if not e[1].when),
+        amounts=tuple(a for a in amounts if not a[1].when),
+    )
     found = [base]
-    for position, effect in effects:
+    both: list[tuple[int, ValueEffect | AmountEffect]] = [*effects, *amounts]
+    for position, effect in both:
         if effect.when:
             own = set().union(*map(mentions, effect.when)) - set(base.terms)
             names = {name: f"?*{name[1:]}" for name in own}  # not those that a precondition has of the same name
             compile_.kinds |= {names[name]: kinds[name] for name in sorted(own)}
-            conditions = (*behavior.preconditions, *(substituted(c, names) for c in effect.when))
+            conditions = (*preconditions, *(substituted(c, names) for c in effect.when))
             arguments = tuple(names.get(a, a) for a in effect.arguments)
-            renamed = replace(effect, arguments=arguments, value=names.get(effect.value, effect.value))
-            found.append(compile_.schema(behavior, base.terms, conditions, ((position, renamed),), conditional=True))
+            if isinstance(effect, AmountEffect):
+                change = replace(effect, arguments=arguments, amount=put_in(effect.amount, names))
+                found.append(compile_.schema(behavior, base.terms, conditions, (), True, ((position, change),)))
+            else:
+                renamed = replace(effect, arguments=arguments, value=names.get(effect.value, effect.value))
+                found.append(compile_.schema(behavior, base.terms, conditions, ((position, renamed),), True))
     return found
 
 
@@ -112,6 +129,7 @@ class _Compiler:
         conditions: Sequence[Condition],
         effects: tuple[tuple[int, ValueEffect], ...],
         conditional: bool = False,
+        amounts: tuple[tuple[int, AmountEffect], ...] = (),
     ) -> Schema:
         kinds, fresh = dict(self.kinds), count()
         plain = [c for c in conditions if not isinstance(c, Witness | AnyOf)]
@@ -128,16 +146,20 @@ class _Compiler:
             for name in filter(is_variable, terms(part)):
                 if name not in bound:
                     raise DomainError(f"{behavior.name}: nothing determines {name}; add a value condition that does")
-        for _, effect in effects:
-            for name in (*effect.arguments, effect.value):
+        named_by = [(*effect.arguments, effect.value) for _, effect in effects]
+        named_by += [(*effect.arguments, *terms_of(effect.amount)) for _, effect in amounts]
+        for names in named_by:
+            for name in names:
                 if is_variable(name) and name not in bound:
                     raise DomainError(f"{behavior.name}: nothing determines {name}, which an effect names")
         used = {t for atom in atoms if atom.fluent for t in atom.terms}
         used |= {t for part in residue for c in walk(part) for t in terms(c) if is_variable(t)}
-        used |= {t for _, effect in effects for t in (*effect.arguments, effect.value)}
+        used |= {t for names in named_by for t in names}
         declared = {*self.kinds}
         named = [*first, *(name for name in bound if name not in first and (name in used or name in declared))]
-        return Schema(behavior, tuple(named), tuple(atoms), tuple(filters), tuple(residue), kinds, effects, conditional)
+        return Schema(
+            behavior, tuple(named), tuple(atoms), tuple(filters), tuple(residue), kinds, effects, conditional, amounts
+        )
 
     def _flat(
         self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
@@ -203,7 +225,12 @@ class _Compiler:
                 yield Atom(("class", kind), (term,))
 
     def _fluent(self, condition: Condition) -> bool:
-        return any(isinstance(c, ValueCondition) and c.situation in self.changed for c in walk(condition))
+        for c in walk(condition):
+            if isinstance(c, ValueCondition) and c.situation in self.changed:
+                return True
+            if isinstance(c, Comparison) and (situations_in(c.left) | situations_in(c.right)) & self.changed:
+                return True
+        return False
 
 
 def plain_variables(group: Sequence[Condition]) -> set[str]:

@@ -8,6 +8,7 @@ a fact that must not hold       a bit of its own, its complement, where some con
 `AnyOf`, a negated `Witness`    a derived bit, where static knowledge doesn't decide it
 `Behavior` with all its terms   an operator
 conditional effect              a step of an operator, and a relaxed operator of its own
+`Comparison`                    a bit that follows from the amounts (`planner.grounded.amounts`)
 ==============================  =================================================================
 """
 
@@ -17,6 +18,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from planner.grounded.amounts import Amounts
 from planner.grounded.joins import Ints
 from planner.plan import Step
 from reasoner.symbols import FALSE, Fact, Problem, Symbol
@@ -73,6 +75,8 @@ class Task:
         To its precondition and its changes, in the order in which they are made.
     describe : function of an operator
         To its behaviour, arguments and bindings.
+    amounts : Amounts, optional
+        Where some operator changes amounts.
     barred : set of (state, operator)
         What isn't to be done where: steps that turned out not to be refinable there.
     """
@@ -92,6 +96,7 @@ class Task:
     derived: tuple[tuple[int, tuple[int, ...]], ...]
     change: Callable[[int], tuple[int, tuple[Change, ...]]]
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
+    amounts: Amounts | None = None
     barred: set[tuple[int, int]] = field(default_factory=set, repr=False)
     _changes: dict[int, tuple[int, tuple[Change, ...]]] = field(default_factory=dict, repr=False)
 
@@ -108,6 +113,11 @@ class Task:
         for when, cleared, set_ in changes:
             if state & when == when:
                 after = after & ~cleared | set_
+        if self.amounts is not None:
+            moved = self.amounts.applied(state, after, operator)
+            if moved is None:
+                return None
+            after = moved
         return self.completed(after) if self.derived else after
 
     def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
@@ -135,6 +145,8 @@ class Task:
                 found[fact.symbol] = fact.value
             elif situations[fact.symbol.situation].boolean:
                 found[fact.symbol] = FALSE
+        if self.amounts is not None:
+            found |= {fact.symbol: fact.value for fact in self.amounts.facts(state)}
         return found
 
     def steps(self, plan: Sequence[int]) -> tuple[Step, ...]:

@@ -9,6 +9,7 @@ condition                  pattern
 `ValueCondition`           ``GRAPH <urn:confab:graph:situation> { ?cup k:location ?l }``
 `RelationCondition`        ``?hand k:canReach ?l``, static, on what is asserted and inferred
 `ClassCondition`           ``?cup a/rdfs:subClassOf* k:Cup``
+`Comparison`               ``GRAPH … { ?bottle k:servings ?n1 } FILTER(?n1 >= 2)``
 `Witness`, `AnyOf`         ``FILTER EXISTS { … }``, joined by ``||``
 negated                    ``FILTER NOT EXISTS { … }``
 =========================  ===================================================================
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 
 import pyoxigraph as ox
 
+from reasoner.amounts import Amount, Calculation, Expression, Measure
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.reading.problem import Reading
 from reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
@@ -30,6 +32,7 @@ from reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Fact,
@@ -39,6 +42,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    allowed,
 )
 from reasoner.vocabulary import ARGUMENTS, RDF
 
@@ -143,6 +147,7 @@ class _Writer:
     def __init__(self, graph: KnowledgeGraph, reading: Reading) -> None:
         self.graph, self.reading = graph, reading
         self.properties = dict(_pairs(graph, VALUE_PROPERTIES))
+        self.numbers = 0  # amounts that were named so far
         self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
 
     def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
@@ -172,7 +177,7 @@ class _Writer:
     def query(self, behavior: Behavior, when: Sequence[Condition] = ()) -> str:
         names = self.names(behavior, when)
         kinds = behavior.kinds
-        conditions = (*behavior.preconditions, *when)
+        conditions = (*behavior.preconditions, *allowed(behavior, self.reading.problem.domain.situations), *when)
         lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]
         head = f"# {behavior.name}: where its preconditions hold in the graph {SITUATION}\n"
@@ -220,6 +225,33 @@ class _Writer:
             case AnyOf(alternatives):
                 groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)
                 yield "FILTER(" + " || ".join(f"EXISTS {{ {group} }}" for group in groups) + ")"
+            case Comparison(left, sign, right):
+                patterns: list[str] = []
+                test = f"FILTER({self.amount(left, patterns)} {sign} {self.amount(right, patterns)})"
+                yield from (*patterns, test)
+
+    def amount(self, expression: Expression, patterns: list[str]) -> str:
+        """Return an amount as an expression, and add the patterns that bind what is in it."""
+        match expression:
+            case Calculation(sign, left, right):
+                return f"({self.amount(left, patterns)} {sign} {self.amount(right, patterns)})"
+            case Amount(situation, arguments):
+                iri, where = self.reading.names.iri(situation), f"GRAPH <{SITUATION}> "
+                said = f"[] :situationType <{iri}> ; "
+                prop = self.properties.get(iri)
+            case Measure(relation, arguments):
+                prop, where = self.reading.names.iri(relation), ""
+                said = f"[] a :SituatedObjectInstance ; :relation <{prop}> ; "
+            case number:
+                return f"({number.numerator}.0 / {number.denominator})"
+        self.numbers += 1
+        name, terms = f"?amount_{self.numbers}", [self.term(argument) for argument in arguments]
+        if prop and len(terms) == 1:
+            patterns.append(f"{where}{{ {terms[0]} <{prop}> {name} }}")
+        else:
+            parts = " ; ".join(f":{part} {term}" for part, term in zip(ARGUMENTS, terms, strict=False))
+            patterns.append(f"{where}{{ {said}{parts} ; :amount {name} }}")
+        return name
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str) -> str:
         if value == FALSE:

@@ -19,19 +19,34 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import chain, product
 
 import pyoxigraph as ox
 
+from reasoner.amounts import (
+    COMPARING,
+    OPERATIONS,
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+    Quantity,
+    bounds_written,
+    inside,
+    written,
+)
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Term, text
 from reasoner.names import Names, local_name, nearest
 from reasoner.reading.definitions import EXPRESSIONS, Definitions
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
+    Comparison,
     Condition,
     Domain,
     EqualityCondition,
@@ -44,7 +59,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, TYPE
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, TYPE
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
@@ -57,6 +72,7 @@ KINDS = (
     "Level",
     "Task",
     "Relation",
+    "Calculation",
 )  # of the schema's nodes
 
 SCHEMA = f"""
@@ -69,6 +85,8 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   UNION {{ ?node :hasSituationType ?value . BIND("owner" AS ?part) BIND(:hasSituationType AS ?property) }}
   UNION {{ ?node :valueProperty ?property . FILTER NOT EXISTS {{ ?property a owl:FunctionalProperty }}
     BIND("pair" AS ?part) BIND(?property AS ?value) }}
+  UNION {{ ?node :valueProperty/rdfs:range ?value . FILTER(?value IN (xsd:integer, xsd:decimal))
+    BIND("range" AS ?part) BIND(rdfs:range AS ?property) }}
   UNION {{ ?node :fromLevel ?value . BIND("level" AS ?part) BIND(:fromLevel AS ?property) }}
   UNION {{ ?node a :SituatedObjectInstance ; ?property ?value .
     FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
@@ -99,7 +117,13 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
 }"""
 
 DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost"))
-"""What the core says of its nodes in numbers and truth values; all else that it says leads to other nodes."""
+DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
+DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
+"""What the core says of its nodes in numbers, signs and truth values; all else that it says leads to other nodes."""
+SIGNS = ("+", "-", "*", "/")
+DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})?")
+BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
+"""What is wanted of an amount, as people write it."""
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
 HIGHEST_NUMBER = 10**9
@@ -133,7 +157,8 @@ class Schema:
     """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
 
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
-    property isn't functional; `tuples` tells whether some facts are nodes of their own, and `facts` has those about nobody;
+    property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
+    facts are nodes of their own, and `facts` has those about nobody;
     `expressions` are the definitions of classes, `ontologies` the IRIs of what was loaded.
     """
 
@@ -141,6 +166,7 @@ class Schema:
     supers: Mapping[str, Sequence[str]]
     owners: Sequence[tuple[str, str]]
     pairs: frozenset[str]
+    whole: frozenset[str]
     from_levels: Mapping[str, int]
     facts: Mapping[str, Node]
     tuples: bool
@@ -155,6 +181,12 @@ class Schema:
             for kind in node[TYPE]:
                 found[kind].append(iri)
         return found
+
+    @cached_property
+    def numbers(self) -> frozenset[str]:
+        """The properties that lead to numbers: value properties of amounts, and relations that give one."""
+        amounts = {p for iri in self.of_kind("Amount") for p in self.nodes[iri].get(CORE + "valueProperty", ())}
+        return frozenset(amounts.union(self.by_kind.get(OWL + "DatatypeProperty", ())))
 
     def of_kind(self, *kinds: str) -> list[str]:
         """Return the nodes of some classes of the core."""
@@ -178,9 +210,9 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     members = [
         (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
     ]
-    facts = [link(row) for row in graph.select(FACTS, SCENE)]
-    tuples = _nodes(_core_triple(row) for row in graph.select(TUPLES, SCENE))
     schema = read_schema(graph) if schema is None else schema
+    facts = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
+    tuples = _nodes(_core_triple(row) for row in graph.select(TUPLES, SCENE))
     return reading_of(graph.scene, frame(schema, members), facts, tuples)
 
 
@@ -193,7 +225,9 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         nodes=_nodes(parts["node"]),
         supers=_superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
         owners=sorted((kind, situation) for kind, _, situation in parts["owner"]),
-        pairs=frozenset(situation for situation, _, _ in parts["pair"]),
+        pairs=frozenset(situation for situation, _, _ in parts["pair"])
+        - {situation for situation, _, kind in parts["node"] if kind == CORE + "Amount"},
+        whole=frozenset(situation for situation, _, kind in parts["range"] if kind.endswith("integer")),
         from_levels={
             value: whole_number(level, f"<{value}>: :fromLevel", 0, HIGHEST_LEVEL) for value, _, level in parts["level"]
         },
@@ -286,7 +320,7 @@ def reading_of(
     whole : bool
     """
     schema, names = known.schema, known.names
-    relations, stated = _facts(facts, {**tuples, **schema.facts}, known.properties, known.domain, names)
+    relations, stated = _facts(facts, {**tuples, **schema.facts}, known.properties, known.domain, names, schema.numbers)
     initial = _initial(known.domain, known.classes, stated, names)
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, known.domain, known.classes, relations, initial, {}, known.parents, levels)
@@ -335,7 +369,14 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         rest.append(TRUE)
     if len(rest) != len(situation.arguments):
         raise KnowledgeError(f"'{fact}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
-    for kind, word in zip((*situation.arguments[1:], situation.range), rest, strict=True):
+    if situation.quantity is not None:
+        if not BOUNDS.fullmatch(rest[-1]):
+            raise KnowledgeError(
+                f"'{fact}': '{rest[-1]}' is no amount; write a number like 2 or 1.5, or bounds like >=2"
+            )
+        rest[-1] = bounds_written(rest[-1])
+    ranges = (*situation.arguments[1:], *([] if situation.quantity else [situation.range]))
+    for kind, word in zip(ranges, rest, strict=situation.quantity is None):
         if word not in individuals and word not in (TRUE, FALSE):
             raise KnowledgeError(
                 f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
@@ -391,6 +432,30 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
                 "name one, without quotation marks"
             )
     return text(subject), text(predicate), text(value)
+
+
+def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
+    """Return a fact as text: a link, or by one of the properties that lead to numbers an amount."""
+    subject, predicate, value = row
+    if text(predicate) not in numbers:
+        return link(row)
+    what = f"<{text(subject)}>: {local_name(text(predicate))}"
+    if not isinstance(value, ox.Literal):
+        raise KnowledgeError(f"{what} leads to {text(value)[:60]}, where a number belongs; write one, like 2 or 1.5")
+    return text(subject), text(predicate), written(decimal(text(value), what))
+
+
+def decimal(text: str, what: str) -> Fraction:
+    """Return a number that stands in an ontology, exact.
+
+    Raises
+    ------
+    KnowledgeError
+        It is none.
+    """
+    if not DECIMAL.fullmatch(text):
+        raise KnowledgeError(f"{what} is '{text[:40]}'; wanted a number, like 2 or 1.5")
+    return Fraction(text)
 
 
 def index_of(iri: str, index: str) -> int:
@@ -518,6 +583,17 @@ class _Schema:
             raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
         return cost
 
+    def decimal(self, iri: str, name: str) -> Fraction | None:
+        if not self.values(iri, name):
+            return None
+        return decimal(self.one(iri, name), f"<{iri}>: :{name}")
+
+    def word(self, iri: str, name: str, known: Sequence[str]) -> str:
+        said = self.one(iri, name)
+        if said not in known:
+            raise KnowledgeError(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
+        return said
+
     def flag(self, iri: str, name: str) -> bool:
         said = set(self.values(iri, name))
         if said - {"true", "false", "1", "0"} or len(said) > 1:
@@ -551,6 +627,11 @@ class _Schema:
         situation = self.one(iri, "situationType")
         if situation not in self.nodes or not _is(self.nodes[situation], "SituationType"):
             raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
+        if _is(self.nodes[situation], "Amount"):
+            raise KnowledgeError(
+                f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
+                "use a :Comparison or an :AmountEffect"
+            )
         arguments = self.arguments(iri)
         value = [self.term(v) for v in self.values(iri, "value")]
         if situation in self.pairs:
@@ -599,7 +680,55 @@ class _Schema:
         if _is(node, "AnyOf"):
             groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
             return AnyOf(tuple(groups), negated)
+        if _is(node, "Comparison"):
+            sign = self.word(iri, "sign", tuple(COMPARING))
+            return Comparison(self.left(iri), sign, self.right(iri), negated)
         raise KnowledgeError(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+
+    def left(self, iri: str) -> Expression:
+        """Return the left side of a comparison or calculation: its own amount, if it has no other."""
+        return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
+
+    def right(self, iri: str) -> Expression:
+        """Return the right side of a comparison, calculation or effect: its own number, if it has no other."""
+        if self.values(iri, "right"):
+            return self.expression(self.one(iri, "right"))
+        number = self.decimal(iri, "amount")
+        if number is None:
+            raise KnowledgeError(
+                f"<{iri}> has neither :amount nor :right; state a number, or what it is worked out from"
+            )
+        return number
+
+    def measured(self, iri: str) -> Expression:
+        """Return the amount of an object, or what a relation gives for it."""
+        if self.values(iri, "relation"):
+            relation = self.one(iri, "relation")
+            if relation not in self.nodes:
+                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+            return Measure(self.names.short(relation), self.arguments(iri))
+        situation = self.one(iri, "situationType")
+        if situation not in self.nodes or not _is(self.nodes[situation], "Amount"):
+            raise KnowledgeError(
+                f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
+                "declare it as :Amount, or use a value condition or effect"
+            )
+        return Amount(self.names.short(situation), self.arguments(iri))
+
+    def expression(self, iri: str) -> Expression:
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as a calculation but isn't declared as one")
+        if iri in self.inside or len(self.inside) > DEEPEST:
+            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
+            raise KnowledgeError(f"<{iri}>: the calculation {what}; take it out of one of them")
+        self.inside.append(iri)
+        if self.values(iri, "sign"):
+            found: Expression = Calculation(self.word(iri, "sign", SIGNS), self.left(iri), self.right(iri))
+        else:
+            number = self.decimal(iri, "amount")
+            found = self.measured(iri) if number is None else number
+        self.inside.pop()
+        return found
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
         return tuple(self.condition(value) for value in self.values(iri, name))
@@ -615,9 +744,19 @@ class _Schema:
             value = FALSE
         return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
 
+    def amount_effect(self, iri: str) -> AmountEffect:
+        changed = self.measured(iri)
+        if not isinstance(changed, Amount):
+            raise KnowledgeError(f"<{iri}>: a static relation can't be changed; make it an :Amount")
+        operation = self.word(iri, "change", OPERATIONS)
+        when = self.conditions(iri, "when")
+        return AmountEffect(changed.situation, changed.arguments, operation, self.right(iri), when)
+
     def behavior(self, iri: str) -> Behavior:
         parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
+        effects = self.values(iri, "postcondition")
+        of_amounts = [e for e in effects if e in self.nodes and _is(self.nodes[e], "AmountEffect")]
         return Behavior(
             name=self.names.short(iri),
             level=self.level(iri),
@@ -627,8 +766,9 @@ class _Schema:
                 *self.conditions(iri, "precondition"),
                 *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
             ),
-            effects=tuple(self.effect(value) for value in self.values(iri, "postcondition")),
+            effects=tuple(self.effect(value) for value in effects if value not in of_amounts),
             cost=self.cost(iri),
+            amounts=tuple(map(self.amount_effect, of_amounts)),
         )
 
     def terms_below(self, iri: str) -> set[str]:
@@ -665,17 +805,26 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
         raise KnowledgeError(
             f"{behavior.name} has several terms called {', '.join(twice)}; give each a name of its own"
         )
-    said: list[Condition | ValueEffect] = [*behavior.preconditions, *behavior.effects]
+    said: list[Condition | ValueEffect | AmountEffect | Expression]
+    said = [*behavior.preconditions, *behavior.effects, *behavior.amounts]
     while said:
         match said.pop():
-            case ValueCondition(situation, arguments) | ValueEffect(situation, arguments) as part:
+            case (
+                ValueCondition(situation, arguments)
+                | ValueEffect(situation, arguments)
+                | AmountEffect(situation, arguments)
+                | Amount(situation, arguments)
+            ) as part:
                 wanted = len(domain.situations[situation].arguments)
                 if len(arguments) != wanted:
                     raise KnowledgeError(
                         f"{behavior.name} speaks of {situation} with {len(arguments)} arguments; it has {wanted}: "
                         "mend the condition or effect, or say what has that situation type"
                     )
-                said += part.when if isinstance(part, ValueEffect) else ()
+                said += part.when if isinstance(part, ValueEffect | AmountEffect) else ()
+                said += inside(part.amount) if isinstance(part, AmountEffect) else ()
+            case Comparison(left, _, right):
+                said += [*inside(left), *inside(right)]
             case Witness(_, _, inner):
                 said += inner
             case AnyOf(alternatives):
@@ -704,6 +853,8 @@ def _situations(
             arguments, boolean = (*arguments, name), True
         for iri_of_property in value_property:
             properties[iri_of_property] = (name, iri in schema.pairs)
+        if quantity := _quantity(schema, iri, iri in read.whole):
+            boolean = False
         rest = schema.values(iri, "restValue")
         default = schema.values(iri, "defaultValue") or rest
         found.append(
@@ -715,9 +866,20 @@ def _situations(
                 rest=schema.term(rest[0]) if rest else None,
                 default=schema.term(default[0]) if default else (FALSE if boolean else None),
                 boolean=boolean,
+                quantity=quantity,
             )
         )
+        if quantity and (amount := schema.decimal(iri, "defaultAmount")) is not None:
+            found[-1] = replace(found[-1], default=written(amount))
     return found, properties
+
+
+def _quantity(schema: _Schema, iri: str, whole: bool) -> Quantity | None:
+    if not _is(schema.nodes[iri], "Amount"):
+        return None
+    unit = schema.one(iri, "unit") if schema.values(iri, "unit") else ""
+    least, most = schema.decimal(iri, "leastAmount"), schema.decimal(iri, "mostAmount")
+    return Quantity(unit, whole or schema.flag(iri, "wholeNumbers"), least, most)
 
 
 def _union(kinds: Sequence[str], classes: dict[str, tuple[str, ...]]) -> str:
@@ -734,12 +896,14 @@ def _facts(
     properties: Mapping[str, tuple[str, bool]],
     domain: Domain,
     names: Names,
+    numbers: Collection[str],
 ) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
     """Return the static relations, and the values that the scene states of each symbol."""
     relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
     stated: dict[Symbol, set[str]] = defaultdict(set)
     for subject, predicate, value in rows:
-        pair = (names.short(subject), names.short(value))
+        number = predicate in numbers
+        pair = (names.short(subject), value if number else names.short(value))
         if predicate not in properties:
             relations[names.short(predicate)].add(pair)
             continue
@@ -752,11 +916,14 @@ def _facts(
     for iri, node in tuples.items():
         if CORE + "relation" in node:
             tail = [names.short(v) for v in facts.values(iri, "value")]
+            tail += [written(decimal(v, f"<{iri}>: :amount")) for v in facts.values(iri, "amount")]
             relations[names.short(facts.one(iri, "relation"))].add((*facts.arguments(iri), *tail))
         else:
             values = facts.values(iri, "value")
             symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
-            stated[symbol].add(names.short(values[0]) if values else TRUE)
+            amount = facts.decimal(iri, "amount")
+            said = names.short(values[0]) if values else TRUE
+            stated[symbol].add(said if amount is None else written(amount))
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"{symbol}: a fact of no known situation type")
@@ -775,15 +942,20 @@ def _initial(
             continue
         for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
             symbol = Symbol(situation.name, arguments)
+            if situation.quantity and len(arguments) > 1 and symbol not in stated and not situation.default:
+                continue  # distances, prices: only what is stated is there
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
                 what = f"several values ({', '.join(values)})" if values else "no value"
                 raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
             initial[symbol] = values[0]
+            if situation.quantity:
+                _check_amount(symbol, values[0], situation.quantity)
     true = [s for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE]
     initial |= dict.fromkeys(sorted(true), TRUE)
     for symbol, value in initial.items():
-        for name in (*symbol.arguments, value):
+        number = domain.situations[symbol.situation].quantity is not None
+        for name in symbol.arguments if number else (*symbol.arguments, value):
             if name not in names and name not in (TRUE, FALSE):
                 raise KnowledgeError(
                     f"{symbol} is {value}, but {name} isn't declared as an individual; declare it, or mend the name"
@@ -791,13 +963,31 @@ def _initial(
     return initial
 
 
+def _check_amount(symbol: Symbol, value: str, quantity: Quantity) -> None:
+    """Raise `KnowledgeError` if a symbol has an amount that it can't have."""
+    if not DECIMAL.fullmatch(value):
+        raise KnowledgeError(f"{symbol} is {value[:40]}; wanted a number, like 2 or 1.5")
+    if not quantity.allows(Fraction(value)):
+        limits = [] if quantity.least is None else [f"at least {written(quantity.least)}"]
+        limits += [] if quantity.most is None else [f"at most {written(quantity.most)}"]
+        limits += ["a whole number"] if quantity.whole else []
+        raise KnowledgeError(f"{symbol} is {value}; it has to be {' and '.join(limits)}: mend the scene")
+
+
 def _with_goal(problem: Problem, known: Frame) -> Problem:
     schema, goal = known.parts, dict[Symbol, str]()
     for task in known.schema.of_kind("Task"):
         for iri in schema.values(task, "goal"):
             wanted = schema.condition(iri)
+            if isinstance(wanted, Comparison):
+                symbol, value = _bounds(iri, wanted)
+                value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
+                goal[symbol] = value
+                if symbol not in problem.initial:
+                    raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
+                continue
             if not isinstance(wanted, ValueCondition):
-                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition")
+                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
             symbol = Symbol(wanted.situation, wanted.arguments)
             value = FALSE if wanted.negated and wanted.value == TRUE else wanted.value
             if goal.setdefault(symbol, value) != value:
@@ -807,6 +997,16 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
                 )
     return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
+    """Return of which symbol a goal wants an amount, and its bounds."""
+    contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
+    sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
+    if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):
+        raise KnowledgeError(f"<{iri}>: a goal compares the amount of one object with a number, as <, <=, =, >= or >")
+    symbol = Symbol(wanted.left.situation, wanted.left.arguments)
+    return symbol, f"{sign}{written(wanted.right)}"
 
 
 def _some(names: Sequence[str], most: int = 12) -> str:

@@ -21,9 +21,11 @@ from itertools import chain
 
 import pyoxigraph as ox
 
+from reasoner.amounts import situations_in, terms_of
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import local_name
 from reasoner.reading.problem import (
+    BOUNDS,
     FIRST_INDEX_OF_NONE,
     Frame,
     Member,
@@ -36,12 +38,15 @@ from reasoner.reading.problem import (
     link,
     read_schema,
     reading_of,
+    stated,
     with_goals,
 )
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
+    Comparison,
     Condition,
     RelationCondition,
     ValueCondition,
@@ -134,26 +139,29 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     more_situations : iterable of str
         Situation types that count besides those of the task's goals.
     """
-    found = Routes(forward=set(known.properties))
+    found = Routes(forward=set(known.properties) - known.schema.numbers)
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: dict[str, set[str]] = {}
     spanned = set[tuple[str, int, bool]]()
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
         for behavior in known.domain.behaviors.values():
-            if not any(effect.situation in counting for effect in behavior.effects):
+            if not behavior.changes & counting:
                 continue
-            counting |= {effect.situation for effect in behavior.effects}
+            counting |= behavior.changes
             kinds = behavior.kinds
-            for number, effect in enumerate(behavior.effects):
+            changes = [((e.value,), e) for e in behavior.effects] + [(terms_of(e.amount), e) for e in behavior.amounts]
+            for number, (values, effect) in enumerate(changes):
                 starts = {False: set(effect.arguments)}
-                if effect.situation in looked_up and (
-                    effect.value.startswith("?") or effect.value in looked_up[effect.situation]
+                if effect.situation in looked_up and any(
+                    value.startswith("?") or value in looked_up[effect.situation] for value in values
                 ):
-                    starts[True] = {effect.value}
+                    starts[True] = set(values)
+                if isinstance(effect, AmountEffect):
+                    counting |= situations_in(effect.amount)
                 scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
-                counting |= {c.situation for s in scopes for c in s.conditions if isinstance(c, ValueCondition)}
-                own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, effect.value}
+                counting |= {s for scope in scopes for c in scope.conditions for s in _situations(c)}
+                own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, *values}
                 own &= kinds.keys()
                 for from_value, start in starts.items():
                     if (behavior.name, number, from_value) in spanned:
@@ -295,7 +303,16 @@ def _terms(condition: Condition) -> set[str]:
             return {*arguments, *([value] if value not in (TRUE, FALSE) else [])}
         case RelationCondition(_, arguments):
             return set(arguments)
+        case Comparison(left, _, right):
+            return {*terms_of(left), *terms_of(right)}
     return {t for name in ("term", "left", "right") for t in [getattr(condition, name, None)] if t}
+
+
+def _situations(condition: Condition) -> Iterable[str]:
+    """Return the situation types of which a condition that isn't nested speaks."""
+    if isinstance(condition, Comparison):
+        return situations_in(condition.left) | situations_in(condition.right)
+    return (condition.situation,) if isinstance(condition, ValueCondition) else ()
 
 
 # ------------------------------------------------------------------------------------------------- 2. following it
@@ -337,10 +354,13 @@ class _Search:
         for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
         rows = []
-        links, nodes = self.links, self.schema.nodes
+        links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
         for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
             subject, said = text(s), text(p)
             names = isinstance(o, ox.NamedNode)
+            if said in numbers:
+                rows.append(stated((s, p, o), numbers))
+                continue
             if not names and said in links and subject not in nodes:
                 link((s, p, o))  # says what is wrong with it
             if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
@@ -427,8 +447,8 @@ class _Search:
 
     def facts(self, known: Frame) -> list[Triple]:
         """Return the values and relations that were read, between individuals whose own triples were read."""
-        wanted, seen = known.properties.keys() | self.schema.nodes.keys(), self.seen
-        return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and o in seen]
+        wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
+        return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
 
     def tuples(self) -> dict[str, Node]:
         """Return the facts that are nodes of their own, as far as all individuals in them were read."""
@@ -509,7 +529,7 @@ def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[s
 
     They are looked up in the namespaces that are known; if one isn't found there, among all individuals.
     """
-    words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split()}
+    words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split() if not BOUNDS.fullmatch(word)}
     if not words:
         return set()
     spaces = _spaces(graph, schema, chain(schema.nodes, schema.supers, _goal_individuals(schema)))

@@ -7,17 +7,20 @@ from dataclasses import replace
 
 import pyoxigraph as ox
 
+from reasoner.amounts import bounds, written
 from reasoner.files import as_iri_part
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.limits import Deadline
 from reasoner.reading.problem import Reading
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE, XSD
 
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
 STATED = "SELECT ?node ?property ?value WHERE { ?node a :SituatedObjectInstance ; ?property ?value }"
 WANTED = "SELECT ?node ?property ?value WHERE { ?task :goal ?node . ?node ?property ?value }"
 TASKS = "SELECT DISTINCT ?task WHERE { ?task a/rdfs:subClassOf* :Task } ORDER BY ?task"
+
+DECIMAL = ox.NamedNode(XSD + "decimal")
 
 Node = Mapping[str, str]
 
@@ -52,12 +55,13 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
         for old in _about(copy, WANTED, reading, goal.symbol):
             _remove(copy, None, link, old)
             _remove(copy, old)
-        name = ".".join(("goal", *goal.symbol.arguments, goal.symbol.situation))
-        node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{as_iri_part(name)}")
-        copy.store.extend(
-            ox.Quad(t.subject, t.predicate, t.object, asserted)
-            for t in (ox.Triple(ox.NamedNode(task), link, node), *_wanted(reading, goal, node))
-        )
+        for number, part in enumerate(goal.value.split(",")):  # two bounds of an amount are two goals
+            name = ".".join(("goal", *goal.symbol.arguments, goal.symbol.situation, *[str(number)] * bool(number)))
+            node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{as_iri_part(name)}")
+            copy.store.extend(
+                ox.Quad(t.subject, t.predicate, t.object, asserted)
+                for t in (ox.Triple(ox.NamedNode(task), link, node), *_wanted(reading, replace(goal, value=part), node))
+            )
     return copy
 
 
@@ -72,20 +76,41 @@ def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> 
     if value == FALSE:
         return
     arguments = [ox.NamedNode(iri(argument)) for argument in symbol.arguments]
+    number = ox.Literal(value, datatype=DECIMAL) if _counted(reading, symbol) else None
+    if prop and number and len(arguments) == 1:
+        yield ox.Triple(arguments[0], ox.NamedNode(prop), number)
+        return
     if prop and len(arguments) + (value != TRUE) == 2:
         tail = arguments[1] if value == TRUE else ox.NamedNode(iri(value))
         yield ox.Triple(arguments[0], ox.NamedNode(prop), tail)
         return
     parts = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": ox.NamedNode(iri(symbol.situation))}
-    parts |= {} if value == TRUE else {"value": ox.NamedNode(iri(value))}
+    if number:
+        yield ox.Triple(node, ox.NamedNode(CORE + "amount"), number)
+    elif value != TRUE:
+        parts["value"] = ox.NamedNode(iri(value))
     yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "SituatedObjectInstance"))
     for part, term in parts.items():
         yield ox.Triple(node, ox.NamedNode(CORE + part), term)
 
 
+def _counted(reading: Reading, symbol: Symbol) -> bool:
+    return reading.problem.domain.situations[symbol.situation].quantity is not None
+
+
 def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Triple]:
-    """Yield a value condition on individuals."""
+    """Yield a value condition on individuals, or a comparison of an amount."""
     iri, symbol, value = reading.names.iri, goal.symbol, goal.value
+    if _counted(reading, symbol):
+        [(sign, limit)] = bounds(value)
+        yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
+        yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "Comparison"))
+        yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(str(goal), language="en"))
+        yield ox.Triple(node, ox.NamedNode(CORE + "sign"), ox.Literal(sign))
+        yield ox.Triple(node, ox.NamedNode(CORE + "amount"), ox.Literal(written(limit), datatype=DECIMAL))
+        for part, name in (*zip(ARGUMENTS, symbol.arguments, strict=False), ("situationType", symbol.situation)):
+            yield ox.Triple(node, ox.NamedNode(CORE + part), ox.NamedNode(iri(name)))
+        return
     arguments = symbol.arguments
     if iri(symbol.situation) in reading.schema.pairs:
         if value == FALSE:

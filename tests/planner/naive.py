@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from itertools import product
 
+from reasoner.amounts import Amount, Calculation, Expression, Measure, meets, written
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.symbols import (
@@ -13,6 +15,7 @@ from reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -64,7 +67,35 @@ def mentioned(conditions: Sequence[Condition]) -> set[str]:
                 found |= mentioned(inner) - {variable}
             case AnyOf(alternatives):
                 found |= set().union(*(mentioned(group) for group in alternatives))
+            case Comparison(left, _, right):
+                found |= named(left) | named(right)
     return {t for t in found if t.startswith("?")}
+
+
+def named(expression: Expression) -> set[str]:
+    match expression:
+        case Calculation(_, left, right):
+            return named(left) | named(right)
+        case Amount(_, arguments) | Measure(_, arguments):
+            return {*arguments}
+    return set()
+
+
+def worth(problem: Problem, state: Facts, expression: Expression, terms: Terms) -> Fraction | None:
+    """Return what an expression comes to; None if it, or a part of it, comes to nothing."""
+    match expression:
+        case Amount(situation, arguments):
+            said = state.get(Symbol(situation, tuple(terms.get(a, a) for a in arguments)))
+            return None if said is None else Fraction(said)
+        case Measure(relation, arguments):
+            key = tuple(terms.get(a, a) for a in arguments)
+            return next((Fraction(row[-1]) for row in problem.relations.get(relation, ()) if row[:-1] == key), None)
+        case Calculation(sign, left, right):
+            a, b = worth(problem, state, left, terms), worth(problem, state, right, terms)
+            if a is None or b is None or (sign == "/" and b == 0):
+                return None
+            return a + b if sign == "+" else a - b if sign == "-" else a * b if sign == "*" else a / b
+    return expression
 
 
 def outside(conditions: Sequence[Condition]) -> set[str]:
@@ -107,6 +138,12 @@ def holds(problem: Problem, state: Facts, condition: Condition, terms: Terms, ki
                 for trial in bindings(problem, outside(group), kinds, terms)
             )
             return found is not negated
+        case Comparison(left, sign, right, negated):
+            a, b = worth(problem, state, left, terms), worth(problem, state, right, terms)
+            if a is None or b is None:
+                return negated
+            signs = {"<" if a < b else ">" if a > b else "="}
+            return (sign[0] in signs or sign[1:] in signs) is not negated
 
 
 def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tuple[tuple[str, ...], Facts]]:
@@ -124,8 +161,39 @@ def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tupl
                     symbol = Symbol(effect.situation, tuple(trial.get(a, a) for a in effect.arguments))
                     if symbol in state:
                         after[symbol] = trial.get(effect.value, effect.value)
+        if not amounts(problem, behavior, state, terms, kinds, after):
+            continue
         yield tuple(terms[name] for name in parameters), after
 
 
+def amounts(problem: Problem, behavior: Behavior, state: Facts, terms: Terms, kinds: Terms, after: Facts) -> bool:
+    """Change the amounts in `after`; whether all are what they can be."""
+    changed: dict[Symbol, Fraction | None] = {}
+    for operations in (("assign",), ("scale",), ("increase", "decrease")):
+        for effect in behavior.amounts:
+            if effect.operation not in operations:
+                continue
+            for trial in bindings(problem, outside(effect.when), kinds, terms):
+                symbol = Symbol(effect.situation, tuple(trial.get(a, a) for a in effect.arguments))
+                if symbol not in state or not all(holds(problem, state, c, trial, kinds) for c in effect.when):
+                    continue
+                old, by = changed.get(symbol, Fraction(state[symbol])), worth(problem, state, effect.amount, trial)
+                if old is None or by is None:
+                    changed[symbol] = None
+                    continue
+                new = {"assign": by, "scale": old * by, "increase": old + by, "decrease": old - by}
+                changed[symbol] = new[effect.operation]
+    for symbol, amount in changed.items():
+        limits = problem.domain.situations[symbol.situation].quantity
+        if amount is None or limits is None or (limits.whole and amount.denominator != 1):
+            return False
+        if (limits.least is not None and amount < limits.least) or (limits.most is not None and amount > limits.most):
+            return False
+        after[symbol] = written(amount)
+    return True
+
+
 def wanted(problem: Problem, state: Facts) -> bool:
-    return all(state.get(symbol, FALSE if value == FALSE else None) == value for symbol, value in problem.goal.items())
+    return all(
+        meets(state.get(symbol, FALSE if value == FALSE else None), value) for symbol, value in problem.goal.items()
+    )

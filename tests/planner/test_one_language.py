@@ -4,6 +4,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +20,7 @@ from planner.paper.transitions import Model, ground
 from planner.transitions import Table
 from planner.validation import successor
 from reasoner import symbols
+from reasoner.amounts import Quantity
 from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from reasoner.reading.affordance import applicable_query, write_situation
 from reasoner.reading.problem import Reading, read
@@ -164,7 +166,7 @@ def test_no_evaluator_forgets_a_kind_of_condition(path: str, function: str) -> N
 
 def test_random_behaviours_are_of_every_kind() -> None:
     conditions: Counter[tuple[str, bool, int]] = Counter()
-    conflicts = equal = odd = own = 0
+    conflicts = equal = odd = own = refused = added = 0
     for seed in range(400):
         problem = language(seed)
         for behavior in problem.domain.behaviors.values():
@@ -172,6 +174,9 @@ def test_random_behaviours_are_of_every_kind() -> None:
                 conditions[type(condition).__name__, condition.negated, depth] += 1
             places = [(e.situation, e.arguments) for e in behavior.effects]
             conflicts += len(set(places)) < len(places)
+            targets = [(e.situation, e.arguments) for e in behavior.amounts]
+            added += len(set(targets)) < len(targets)
+            refused += not set(by_naive(problem)) >= set(by_naive(without_bounds(problem)))
             own += any(e.when and e.value in {v.name for v in behavior.variables} for e in behavior.effects)
         for (name, arguments), _ in by_naive(problem).items():
             equal += len(set(arguments)) < len(arguments)
@@ -179,11 +184,19 @@ def test_random_behaviours_are_of_every_kind() -> None:
     kinds = {
         (name, negated, depth) for name, negated, depth in conditions if depth < 2 or name not in ("Witness", "AnyOf")
     }
-    plain = {"ValueCondition", "RelationCondition", "ClassCondition", "EqualityCondition"}
+    plain = {"ValueCondition", "RelationCondition", "ClassCondition", "EqualityCondition", "Comparison"}
     assert kinds >= set(product(plain, (False, True), (0, 1, 2))) | set(
         product(("Witness", "AnyOf"), (False, True), (0, 1))
     )
-    assert min(conflicts, equal, odd, own) > 20
+    assert min(conflicts, equal, odd, own, refused, added) > 20
+
+
+def without_bounds(problem: Problem) -> Problem:
+    """Return the problem with amounts that can be any."""
+    situations = {
+        name: replace(s, quantity=Quantity()) if s.quantity else s for name, s in problem.domain.situations.items()
+    }
+    return replace(problem, domain=replace(problem.domain, situations=situations))
 
 
 def nested(conditions: Sequence[Condition], depth: int = 0) -> Iterator[tuple[int, Condition]]:

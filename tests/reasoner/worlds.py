@@ -12,7 +12,7 @@ HEAD = """
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
 @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 <https://example.org/world> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> .
-w:Thing a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Object ; :hasSituationType w:AT, w:COLOR, w:TOUCHES .
+w:Thing a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Object ; :hasSituationType w:AT, w:COLOR, w:TOUCHES, w:FILL .
 w:Tool a owl:Class, owl:NamedIndividual ; rdfs:subClassOf w:Thing .
 w:Spot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf w:AT .
 w:AT a owl:Class, owl:NamedIndividual, :SituationType ; :valueProperty w:at .
@@ -25,6 +25,10 @@ w:blue a owl:NamedIndividual, w:COLOR .
 w:TOUCHES a owl:Class, owl:NamedIndividual, :SituationType ; :valueProperty w:touches .
 w:touches a owl:ObjectProperty, owl:NamedIndividual .
 w:Spot rdfs:subClassOf w:TOUCHES .
+w:FILL a owl:NamedIndividual, :SituationType, :Amount ; :valueProperty w:fill .
+w:FILL :leastAmount 0 ; :mostAmount 2.5 ; :defaultAmount 1 .
+w:fill a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual .
+w:size a owl:DatatypeProperty, owl:NamedIndividual, :Relation .
 w:near a owl:ObjectProperty, owl:NamedIndividual, :Relation .
 w:fits a owl:ObjectProperty, owl:NamedIndividual, :Relation .
 """
@@ -38,6 +42,7 @@ def leaf(draw: st.DrawFn, behavior: str, name: str) -> str:
     thing, other = (f"w:{behavior}.{draw(st.sampled_from(THINGS))}" for _ in range(2))
     spot, spot2 = (f"w:{behavior}.{draw(st.sampled_from(SPOTS))}" for _ in range(2))
     negated = draw(st.sampled_from(["", "", "", " ; :negated true"]))
+    sign, amount = draw(st.sampled_from(["<", "<=", "=", ">=", ">"])), draw(st.sampled_from(["0", "1", "1.5", "2.50"]))
     body = draw(
         st.sampled_from(
             [
@@ -50,10 +55,16 @@ def leaf(draw: st.DrawFn, behavior: str, name: str) -> str:
                 f":RelationCondition ; :about {thing} ; :relation w:fits ; :value {spot}",
                 f":ClassCondition ; :about {thing} ; :ofClass w:Tool",
                 f":EqualityCondition ; :about {thing} ; :value {other}",
+                f':Comparison ; :about {thing} ; :situationType w:FILL ; :sign "{sign}" ; :amount {amount}',
+                f':Comparison ; :left w:{name}_l ; :sign "{sign}" ; :right w:{name}_r',
             ]
         )
     )
-    return f"w:{name} a owl:NamedIndividual, {body}{negated} .\n"
+    more = (
+        f"w:{name}_l a owl:NamedIndividual, :Calculation ; :about {thing} ; :relation w:size .\n"
+        f'w:{name}_r a owl:NamedIndividual, :Calculation ; :about {other} ; :situationType w:FILL ; :sign "+" ; :amount -0.5 .\n'
+    )
+    return f"w:{name} a owl:NamedIndividual, {body}{negated} .\n" + more * (":left" in body)
 
 
 @st.composite
@@ -105,6 +116,14 @@ def behavior(draw: st.DrawFn, name: str) -> str:
         f"w:{name}_e a owl:NamedIndividual, :ValueEffect ; :about w:{name}.{thing} ; "
         f":situationType w:{situation} ; :value {effects[situation]}{negated} .\n"
     )
+    effects_of = [f"w:{name}_e"]
+    if draw(st.booleans()):
+        change = draw(st.sampled_from(["assign", "increase", "decrease", "scale"]))
+        effects_of.append(f"w:{name}_a")
+        text += (
+            f"w:{name}_a a owl:NamedIndividual, :AmountEffect ; :about w:{name}.{draw(st.sampled_from(THINGS))} ; "
+            f':situationType w:FILL ; :change "{change}" ; :amount {draw(st.sampled_from(["0.5", "1", "-1"]))} .\n'
+        )
     used = [term for term in KINDS if f"w:{name}.{term} " in text]
     determined = {
         term for term in used for i in range(conditions) if _determines(text, f"{name}_{i}", f"{name}.{term}")
@@ -118,7 +137,7 @@ def behavior(draw: st.DrawFn, name: str) -> str:
     return (
         text
         + f"w:{name} a owl:NamedIndividual, :Behavior ; :level 1 {'; :parameter ' * bool(parameters)}{parameters} ; "
-        f":precondition {listed} ; :postcondition w:{name}_e .\n"
+        f":precondition {listed} ; :postcondition {', '.join(effects_of)} .\n"
     )
 
 
@@ -142,6 +161,7 @@ def worlds(draw: st.DrawFn) -> str:
         place, kind = draw(st.sampled_from([*spots, "nowhere"])), draw(st.sampled_from(["Thing", "Tool"]))
         text += f"w:{thing} a owl:NamedIndividual, w:{kind} ; w:at w:{place} .\n"
         text += draw(st.sampled_from(["", f"w:{thing} w:color w:blue .\n"]))
+        text += draw(st.sampled_from(["", f"w:{thing} w:fill 2.5 ; w:size 1.50 .\n", f"w:{thing} w:size 0.5 .\n"]))
         text += "".join(f"w:{thing} w:fits w:{spot} .\n" for spot in spots if draw(st.booleans()))
         text += "".join(f"w:{thing} w:touches w:{spot} .\n" for spot in spots if draw(st.booleans()))
     for i in range(draw(st.integers(2, 3))):

@@ -1,0 +1,284 @@
+"""Amounts of a grounded level: above its bits a state holds the number of a tuple of amounts.
+
+A comparison with individuals put in is a bit that follows from the tuple, so that an operator's conditions, the goal and all that
+looks at bits are the same with amounts and without. What an operator that changes an amount may make true is known from how it
+moves each comparison: by how much, where that is the same in every state (`Push`).
+
+Comparisons are linear: amounts times numbers, added up. Numbers are exact; whole ones are Python integers, which are fast.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import TypeAlias
+
+from planner.language import DomainError
+from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, written
+from reasoner.symbols import Fact, Problem, State, Symbol
+
+Exact: TypeAlias = "int | Fraction"
+Vector: TypeAlias = "tuple[Exact, ...]"
+Push: TypeAlias = "Exact | None"
+"""How far an operator moves the amount of a comparison; None where that depends on the state."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Amounts (by their places in the tuple) times numbers, added up with a constant."""
+
+    terms: tuple[tuple[int, Exact], ...]
+    constant: Exact
+
+    def of(self, vector: Vector) -> Exact:
+        """Return what it comes to."""
+        total = self.constant
+        for place, factor in self.terms:
+            total += vector[place] * factor
+        return total
+
+    def plus(self, other: Linear, times: Exact = 1) -> Linear:
+        """Return the sum with another, that one multiplied."""
+        found = defaultdict[int, Exact](int, self.terms)
+        for place, factor in other.terms:
+            found[place] += factor * times
+        terms = tuple(sorted((place, factor) for place, factor in found.items() if factor))
+        return Linear(terms, _exact(self.constant + other.constant * times))
+
+    def times(self, factor: Exact) -> Linear:
+        """Return it multiplied."""
+        return Linear((), 0).plus(self, factor)
+
+
+@dataclass(frozen=True)
+class Move:
+    """One change of an amount: what is done to it, by how much (None: nothing), and the bits with which it is done.
+
+    Of several with one `position`, which are ways in which the condition of one effect holds, the first is done.
+    """
+
+    position: int
+    when: int
+    place: int
+    operation: str
+    by: Linear | None
+
+
+class AmountTable:
+    """The amounts of a level while it is being grounded: those that change have places, comparisons of them get bits.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : int
+    initial : State
+    """
+
+    def __init__(self, problem: Problem, level: int, initial: State) -> None:
+        self.problem = problem
+        situations = problem.domain.situations
+        changed = {effect.situation for behavior in problem.domain.at_level(level) for effect in behavior.amounts}
+        self.now: dict[Symbol, Exact] = {
+            symbol: _exact(Fraction(value))
+            for symbol, value in sorted(initial.items())
+            if situations[symbol.situation].quantity is not None and situations[symbol.situation].level <= level
+        }
+        self.place = {s: i for i, s in enumerate(symbol for symbol in self.now if symbol.situation in changed)}
+        self.first = tuple(self.now[symbol] for symbol in self.place)
+        self.bits: dict[tuple[Linear, str], int] = {}
+        self._measures: dict[str, Mapping[tuple[str, ...], Exact]] = {}
+
+    def text(self, symbol: Symbol) -> str:
+        """Return a symbol's amount as a value."""
+        return written(Fraction(self.now[symbol]))
+
+    def linear(self, expression: Expression, terms: Mapping[str, str]) -> Linear | None:
+        """Return an expression with individuals put in; None if it comes to nothing.
+
+        Raises
+        ------
+        DomainError
+            Two amounts that change are multiplied, or one is divided by.
+        """
+        match expression:
+            case Amount(situation, arguments):
+                symbol = Symbol(situation, tuple(terms.get(a, a) for a in arguments))
+                if symbol in self.place:
+                    return Linear(((self.place[symbol], 1),), 0)
+                return Linear((), self.now[symbol]) if symbol in self.now else None
+            case Measure(relation, arguments):
+                said = self._measured(relation).get(tuple(terms.get(a, a) for a in arguments))
+                return None if said is None else Linear((), said)
+            case Calculation(sign, left, right):
+                one, other = self.linear(left, terms), self.linear(right, terms)
+                if one is None or other is None:
+                    return None
+                if sign in "+-":
+                    return one.plus(other, 1 if sign == "+" else -1)
+                if other.terms and (one.terms or sign == "/"):
+                    raise DomainError(f"amounts that change are multiplied or divided by one another: {expression}")
+                if sign == "/":
+                    return one.times(_exact(Fraction(1) / other.constant)) if other.constant else None
+                return other.times(one.constant) if other.terms else one.times(other.constant)
+            case constant:
+                return Linear((), _exact(constant))
+
+    def _measured(self, relation: str) -> Mapping[tuple[str, ...], Exact]:
+        if relation not in self._measures:
+            rows = self.problem.relations.get(relation, ())
+            self._measures[relation] = {row[:-1]: _exact(Fraction(row[-1])) for row in rows}
+        return self._measures[relation]
+
+    def comparison(
+        self, left: Linear | None, sign: str, right: Linear | None, negated: bool, fresh: Callable[[], int]
+    ) -> tuple[tuple[int, ...] | None, ...]:
+        """Return the alternatives of which one must hold for a comparison to hold (negated: not to), each as literals.
+
+        `fresh` gives the next free bit. A difference is at least zero, more than zero, or zero; nothing else has a bit.
+        """
+        if left is None or right is None:
+            return ((),) if negated else (None,)
+        contrary = {"<": (">=",), "<=": (">",), "=": ("<", ">"), ">=": ("<",), ">": ("<=",)}
+        signs = contrary[sign] if negated else (sign,)
+        found: list[tuple[int, ...] | None] = []
+        for one in signs:
+            difference = right.plus(left, -1) if one[0] == "<" else left.plus(right, -1)
+            upward = one.replace("<", ">")
+            if not difference.terms:
+                found.append(() if COMPARING[upward](Fraction(difference.constant), Fraction(0)) else None)
+                continue
+            if (difference, upward) not in self.bits:
+                self.bits[difference, upward] = fresh()
+            found.append((self.bits[difference, upward],))
+        return tuple(found)
+
+
+@dataclass(eq=False)
+class Amounts:
+    """The amounts of a task.
+
+    Parameters
+    ----------
+    symbols : sequence of Symbol
+        What the places of a tuple stand for.
+    first : tuple of numbers
+        In the initial state.
+    quantities : sequence of Quantity
+        What each of them can be.
+    bits : mapping of (difference, sign) to bit
+        The bit is set where the difference is ``>=``, ``>`` or ``=`` 0.
+    size : int
+        Number of bits below the number of a tuple.
+    moves : function of an operator
+        To the changes that it makes.
+    """
+
+    symbols: Sequence[Symbol]
+    first: Vector
+    quantities: Sequence[Quantity]
+    bits: Mapping[tuple[Linear, str], int]
+    size: int
+    moves: Callable[[int], tuple[Move, ...]]
+    vectors: list[Vector] = field(default_factory=list)
+    _number: dict[Vector, int] = field(default_factory=dict, repr=False)
+    _masks: list[int] = field(default_factory=list, repr=False)
+    _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        """Begin with the first tuple."""
+        self.compared = sum(1 << bit for bit in self.bits.values())
+        self.keep = ~self.compared & (1 << self.size) - 1
+        self.numbered(self.first, 0, range(len(self.symbols)))
+
+    @cached_property
+    def at(self) -> Mapping[int, Sequence[tuple[int, Linear, str]]]:
+        """The comparisons in which each place is."""
+        found = defaultdict[int, list[tuple[int, Linear, str]]](list)
+        for (difference, sign), bit in self.bits.items():
+            for place, _ in difference.terms:
+                found[place].append((bit, difference, sign))
+        return found
+
+    def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
+        """Return the number of a tuple; where it is new, its bits are those of another but for what changed."""
+        number = self._number.get(vector)
+        if number is None:
+            for place in changed:
+                for bit, difference, sign in self.at.get(place, ()):
+                    amount = difference.of(vector)
+                    holds = amount > 0 or (amount == 0 and sign != ">") if sign != "=" else amount == 0
+                    mask = mask | 1 << bit if holds else mask & ~(1 << bit)
+            number = self._number[vector] = len(self.vectors)
+            self.vectors.append(vector)
+            self._masks.append(mask)
+        return number
+
+    def vector(self, state: int) -> Vector:
+        """Return the amounts of a state."""
+        return self.vectors[state >> self.size]
+
+    def begun(self, state: int) -> int:
+        """Return a state's bits with the first amounts."""
+        return state & self.keep | self._masks[0]
+
+    def applied(self, before: int, after: int, operator: int) -> int | None:
+        """Return a state with its amounts changed by an operator as they were before; None if one can't be what it would be."""
+        moves = self._moves.get(operator)
+        if moves is None:
+            moves = self._moves[operator] = self.moves(operator)
+        if not moves:
+            return after
+        number = before >> self.size
+        vector = self.vectors[number]
+        new: dict[int, Exact] = {}
+        position = -1
+        for move in moves:
+            if move.position == position or before & move.when != move.when:
+                continue
+            position = move.position
+            if move.by is None:
+                return None
+            by, old = move.by.of(vector), new.get(move.place, vector[move.place])
+            match move.operation:
+                case "assign":
+                    new[move.place] = by
+                case "scale":
+                    new[move.place] = old * by
+                case "increase":
+                    new[move.place] = old + by
+                case _:
+                    new[move.place] = old - by
+        for place, amount in new.items():
+            if not self.quantities[place].allows(Fraction(amount)):
+                return None
+        changed = list(vector)
+        for place, amount in new.items():
+            changed[place] = _exact(amount)
+        number = self.numbered(tuple(changed), self._masks[number], new)
+        return after & self.keep | self._masks[number] | number << self.size
+
+    def facts(self, state: int) -> list[Fact]:
+        """Return the amounts of a state as facts."""
+        found = zip(self.symbols, self.vector(state), strict=True)
+        return [Fact(symbol, written(Fraction(amount))) for symbol, amount in found]
+
+
+def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
+    """Return how far some changes move a difference: False if they don't, None if that depends on the state."""
+    factors = dict(difference.terms)
+    concerned = [move for move in moves if move.place in factors]
+    if not concerned:
+        return False
+    total: Exact = 0
+    for move in concerned:
+        if move.operation not in ("increase", "decrease") or move.by is None or move.by.terms:
+            return None
+        total += factors[move.place] * move.by.constant * (1 if move.operation == "increase" else -1)
+    return _exact(total)
+
+
+def _exact(amount: Exact) -> Exact:
+    return amount.numerator if amount.denominator == 1 else amount
