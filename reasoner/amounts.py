@@ -202,5 +202,6 @@ def nearer(before: str | None, after: Number, wanted: str) -> bool:
 def _off(limits: tuple[tuple[str, Fraction], ...], amount: Number) -> Number:
     total: Number = Fraction(0)
     for sign, limit in limits:
-        total += Fraction(0) if COMPARING[sign](amount, limit) else abs(amount - limit)
+        if not COMPARING[sign](amount, limit):
+            total += max(amount - limit, limit - amount)
     return total
