@@ -205,6 +205,19 @@ class Scene:
         ):
             return image.copy()
 
+    def board(self) -> Any:
+        """Return a board for a notebook, on which one turns facts, goals and interventions by hand and sees the plan change.
+
+        Raises
+        ------
+        KnowledgeError
+            anywidget isn't installed (the extra `notebook` brings it), or the scene is too large to be turned by hand.
+        """
+        from confab.board import board
+
+        self._settle()
+        return board(self)
+
     @cached_property
     def graph(self) -> rdflib.Graph:
         """The scene's triples as an rdflib graph; what is added to it or removed from it counts in `query` and `plan` at once."""

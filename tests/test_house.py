@@ -19,7 +19,15 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "acting": {"hierarchical"},
 }
 OPEN_CYCLES = [  # what still imports each other: a scene and what can be done with it, and how both are shown
-    {"confab.execution", "confab.live", "confab.memory", "confab.physics", "confab.picturing", "confab.reaching"}
+    {
+        "confab.board",
+        "confab.execution",
+        "confab.live",
+        "confab.memory",
+        "confab.physics",
+        "confab.picturing",
+        "confab.reaching",
+    }
     | {"confab.scene", "confab.serving"}
     | {"confab.explaining", "confab.why", "confab.report.notebook", "confab.report.page", "confab.report.pieces"},
 ]

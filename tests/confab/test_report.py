@@ -27,6 +27,18 @@ from sim.verdict import Verdict
 from sim.verify import Rollout, StepReport
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--virtual-time-budget=2000",
+    "--dump-dom",
+]
 SYMBOLIC = ["towers-small", "house-small"]
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 
@@ -210,11 +222,7 @@ def test_in_a_browser_nothing_runs_over_or_fails_and_a_click_is_followed(
 ) -> None:
     assert CHROMIUM is not None
     (tmp_path / "page.html").write_text(pages[name].replace("<title>", WATCH + "<title>", 1))
-    flags = (
-        "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-        "--disable-component-update --disable-sync --virtual-time-budget=2000 --dump-dom"
-    )
-    line = [CHROMIUM, *flags.split(), f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size},900"]
+    line = [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size},900"]
     done = subprocess.run(
         [*line, (tmp_path / "page.html").as_uri()], capture_output=True, text=True, timeout=60, check=False
     )
