@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,9 @@ from rdflib.plugins.stores.memory import SimpleMemory
 
 import confab
 from reasoner.generate import write_scene
-from reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load
-from reasoner.reading.problem import SCHEMA
+from reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
+from reasoner.names import local_name
+from reasoner.reading.problem import SCHEMA, Member, Schema
 from reasoner.reading.relevance import recognise
 
 
@@ -109,6 +110,26 @@ def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: 
         assert counted(path, goals) == alone
 
 
+def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What commit 40b5436 brought: namesakes were looked for by a query that went through all individuals."""
+
+    def namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
+        endings = {local_name(individual) for individual, _, _ in members}
+        found = {text(x) for (x,) in graph.select("SELECT ?x WHERE { ?x a owl:NamedIndividual }", SCENE)}
+        return {x for x in found if local_name(x) in endings} - {individual for individual, _, _ in members}
+
+    monkeypatch.setattr("reasoner.reading.relevance._namesakes", namesakes)
+    path = tmp_path / "scene.ttl"
+    write_scene(path, "served")
+    alone = counted(path)
+    write_scene(path, "served", clutter=100)
+    among = counted(path)
+    assert among["queries"] == alone["queries"]
+    assert all(among[what] > alone[what] + 100 for what in ("rows", "bytes", "looked"))
+
+
 def test_a_call_asks_the_store_few_questions() -> None:
     """Two and one per file for loading; six for recognition, and one more that finds what a changed goal names."""
     scene = confab.load("beverage-serving")
@@ -157,14 +178,25 @@ MOST_MODULES = 250
 """140 are Python's own, 42 rich's, 42 ours, 12 click's; and a few."""
 
 
-def test_the_plan_command_imports_what_it_needs() -> None:
+def imported(before: str = "") -> list[str]:
+    """Return the modules that a plan on the command line imports, after a line of Python."""
     script = (
-        "import sys; sys.argv = ['confab', 'plan', 'beverage-serving']\n"
+        f"{before}\nimport sys; sys.argv = ['confab', 'plan', 'beverage-serving']\n"
         "from confab.cli import main\n"
         "try: main()\n"
         "finally: print(*sys.modules, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    modules = done.stderr.split()
+    return done.stderr.split()
+
+
+def test_the_plan_command_imports_what_it_needs() -> None:
+    modules = imported()
     assert [name for name in modules if name in UNWANTED] == []
     assert len(modules) <= MOST_MODULES
+
+
+def test_what_it_doesnt_need_is_noticed() -> None:
+    modules = imported("import rdflib, planner.grounded.task")
+    assert {name for name in modules if name in UNWANTED} >= {"rdflib", "planner.grounded"}
+    assert len(modules) > MOST_MODULES
