@@ -5,6 +5,8 @@ who    situation type → value → the keys that have it, in the order in which
 trail  what was overwritten, oldest first; `undo` takes it back to a mark
 age    how often anything was changed, undoing included: what was read off the table at this age still holds
 
+What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`Derived`).
+
 Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world. A condition becomes
 one Python expression over `now` and `who`, a behaviour a function ``forward(arguments)`` that returns the individuals of its
 variables and its changes, or None if it isn't applicable now. A new kind of condition gets its case in `Writer.expression`.
@@ -33,6 +35,7 @@ from reasoner.amounts import (
     terms_of,
 )
 from reasoner.amounts import written as amount_written
+from reasoner.derivation import strata
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -128,6 +131,77 @@ class Table:
         return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
 
 
+class Derived(dict[Key, str]):
+    """In place of the cells of a situation type that is defined: nothing is kept in it, and `get` works a value out."""
+
+    def __init__(self, name: str, stratum: Stratum) -> None:
+        super().__init__()
+        self.name, self.stratum = name, stratum
+
+    def get(self, key: Key, default: str | None = None) -> str:  # type: ignore[override]
+        """Return whether it holds of the arguments behind a key."""
+        return TRUE if self.stratum.holds((self.name, key)) else FALSE
+
+
+class Stratum:
+    """Situation types whose rules need each other, and what is known of them at one age of the table.
+
+    What is asked for is tried, with all that its rules ask for in turn, until a round makes nothing more of it true: then the
+    rest is false. Nothing else is looked at, and no chain is too long for the interpreter's stack.
+    """
+
+    def __init__(self, table: Table) -> None:
+        self.table, self.age = table, -1
+        self.tests: dict[str, Callable[..., bool]] = {}
+        self.known: dict[Cell, bool] = {}
+        self.asked: dict[Cell, None] | None = None  # while something is worked out: with it, what that led to
+
+    def holds(self, cell: Cell) -> bool:
+        """Return whether a symbol is true; while another one is worked out: as far as is known."""
+        if self.age != self.table.age:
+            self.age = self.table.age
+            self.known.clear()
+        found = self.known.get(cell)
+        if found is not None:
+            return found
+        if self.asked is not None:
+            self.asked[cell] = None
+            return False
+        self.asked = {cell: None}
+        try:
+            found = self._worked_out(cell, self.asked)
+            if not found:
+                for other in self.asked:
+                    self.known.setdefault(other, False)
+        finally:
+            self.asked = None
+        return found
+
+    def _worked_out(self, cell: Cell, asked: dict[Cell, None]) -> bool:
+        order, done, known = [cell], 0, self.known
+        while True:
+            grown = False
+            while done < len(order):  # what was asked for the first time
+                grown |= self._try(order[done])
+                done += 1
+                if len(asked) > len(order):
+                    order += list(asked)[len(order) :]
+            if cell in known:
+                return True
+            for other in reversed(order):  # the last ones asked for are those that others wait for
+                if other not in known:
+                    grown |= self._try(other)
+            if cell in known or not (grown or len(asked) > len(order)):
+                return cell in known
+            order += list(asked)[len(order) :]
+
+    def _try(self, cell: Cell) -> bool:
+        found = self.tests[cell[0]](*arguments_of(cell[1]))
+        if found:
+            self.known[cell] = True
+        return found
+
+
 class Writer:
     """Writes conditions and behaviours of one problem as Python over the dictionaries of a table.
 
@@ -142,6 +216,37 @@ class Writer:
         self.constants: dict[str, object] = {}
         self.variables: dict[str, tuple[str, ...]] = {}
         self._fan: dict[str, float] = {}
+        self._define = self.function(["rules = {}", *self._rules()], "rules") if problem.domain.rules else None
+
+    def define(self, table: Table) -> None:
+        """Have a table work out what is defined; before any function is bound to it."""
+        if self._define is None:
+            return
+        rules = self.problem.domain.rules
+        for group in strata(rules):
+            stratum = Stratum(table)
+            for name in group:
+                table.now[name] = Derived(name, stratum)
+        tests = self._define(table.now, table.who)
+        for name in rules:
+            cells = table.now[name]
+            assert isinstance(cells, Derived)
+            cells.stratum.tests[name] = tests[name]
+
+    def _rules(self) -> Iterator[str]:
+        """Yield the lines that put a function for each situation type that is defined into `rules`."""
+        for name, rules in self.problem.domain.rules.items():
+            arguments = [f"a{i}" for i in range(len(self.problem.domain.situations[name].arguments))]
+            yield f"def {identifier('rule', name)}({', '.join(arguments)}):"
+            for rule in rules:
+                kinds, bound = rule.behavior.kinds, {p.name for p in rule.parameters}
+                put = ", ".join(written(p.name) for p in rule.parameters)
+                tests = [self.member(p.name, p.kind) for p in rule.parameters]
+                tests += self.conjunction(rule.conditions, bound, kinds, name)
+                yield f"    {put}, = {', '.join(arguments)},"
+                yield f"    if {' and '.join(f'({test})' for test in tests)}: return True"
+            yield "    return False"
+            yield f"rules[{name!r}] = {identifier('rule', name)}"
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
         """Return a function of a table's `now` and `who` (and what else is given) that runs lines and returns a result."""
@@ -290,8 +395,9 @@ class Writer:
         return source, tests
 
     def listed(self, situation: str, value: str) -> bool:
-        """Whether the table lists who has a value: what is false isn't listed, and a variable could be that."""
-        return value == TRUE or not self.problem.domain.situations[situation].boolean
+        """Whether the table lists who has a value: not what is defined, nor what is false, and a variable could be that."""
+        domain = self.problem.domain
+        return situation not in domain.rules and (value == TRUE or not domain.situations[situation].boolean)
 
     def look(self, condition: ValueCondition) -> str:
         """Return the expression for the value that a condition asks about."""

@@ -13,14 +13,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import groupby
 from operator import contains, itemgetter
 from typing import TypeAlias
 
 from planner.plan import Plan, Step
 from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, meets, terms_of, written
+from reasoner.derivation import strata
 from reasoner.symbols import (
     FALSE,
+    TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -186,13 +189,49 @@ class Facts:
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
+        self._asking: dict[tuple[str, ...], dict[Cell, bool]] = {}
         for symbol, value in state.items():
             self._values[symbol.situation][symbol.arguments] = value
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
         """Return the value of a symbol, or None if there is no such symbol."""
+        if situation in self.problem.domain.rules:
+            if not self.exists(situation, arguments):
+                return None
+            return TRUE if self.follows((situation, arguments)) else FALSE
         value = self._values[situation].get(arguments)
         return FALSE if value is None and self.exists(situation, arguments) else value
+
+    def follows(self, cell: Cell) -> bool:
+        """Return whether something that is defined holds: whether its rules give it, or what they ask for in turn.
+
+        What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
+        tried again until nothing more becomes true.
+        """
+        stratum = self._strata[cell[0]]
+        asked = self._asking.get(stratum)
+        if asked is not None:
+            return asked.setdefault(cell, False)
+        asked = self._asking[stratum] = {cell: False}
+        seen, grown = 0, False
+        try:
+            while not asked[cell] and (seen < len(asked) or grown):
+                fresh = list(asked)[seen:]
+                seen, grown = len(asked), bool(fresh) and grown
+                for one in fresh or [one for one in reversed(asked) if not asked[one]]:
+                    asked[one] = self._rules.follows(*one, self)
+                    grown |= asked[one]
+            return asked[cell]
+        finally:
+            del self._asking[stratum]
+
+    @cached_property
+    def _strata(self) -> Mapping[str, tuple[str, ...]]:
+        return {name: group for group in strata(self.problem.domain.rules) for name in group}
+
+    @cached_property
+    def _rules(self) -> Rules:
+        return Rules(self.problem)
 
     def state(self) -> dict[Symbol, str]:
         """Return what is stated now."""
@@ -242,6 +281,17 @@ class Rules:
         self.problem = problem
         self._read: dict[str, _Behavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
+        self._defined: dict[str, list[_Behavior]] = {}
+
+    def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
+        """Whether one of the rules of a situation type gives it of some arguments."""
+        if situation not in self._defined:
+            self._defined[situation] = [_Behavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]]
+        for rule in self._defined[situation]:
+            values = [*arguments, *rule.terms[len(arguments) :]]
+            if all(map(contains, rule.members, arguments)) and _hold(rule.preconditions, facts, values):
+                return True
+        return False
 
     def read(self, behavior: Behavior) -> _Behavior:
         """Return how a behaviour is read."""
@@ -425,7 +475,9 @@ class _Reading:
         """Return those that the first unknown variable of a condition could be."""
         variable, kind = unknown[0], kinds[unknown[0]]
         match condition:
-            case ValueCondition(situation, arguments, value, False) if value not in unknown:
+            case ValueCondition(situation, arguments, value, False) if (
+                value not in unknown and situation not in self.problem.domain.rules
+            ):
                 position, at = arguments.index(variable), self.place(value)
 
                 def having(facts: Facts, values: Values) -> Iterable[str]:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import isnan
 from typing import TypeAlias
 
 Number: TypeAlias = "Fraction | float"
@@ -32,10 +31,10 @@ class Quantity:
     def allows(self, amount: Number) -> bool:
         """Whether an amount is one of these."""
         return (
-            not isnan(amount)
+            isinstance(amount, Fraction)  # and not `NOTHING`
             and (self.least is None or amount >= self.least)
             and (self.most is None or amount <= self.most)
-            and (not self.whole or (isinstance(amount, Fraction) and amount.denominator == 1))
+            and (not self.whole or amount.denominator == 1)
         )
 
 
@@ -191,7 +190,7 @@ def meets(value: str | None, wanted: str) -> bool:
 
 def nearer(before: str | None, after: Number, wanted: str) -> bool:
     """Whether an amount comes nearer to what is wanted of it, or gets there."""
-    if before is None or isnan(after):
+    if before is None or not isinstance(after, Fraction):
         return False
     limits, old = bounds(wanted), number(before)
     if all(COMPARING[sign](after, limit) for sign, limit in limits):

@@ -12,6 +12,7 @@ situated object instance      fact                                       `Fact`
 situation type                the variable's property, and its domain    `SituationType`
 behaviour                     action schema                              `Behavior`
 quantified behaviour          ground action                              `GroundBehavior`
+(none)                        derived predicate, and its axioms          `Rule`
 ============================  =========================================  =====================
 """
 
@@ -233,6 +234,37 @@ class Behavior:
         return {term.name: term.kind for term in (*self.parameters, *self.variables)}
 
 
+@dataclass(frozen=True)
+class Rule:
+    """A situation type that is defined: of these individuals it is true where all conditions hold, in every state.
+
+    Where a situation type has several rules, one suffices; where none applies it is false. Its symbols are in no state that is
+    handed around: whoever is asked for one works it out. Rules may need each other, but none the negation of what needs it
+    (`reasoner.derivation`).
+
+    Parameters
+    ----------
+    situation : str
+        A boolean situation type, which no behaviour changes.
+    parameters : tuple of Parameter
+        What its arguments are called in the conditions, and the classes of which they have to be.
+    variables : tuple of Parameter
+        What the conditions determine besides, as in a behaviour.
+    conditions : tuple of Condition
+    """
+
+    situation: str
+    parameters: tuple[Parameter, ...]
+    variables: tuple[Parameter, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+
+    @cached_property
+    def behavior(self) -> Behavior:
+        """The rule as a behaviour that makes its situation type true, for all that asks what makes what true."""
+        head = ValueEffect(self.situation, tuple(p.name for p in self.parameters), TRUE)
+        return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
+
+
 @dataclass(frozen=True, order=True)
 class GroundBehavior:
     """A quantified behaviour with the ID that its level's numbering gives it."""
@@ -248,11 +280,15 @@ class GroundBehavior:
 
 @dataclass(frozen=True)
 class Domain:
-    """What can be the case and what can be done: situation types and behaviours, in declared order."""
+    """What can be the case and what can be done: situation types and behaviours, in declared order.
+
+    `rules` has the situation types that are defined instead of changed, each with its rules.
+    """
 
     situations: Mapping[str, SituationType]
     behaviors: Mapping[str, Behavior]
     first_ids: Mapping[int, int] = field(default_factory=dict)
+    rules: Mapping[str, tuple[Rule, ...]] = field(default_factory=dict)
 
     @property
     def levels(self) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""Random behaviours over a few individuals: every kind of condition and effect, nested in one another, over odd symbols.
+"""Random behaviours and rules over a few individuals: every kind of condition and effect, nested in one another, over odd symbols.
 
 Among them are effects on one and the same fact, parameters that get the same individual, symbols that don't exist (a place of
 something that has none), special values (`nowhere`), and variables that only a part of a condition determines.
@@ -6,6 +6,7 @@ something that has none), special values (`nowhere`), and variables that only a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import product
 from random import Random
@@ -25,6 +26,7 @@ from reasoner.symbols import (
     Parameter,
     Problem,
     RelationCondition,
+    Rule,
     SituationType,
     Symbol,
     ValueCondition,
@@ -53,6 +55,12 @@ AMOUNTS = {
     ),
 }
 MEASURES = {"size": ("Thing",), "way": ("Cup", "Shelf")}
+DEFINED = {
+    "SEEN": SituationType("SEEN", ("Thing",), "Truth", boolean=True),
+    "ABOVE": SituationType("ABOVE", ("Thing", "Thing"), "Truth", boolean=True),
+    "LOST": SituationType("LOST", ("Cup",), "Truth", boolean=True),
+}
+"""Situation types that have random rules; the first two need each other, the last one may need their being false."""
 RELATIONS = {"fits": ("Thing", "Thing"), "marked": ("Shelf",)}
 DEPTH = 2
 
@@ -60,9 +68,12 @@ DEPTH = 2
 class Writer:
     """Writes one random behaviour."""
 
-    def __init__(self, rng: Random) -> None:
+    def __init__(self, rng: Random, defined: Sequence[str] = (), positive: Sequence[str] = ()) -> None:
         self.rng = rng
         self.kinds: dict[str, str] = {}
+        self.asked = {**SITUATIONS, **{name: DEFINED[name] for name in defined}}
+        self.positive = positive  # those that are asked for only where their being true helps
+        self.flipped = False
 
     def behavior(self, name: str, level: int = 1) -> Behavior:
         """Return a behaviour in which something determines every variable."""
@@ -92,6 +103,14 @@ class Writer:
             name, level, tuple(t for t in terms if t.name in parameters), tuple(t for t in terms if t.name not in parameters),
             tuple(conditions), tuple(effects), amounts=tuple(amounts),
         )  # fmt: skip
+
+    def rule(self, situation: str) -> Rule:
+        """Return a rule of a situation type that is defined."""
+        wanted = DEFINED[situation].arguments
+        parameters = [self.fresh(self.rng.choice((kind, kind, "Cup"))) for kind in wanted]
+        conditions = self.conditions(list(parameters), self.rng.randint(1, 3), DEPTH)
+        terms = [Parameter(term, self.kinds[term]) for term in self.kinds]
+        return Rule(situation, tuple(terms[: len(wanted)]), tuple(terms[len(wanted) :]), tuple(conditions))
 
     def fresh(self, kind: str) -> str:
         """Return a new variable of a class."""
@@ -130,14 +149,21 @@ class Writer:
             case "witness" if depth:
                 variable = self.fresh(kind := rng.choice(("Cup", "Shelf", "Thing")))
                 del self.kinds[variable]  # it isn't one of the behaviour's
+                self.flipped ^= negated
                 inner = self.conditions([*bound, variable], rng.randint(1, 2), depth - 1)
+                self.flipped ^= negated
                 return Witness(variable, kind, tuple(inner), negated)
             case "any" if depth:
+                self.flipped ^= negated
                 groups = [self.conditions(list(bound), rng.randint(1, 2), depth - 1) for _ in range(rng.randint(1, 3))]
+                self.flipped ^= negated
                 return AnyOf(tuple(map(tuple, groups)), negated)
-        situation = rng.choice(sorted(SITUATIONS))
-        arguments = tuple(self.term(bound) for _ in SITUATIONS[situation].arguments)
-        return ValueCondition(situation, arguments, rng.choice(CLASSES[SITUATIONS[situation].range]), negated)
+        situation = rng.choice(sorted(self.asked))
+        arguments = tuple(self.term(bound) for _ in self.asked[situation].arguments)
+        value = rng.choice(CLASSES[self.asked[situation].range])
+        if situation in self.positive and (negated is not (value == FALSE)) is not self.flipped:
+            negated = not negated
+        return ValueCondition(situation, arguments, value, negated)
 
     def amount(self, bound: list[str], depth: int) -> Expression:
         """Return an amount of terms that are bound, sometimes one that isn't there; linear in what changes."""
@@ -175,10 +201,17 @@ class Writer:
         return ValueEffect(situation, arguments, value, when)
 
 
-def language(seed: int, behaviors: int = 2) -> Problem:
-    """Return a problem of one level with random behaviours, a random state and no goal."""
+def language(seed: int, behaviors: int = 2, defined: bool = False) -> Problem:
+    """Return a problem of one level with random behaviours, a random state and no goal; on request with random rules."""
     rng = Random(seed)
-    made = [Writer(rng).behavior(f"B{i}") for i in range(behaviors)]
+    names = tuple(DEFINED) if defined else ()
+    made = [Writer(rng, names).behavior(f"B{i}") for i in range(behaviors)]
+    rules = {}
+    for name in names:
+        both = names[:2] if name in names[:2] else names
+        rules[name] = tuple(
+            Writer(rng, both, both[:2] if name in names[:2] else (name,)).rule(name) for _ in range(rng.randint(1, 3))
+        )
     relations = {
         name: frozenset(row for row in product(*(CLASSES[kind] for kind in kinds)) if rng.random() < 0.5)
         for name, kinds in RELATIONS.items()
@@ -199,5 +232,6 @@ def language(seed: int, behaviors: int = 2) -> Problem:
             initial |= {Symbol(name, row): value for row, value in rows.items()}
         else:
             relations[name] = frozenset((*row, value) for row, value in rows.items())
-    domain = Domain(SITUATIONS | AMOUNTS, {b.name: b for b in made})
+    situations = SITUATIONS | AMOUNTS | {name: DEFINED[name] for name in names}
+    domain = Domain(situations, {b.name: b for b in made}, rules=rules)
     return Problem("random", domain, CLASSES, relations, initial, {})

@@ -155,6 +155,13 @@ class AmountTable:
             found.append((self.bits[difference, upward],))
         return tuple(found)
 
+    def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
+        """Return the alternatives of which one must hold for a comparison's bit not to be set; None if it is no comparison's."""
+        for (difference, sign), its in self.bits.items():
+            if its == bit:
+                return list(self.comparison(difference, sign, Linear((), 0), True, fresh))
+        return None
+
 
 @dataclass(eq=False)
 class Amounts:

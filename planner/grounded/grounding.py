@@ -22,6 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.grounded.amounts import Amounts, Linear, Move, pushes
+from planner.grounded.derived import Bit, Derived, in_parts
 from planner.grounded.joins import Ints, Table
 from planner.grounded.reachability import Flags, Formulas, Literals, Reached
 from planner.grounded.schemas import Schema
@@ -29,11 +30,13 @@ from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
 from planner.plan import Reason
+from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
     TRUE,
     Fact,
     Problem,
+    Rule,
     State,
     Symbol,
 )
@@ -102,7 +105,7 @@ class _Assembly:
 
     def task(self, goal: State) -> Task | Reason:
         self._number_facts()
-        base = [i for i, schema in enumerate(self.reached.schemas) if not schema.conditional]
+        base = [i for i, schema in enumerate(self.reached.schemas) if not schema.conditional and not schema.rule]
         rows, needs = {}, {}
         for i, schema in enumerate(self.reached.schemas):
             rows[i], needs[i] = self._needs(schema, self.reached.rows[i])
@@ -131,13 +134,16 @@ class _Assembly:
                 rows[i], owners[i] = rows[i][keep], first[parent] + place[keep]
                 first[i] = count
                 count += len(keep)
-        return self._build(rows, needs, owners, first, operators, count, wanted)
+        derived, cases = self._derived(rows, needs)
+        return self._build(rows, needs, owners, first, operators, count, wanted, derived, cases)
 
     def _number_facts(self) -> None:
         """Give a bit to every reachable fact whose symbol can change."""
         reached, names = self.reached, self.reached.individuals
         for name, situation in reached.situations.items():
             reached.check_time()
+            if name in reached.defined:
+                continue
             table = reached.tables["situation", name]
             if situation.boolean:
                 symbols = np.arange(len(table))
@@ -165,7 +171,14 @@ class _Assembly:
                     self.facts.append(Fact(symbol, value))
         amounts = reached.amounts
         self.constants |= {symbol: amounts.text(symbol) for symbol in amounts.now if symbol not in amounts.place}
-        self.formulas.size = len(self.facts)
+        size = len(self.facts)
+        for name in sorted(reached.defined):  # behind all that can be stated
+            table = reached.tables["situation", name]
+            self.fact_bit[name] = np.arange(size, size + len(table))
+            rows = (tuple(names[i] for i in row) for row in table.rows.tolist())
+            self.formulas.bits[name] = dict(zip(rows, range(size, size + len(table)), strict=True))
+            size += len(table)
+        self.formulas.size = size
 
     def _true_at_first(self, name: str) -> int:
         return sum(v == TRUE for s, v in self.reached.initial.items() if s.situation == name)
@@ -216,6 +229,61 @@ class _Assembly:
         held = keep[row]
         return rows[keep], (new[row[held]], bit[held])
 
+    def _derived(
+        self, rows: Mapping[int, Ints], needs: Mapping[int, tuple[Ints, Ints]]
+    ) -> tuple[Derived, list[tuple[tuple[int, ...], int]]]:
+        """Return the bits that follow from others, and for the relaxed task each way in which one does."""
+        formulas = self.formulas
+        ways: dict[int, dict[tuple[int, ...], None]] = {}  # of each bit of a situation type that is defined
+        for name in self.reached.defined:
+            ways |= {int(bit): {} for bit in self.fact_bit[name]}
+        for i, schema in enumerate(self.reached.schemas):
+            if schema.rule:
+                effect = schema.effects[0][1]
+                table = self.reached.tables["situation", effect.situation]
+                places = table.find(self.reached.effect_rows(schema, effect, rows[i]))
+                lists = _grouped(*needs[i], len(rows[i])).lists()
+                for place, found in zip(places.tolist(), lists, strict=True):
+                    if place >= 0:
+                        ways[int(self.fact_bit[effect.situation][place])][tuple(found)] = None
+        if not ways and not formulas.derived:
+            return Derived(), []
+        self._opposites(ways)
+        for groups, bit in formulas.derived.items():
+            ways[bit] = dict.fromkeys(groups)
+        bits = {bit: Bit(1 << bit, tuple(_mask(found) for found in its)) for bit, its in ways.items()}
+        cases = [(found, bit) for bit, its in ways.items() for found in its]
+        for bit, opposite in formulas.complements.items():
+            if bit in ways and opposite not in ways:
+                bits[opposite] = Bit(1 << opposite, (1 << bit,), opposite=True)
+                cases.append(((), opposite))
+        return in_parts(bits), cases
+
+    def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]]) -> None:
+        """Add what it takes for what is defined not to hold, where that is asked for and it doesn't follow from itself."""
+        formulas = self.formulas
+        circular = {
+            bit for name in self.reached.defined for bit in self.fact_bit[name].tolist() if name in self._circular()
+        }
+        waiting = [bit for bit in formulas.complements if bit in ways]
+        for bit in waiting:  # which grows
+            self.reached.check_time()
+            if bit in circular:
+                continue
+            known = len(formulas.complements)
+            found = formulas.all_of(formulas.any_of(formulas.opposite(one) for one in way) for way in ways[bit])
+            ways[formulas.complements[bit]] = {} if found is None else {found: None}
+            waiting += [other for other in list(formulas.complements)[known:] if other in ways]
+
+    def _circular(self) -> set[str]:
+        """Return the situation types that are defined by themselves, or by others that are defined by them."""
+        rules: dict[str, list[Rule]] = {name: [] for name in self.reached.defined}
+        for schema in self.reached.schemas:
+            if schema.rule:
+                behavior = schema.behavior
+                rules[behavior.effects[0].situation].append(Rule(behavior.name, (), (), behavior.preconditions))
+        return circular(rules)
+
     def _goal(self, goal: State) -> Literals:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
 
@@ -228,6 +296,8 @@ class _Assembly:
         operators: int,
         count: int,
         wanted: tuple[int, ...],
+        derived: Derived,
+        cases: Sequence[tuple[tuple[int, ...], int]],
     ) -> Task:
         schemas_, reached, formulas = self.reached.schemas, self.reached, self.formulas
         owner = np.concatenate([owners[i] for i in sorted(first, key=first.__getitem__)] or [np.empty(0, np.int64)])
@@ -245,8 +315,8 @@ class _Assembly:
         reached.check_time()
         effects = self._effects(rows, first)
         symbol_bits: dict[int, list[int]] = defaultdict(list)
-        for name, bits in self.fact_bit.items():
-            for symbol, bit in zip(self.symbol_of[name].tolist(), bits.tolist(), strict=True):
+        for name, symbols in self.symbol_of.items():
+            for symbol, bit in zip(symbols.tolist(), self.fact_bit[name].tolist(), strict=True):
                 if bit >= 0:
                     symbol_bits[symbol].append(bit)
         moves = self._moves(rows, first)
@@ -328,19 +398,15 @@ class _Assembly:
         costs = np.concatenate(
             [np.full(len(rows[i]), schemas_[i].behavior.cost) for i in bases] or [np.empty(0)]
         ).tolist()
-        derived = tuple(
-            (1 << bit, tuple(sum(1 << b for b in group) for group in groups))
-            for groups, bit in formulas.derived.items()
-        )
         # Derived bits in the relaxed task: an operator of no cost per alternative, owned by nobody.
-        need, add, owner = _with_derived(need, add, owner, formulas.derived)
-        task = Task(
+        need, add, owner = _with_derived(need, add, owner, cases)
+        return Task(
             problem=reached.problem,
             level=reached.level,
             facts=self.facts,
-            complements={complement: self.facts[bit] for bit, complement in formulas.complements.items()},
+            complements={c: self.facts[bit] for bit, c in formulas.complements.items() if bit < len(self.facts)},
             size=formulas.size,
-            initial=initial,
+            initial=derived.completed(initial),
             goal=sum(1 << bit for bit in wanted),
             constants=self.constants,
             costs=costs,
@@ -352,7 +418,6 @@ class _Assembly:
             describe=describe,
             amounts=amounts,
         )
-        return task if not derived else _completed(task)
 
     def _initial_bits(self) -> Iterator[int]:
         true = set()
@@ -451,14 +516,9 @@ class _Assembly:
         return _grouped(np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs]), count)
 
 
-def _completed(task: Task) -> Task:
-    return replace(task, initial=task.completed(task.initial))
-
-
 def _with_derived(
-    need: Grouped, add: Grouped, owner: Ints, derived: Mapping[tuple[tuple[int, ...], ...], int]
+    need: Grouped, add: Grouped, owner: Ints, cases: Sequence[tuple[tuple[int, ...], int]]
 ) -> tuple[Grouped, Grouped, Ints]:
-    cases = [(group, bit) for groups, bit in derived.items() for group in groups]
     if not cases:
         return need, add, owner
     more = np.array([bit for group, _ in cases for bit in group], np.int64)
@@ -467,6 +527,10 @@ def _with_derived(
     ends = add.starts[-1] + np.arange(1, len(cases) + 1)
     add = Grouped(np.concatenate([add.starts, ends]), np.concatenate([add.items, np.array([bit for _, bit in cases])]))
     return need, add, np.concatenate([owner, np.full(len(cases), -1)])
+
+
+def _mask(bits: Sequence[int]) -> int:
+    return sum(1 << bit for bit in bits)
 
 
 def _grouped(owner: Ints, items: Ints, count: int) -> Grouped:

@@ -146,7 +146,7 @@ def _plain(task: Task, operator: int) -> tuple[int, int] | None:
     changes = task.known(operator)[1]
     if task.barred or (task.amounts is not None and task.amounts.moves(operator)):
         return None
-    if task.derived or len(changes) != 1 or changes[0][0]:
+    if task.derived.parts or len(changes) != 1 or changes[0][0]:
         return (-1, 0) if not changes else None
     _, cleared, set_ = changes[0]
     return ~cleared, set_

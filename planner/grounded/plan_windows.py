@@ -323,8 +323,7 @@ class _Windows:
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*operators, *(r for r in self.beside if task.owners[r] < 0 or task.owners[r] in place)]
         needs = [task.needs[r] for r in rows]
-        derived = sum(bit for bit, _ in task.derived)
-        bits = sorted({bit for found in needs for bit in found}.union(bits_of(wanted | derived)))
+        bits = sorted({bit for found in needs for bit in found}.union(bits_of(wanted | task.derived.mask)))
         new = {bit: i for i, bit in enumerate(bits)}
         mask = sum(1 << bit for bit in bits)
 
@@ -344,7 +343,7 @@ class _Windows:
             owners=[place.get(task.owners[r], -1) for r in rows],
             needs=_grouped([[new[bit] for bit in found] for found in needs]),
             adds=_grouped([[new[bit] for bit in task.adds[r] if bit in new] for r in rows]),
-            derived=tuple((small(bit), tuple(map(small, groups))) for bit, groups in task.derived),
+            derived=task.derived.renamed(small),
             change=change,
             describe=lambda operator: task.describe(operators[operator]),
             _changes={},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 from typing import TypeAlias
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from planner.grounded.amounts import AmountTable
 from planner.grounded.joins import Ints, Table, pack
-from planner.grounded.schemas import Atom, Schema, plain_variables, schemas
+from planner.grounded.schemas import Atom, Schema, plain_variables, rules_apart, schemas
 from planner.language import mentions
 from planner.plan import OutOfTimeError, TooLargeError
 from reasoner.amounts import Amount, bounds
@@ -62,8 +63,18 @@ class Reached:
         self.initial = {symbol: value for symbol, value in initial.items() if symbol.situation in self.situations}
         behaviors = problem.domain.at_level(level)
         changed = frozenset[str]().union(*(behavior.changes for behavior in behaviors))
-        situations, members = problem.domain.situations, problem.members
+        situations, members = dict(problem.domain.situations), problem.members
+        self.defined = self.situations.keys() & problem.domain.rules.keys()
+        rules = [rule.behavior for name in sorted(self.defined) for rule in problem.domain.rules[name]]
+        if rules:
+            changed |= self.defined
+            rules, made = rules_apart(rules, changed)
+            self.situations |= made
+            situations |= made
+            self.defined |= made.keys()
+            changed |= made.keys()
         self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
+        self.schemas += [replace(s, rule=True) for rule in rules for s in schemas(rule, situations, changed, members)]
         self.individuals = tuple(dict.fromkeys(self._individuals()))
         self.number = {name: i for i, name in enumerate(self.individuals)}
         self.radix = max(len(self.individuals), 1)
@@ -321,7 +332,9 @@ class Formulas:
         self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
         self.size = 0
         self.complements: dict[int, int] = {}
+        self.facts_of: dict[int, int] = {}  # their opposite
         self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
+        self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # of disjunctions, by bit
         self.asked = 0
 
     def condition(
@@ -442,10 +455,21 @@ class Formulas:
         return (self.complement(bit) if negated else bit,)
 
     def complement(self, bit: int) -> int:
-        """Return the bit that says that a fact doesn't hold."""
+        """Return the bit that says that a fact doesn't hold, or the fact's bit if that is a complement."""
+        if bit in self.facts_of:
+            return self.facts_of[bit]
         if bit not in self.complements:
             self.complements[bit] = self.fresh()
+            self.facts_of[self.complements[bit]] = bit
         return self.complements[bit]
+
+    def opposite(self, bit: int) -> Literals:
+        """Return what must hold for a bit not to be set."""
+        groups = self._groups.get(bit)
+        if groups is not None:
+            return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)
+        contrary = self.reached.amounts.opposite(bit, self.fresh)
+        return (self.complement(bit),) if contrary is None else self.any_of(contrary)
 
     def fresh(self) -> int:
         """Return a bit that nothing has yet."""
@@ -481,4 +505,5 @@ class Formulas:
             return alternatives[0] if alternatives else None
         if alternatives not in self.derived:
             self.derived[alternatives] = self.fresh()
+            self._groups[self.derived[alternatives]] = alternatives
         return (self.derived[alternatives],)

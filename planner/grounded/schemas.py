@@ -25,6 +25,7 @@ from reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Parameter,
     RelationCondition,
     SituationType,
     ValueCondition,
@@ -62,6 +63,55 @@ class Schema:
     effects: tuple[tuple[int, ValueEffect], ...]
     conditional: bool = False
     amounts: tuple[tuple[int, AmountEffect], ...] = ()
+    rule: bool = False
+
+
+def rules_apart(rules: Sequence[Behavior], changed: frozenset[str]) -> tuple[list[Behavior], dict[str, SituationType]]:
+    """Return rules, each as a behaviour, in which nothing is looked for but one individual, with situation types made for that.
+
+    "There is a full cup, and there is a free shelf" joined at once would be all pairs. So a rule's witness becomes a
+    situation type of its own, true of the individuals that are named in it from outside, unless nothing else in the rule changes.
+    """
+    found: list[Behavior] = []
+    made: dict[str, SituationType] = {}
+    waiting = list(rules)
+    for rule in waiting:  # which grows
+        conditions: list[Condition] = []
+        parameters, variables = list(rule.parameters), list(rule.variables)
+        left = list(rule.preconditions)
+        while left:
+            condition = left.pop(0)
+            if not isinstance(condition, Witness) or condition.negated:
+                conditions.append(condition)
+                continue
+            name = f"?{len(made)}/{len(parameters)}{condition.variable[1:]}"
+            own = (ClassCondition(name, condition.kind), *substituted(condition, {}).conditions)  # type: ignore[union-attr]
+            own = tuple(substituted(c, {condition.variable: name}) for c in own)
+            outside = {p.name for p in parameters} | plain_variables(conditions + left)
+            kinds = {t.name: t.kind for t in (*parameters, *variables)}
+            if not any(_changing(c, changed) for c in conditions + left):
+                parameters.append(Parameter(name, condition.kind))
+                left = [*own, *left]
+                continue
+            shared = sorted(set().union(*map(mentions, own)) & outside - {name})
+            aux = f"{rule.effects[0].situation}/{len(made)}"
+            made[aux] = SituationType(aux, tuple(kinds[term] for term in shared), "Truth", boolean=True)
+            terms_ = (*(Parameter(term, kinds[term]) for term in shared), Parameter(name, condition.kind))
+            rest = tuple(v for v in (*parameters, *variables) if v.name not in shared)
+            waiting.append(replace(rule, name=aux, parameters=terms_, variables=rest, preconditions=own,
+                                   effects=(ValueEffect(aux, tuple(shared), TRUE),)))  # fmt: skip
+            conditions.append(ValueCondition(aux, tuple(shared), TRUE))
+        found.append(replace(rule, parameters=tuple(parameters), preconditions=tuple(conditions)))
+    return found, made
+
+
+def _changing(condition: Condition, changed: frozenset[str]) -> bool:
+    for c in walk(condition):
+        if isinstance(c, ValueCondition) and c.situation in changed:
+            return True
+        if isinstance(c, Comparison) and (situations_in(c.left) | situations_in(c.right)) & changed:
+            return True
+    return False
 
 
 def schemas(
@@ -225,12 +275,7 @@ class _Compiler:
                 yield Atom(("class", kind), (term,))
 
     def _fluent(self, condition: Condition) -> bool:
-        for c in walk(condition):
-            if isinstance(c, ValueCondition) and c.situation in self.changed:
-                return True
-            if isinstance(c, Comparison) and (situations_in(c.left) | situations_in(c.right)) & self.changed:
-                return True
-        return False
+        return _changing(condition, self.changed)
 
 
 def plain_variables(group: Sequence[Condition]) -> set[str]:

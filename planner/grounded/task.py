@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from planner.grounded.amounts import Amounts
+from planner.grounded.derived import Derived
 from planner.grounded.joins import Ints
 from planner.plan import Step
 from reasoner.symbols import FALSE, Fact, Problem, Symbol
@@ -69,8 +70,8 @@ class Task:
         Per relaxed operator, the operator that it is or a conditional effect of which it is.
     needs, adds : Grouped
         Per relaxed operator, the bits that it needs and those that it may set.
-    derived : sequence of (bit, alternatives)
-        The bit is set in a state that has all bits of an alternative; later ones may need earlier ones.
+    derived : Derived
+        The bits that follow from others.
     change : function of an operator
         To its precondition and its changes, in the order in which they are made.
     describe : function of an operator
@@ -93,7 +94,7 @@ class Task:
     owners: list[int]
     needs: Grouped
     adds: Grouped
-    derived: tuple[tuple[int, tuple[int, ...]], ...]
+    derived: Derived
     change: Callable[[int], tuple[int, tuple[Change, ...]]]
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
     amounts: Amounts | None = None
@@ -118,7 +119,7 @@ class Task:
             if moved is None:
                 return None
             after = moved
-        return self.completed(after) if self.derived else after
+        return self.derived.after(after, state) if self.derived.parts else after
 
     def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
         """Return an operator's precondition and changes, worked out once."""
@@ -126,15 +127,6 @@ class Task:
         if known is None:
             known = self._changes[operator] = self.change(operator)
         return known
-
-    def completed(self, state: int) -> int:
-        """Return the state with its derived bits as they have to be."""
-        for bit, alternatives in self.derived:
-            if any(state & wanted == wanted for wanted in alternatives):
-                state |= bit
-            else:
-                state &= ~bit
-        return state
 
     def values(self, state: int) -> dict[Symbol, str]:
         """Return a state as values of symbols; a boolean symbol that could never be true is left out."""

@@ -50,7 +50,7 @@ class Achiever:
     """One effect of one behaviour, seen from the value that it brings about.
 
     `soft` are the conditions that the state can change, by position; `determined` says of which symbol a variable is the
-    value: its situation type and argument terms.
+    value: its situation type and argument terms; of a rule, `determining` has the conditions that do so.
     """
 
     behavior: str
@@ -58,6 +58,7 @@ class Achiever:
     soft: tuple[Condition, ...]
     determined: Mapping[str, tuple[str, tuple[str, ...]]]
     kinds: Mapping[str, str]
+    determining: Sequence[Condition] = ()
 
 
 @dataclass
@@ -87,6 +88,7 @@ class Program:
         self.members = {kind: frozenset(members) for kind, members in problem.classes.items()}
         self.levels = problem.domain.levels
         self.achievers: dict[tuple[int, str], list[Achiever]] = {}
+        self.rules = {name: [self._rule(rule.behavior) for rule in its] for name, its in self.domain.rules.items()}
         self.named = named(problem)
         self.alike = Alike(problem, self.named)
         self.writer = Writer(problem)
@@ -99,6 +101,7 @@ class Program:
 
         Of more than a `few` alike one stands for all.
         """
+        self.writer.define(table)
         return Bound(*self._bind(table.now, table.who, focus, few))
 
     def _picked(
@@ -208,6 +211,28 @@ class Program:
         achiever = Achiever(behavior.name, number, tuple(soft), determined, kinds)
         self.achievers.setdefault((behavior.level, effect.situation), []).append(achiever)
 
+    @staticmethod
+    def _rule(rule: Behavior) -> tuple[tuple[str, ...], Achiever]:
+        """Return a rule's parameters, and it as an achiever of what it defines; its conditions bind before they use."""
+        waiting, soft = list(rule.preconditions), list[Condition]()
+        parameters = tuple(p.name for p in rule.parameters)
+        bound = set(parameters)
+        determined: dict[str, tuple[str, tuple[str, ...]]] = {}
+        determining: list[Condition] = []
+        while waiting:
+            condition = ready_condition(waiting, bound, rule.name)
+            waiting.remove(condition)
+            soft.append(condition)
+            if (
+                isinstance(condition, ValueCondition)
+                and condition.value.startswith("?")
+                and condition.value not in bound
+            ):
+                bound.add(condition.value)
+                determined[condition.value] = condition.situation, condition.arguments
+                determining.append(condition)
+        return parameters, Achiever(rule.name, 0, tuple(soft), determined, rule.kinds, determining)
+
     def _generator(
         self,
         waiting: Sequence[Condition],
@@ -258,6 +283,8 @@ class Program:
         self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str], behavior: Behavior
     ) -> bool:
         """Whether an effect on the level of `behavior` can fall on a symbol with these terms."""
+        if situation in self.domain.rules:
+            return True  # whatever it follows from
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
             others = other.kinds
@@ -290,10 +317,11 @@ def prefer(candidates: Sequence[str] | Mapping[Key, None], focus: Mapping[str, N
 
 
 def named(problem: Problem) -> list[str]:
-    """Return the individuals that behaviours mention by name, and the values that situation types start or rest with."""
+    """Return the individuals that behaviours and rules mention by name, and the values that situation types start or rest with."""
     found: dict[str, None] = {}
 
-    for behavior in problem.domain.behaviors.values():
+    rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
+    for behavior in (*problem.domain.behaviors.values(), *rules):
         whens = [condition for effect in behavior.effects for condition in effect.when]
         for condition in (*behavior.preconditions, *whens):
             found.update(dict.fromkeys(term for inner in walk(condition) for term in terms(inner)))

@@ -78,4 +78,4 @@ def _state(task: Task, values: State) -> int:
     """Return the state of a level's task in which the symbols have some values."""
     facts = sum(1 << bit for bit, fact in enumerate(task.facts) if values.get(fact.symbol, FALSE) == fact.value)
     absent = sum(1 << bit for bit, fact in task.complements.items() if values.get(fact.symbol, FALSE) != fact.value)
-    return task.completed(facts | absent)
+    return task.derived.completed(facts | absent)

@@ -156,6 +156,10 @@ class Call:
                 elif cell in asleep:
                     del asleep[cell]
                     active.append(cell)
+            for cell in self.segments.defined:
+                if cell in self.kept and not self.met(cell):
+                    del self.kept[cell]
+                    active.append(cell)
 
         while active or asleep:
             mark = len(self.table.trail)
@@ -386,7 +390,7 @@ class Call:
         """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""
         by_individual: dict[str, list[Cell]] = {}
         for cell in self.goal:
-            if cell not in self.kept:
+            if cell not in self.kept and cell[0] not in self.program.rules:
                 for individual in {*arguments_of(cell[1]), self.goal[cell]}:
                     by_individual.setdefault(individual, []).append(cell)
         before: dict[Cell, list[Cell]] = {}

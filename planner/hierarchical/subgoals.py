@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from planner.hierarchical.operators import FEW, Achiever, Program
 from planner.hierarchical.symmetry import representatives
 from planner.language import mentions, needs, walk
-from planner.transitions import Cell, Key, Table, key_of, written
+from planner.transitions import Cell, Key, Table, arguments_of, key_of, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -26,6 +26,8 @@ from reasoner.symbols import (
 
 Want: TypeAlias = "tuple[str, Key, tuple[str, ...]]"
 """Situation type, key, and the values of which one is wanted."""
+DEEPEST = 8
+"""Rules that are followed one inside the other to what they lack."""
 Env: TypeAlias = "Mapping[str, str | None]"
 
 
@@ -48,7 +50,8 @@ class Wants:
         self._cursors: dict[int, int] = {}
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
-        self._negations: dict[int, tuple[ValueCondition, ValueCondition]] = {}
+        self._negations: dict[int, tuple[Condition, Condition]] = {}
+        self._open: set[tuple[str, Key, bool]] = set()  # what is defined, and being asked what brings it about
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str, int], list[str]] = {}
@@ -88,6 +91,10 @@ class Wants:
     def of(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
         """Yield alternative wants, any of which may bring an achiever's unmet condition nearer."""
         match condition:
+            case ValueCondition(situation, arguments, value, negated) if situation in self.program.rules:
+                key = self._key(arguments, env)
+                if key is not None:
+                    yield from self.defining(situation, key, (value == TRUE) is not negated, level)
             case ValueCondition(situation, arguments, value, negated):
                 key = self._key(arguments, env)
                 if key is not None and (key in self.table.now[situation] or self._boolean(situation)):
@@ -122,6 +129,35 @@ class Wants:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
         yield from self._redetermined(achiever, condition, env)
 
+    def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:
+        """Yield wants, any of which may make something that is defined true, or false."""
+        cell = situation, key, wanted
+        if cell in self._open or len(self._open) >= DEEPEST:
+            return
+        self._open.add(cell)
+        for parameters, rule in self.program.rules[situation]:
+            env: dict[str, str | None] = dict(zip(parameters, arguments_of(key), strict=True))
+            if all(env[name] in self.program.members.get(rule.kinds[name], ()) for name in parameters):
+                unmet = [c for c in rule.soft if not self._holds_so_far(rule, c, env)]
+                dead = any(self._about(c)[0] and not rule.determined.keys() & self._about(c)[2] for c in unmet)
+                if wanted and not dead:
+                    for condition in unmet:
+                        yield from self.of(rule, condition, env, level)
+                elif not wanted and not unmet:
+                    for condition in rule.soft:
+                        if not self._about(condition)[0] and condition not in rule.determining:
+                            yield from self.of(rule, self._negation(condition), env, level)
+        self._open.discard(cell)
+
+    def _holds_so_far(self, rule: Achiever, condition: Condition, env: dict[str, str | None]) -> bool:
+        """Whether a condition of a rule holds, those before it being put in; the individual that it determines is put in, too."""
+        if condition in rule.determining and isinstance(condition, ValueCondition):
+            key = self._key(condition.arguments, env)
+            found = None if key is None else self.table.now[condition.situation].get(key)
+            env[condition.value] = found
+            return found in self.program.members.get(rule.kinds[condition.value], ())
+        return self.holds(rule, condition, env)
+
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
         """Yield wants for other values of the symbols that determine a condition's variables."""
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
@@ -154,7 +190,7 @@ class Wants:
             self._conditions[id(condition)] = found
         return found
 
-    def _negation(self, condition: ValueCondition) -> ValueCondition:
+    def _negation(self, condition: Condition) -> Condition:
         """Return the opposite of a condition, always the same one."""
         found = self._negations.get(id(condition))
         if found is None:

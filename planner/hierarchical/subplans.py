@@ -24,7 +24,7 @@ from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Want, Wants
 from planner.plan import Counts
 from planner.transitions import Cell, Change, Key, Table, arguments_of
-from reasoner.symbols import FALSE
+from reasoner.symbols import FALSE, TRUE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
@@ -91,6 +91,7 @@ class Segments:
         self.forward, self.achieve = bound.forward, bound.achieve
         self.wants = Wants(self.program, self.table, self.goal)
         self.counts = {level: Counts() for level in self.program.levels}
+        self.defined = [cell for cell in self.goal if cell[0] in self.program.rules]
         self.rest = {s.name: s.rest for s in self.program.domain.situations.values() if s.rest is not None}
         self.widest = {
             level: max(len(b.effects) for b in self.program.domain.at_level(level)) for level in self.program.levels
@@ -188,6 +189,12 @@ class Segments:
                 still.pop(cell, None)
             else:
                 still[cell] = wanted
+        for cell in self.defined:
+            wanted = targets.get(cell) or keep(cell, "")
+            if wanted and now[cell[0]].get(cell[1]) != wanted:
+                still[cell] = wanted
+            else:
+                still.pop(cell, None)
         return still, changes
 
     def apply(self, changes: Sequence[Change]) -> None:
@@ -261,6 +268,8 @@ class Segments:
         """
         asked: set[tuple[str, Key, str]] = set()
         wants: Iterable[Want] = [(*cell, (value,))]
+        if cell[0] in self.program.rules:
+            wants = list(self.wants.defining(*cell, value == TRUE, level))
         blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
         length = 0
         while (blocked or not length) and len(asked) < questions:
@@ -294,6 +303,8 @@ class Segments:
     def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
         """Return the symbols whose change could make a value attainable in one step."""
         found: dict[Cell, None] = {}
+        if cell[0] in self.program.rules:
+            return [want[:2] for want in self.wants.defining(*cell, value == TRUE, level)]
         for achiever in self.program.achievers.get((level, cell[0]), ()):
             for _, unmet, env in self.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
                 for number in unmet:

@@ -88,6 +88,9 @@ class World:
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
             if wanted == value:  # what isn't at rest may stay so; who touches it is found out by the caller
                 goal.setdefault(symbol, value)
+        for cell in segments.defined:
+            if wanted := keep(cell, ""):
+                goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
         return ground(small, level, goal=goal, most=width.work // SMALLEST, deadline=segments.deadline)
 
     def search(self) -> list[Ground] | None:
@@ -187,6 +190,7 @@ def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set
     """
     program, table = segments.program, segments.table
     behaviors = program.domain.at_level(level)
+    behaviors += tuple(rule.behavior for its in program.domain.rules.values() for rule in its)
     conditions = [c for b in behaviors for c in (*b.preconditions, *(c for e in b.effects for c in e.when))]
     witnesses = [inner for c in conditions for inner in walk(c) if isinstance(inner, Witness)]
     there, fresh = set(inside), set(inside)
@@ -204,7 +208,7 @@ def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set
         while waiting:
             individual = waiting.pop()
             for situation, cells in table.now.items():
-                value = cells.get(individual)
+                value = dict.get(cells, individual)  # of what is kept, nothing is worked out
                 if value is not None and value not in met and program.domain.situations[situation].level <= level:
                     met.add(value)
                     waiting.append(value)

@@ -48,7 +48,7 @@ def unattainable(segments: Segments) -> Reason | None:
 
 
 def _attainable(segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked) -> bool:
-    if segments.table.now[cell[0]].get(cell[1], FALSE) == value:
+    if cell[0] in segments.program.rules or segments.table.now[cell[0]].get(cell[1], FALSE) == value:
         return True
     known = asked.get((cell, value))
     if known is not None:
@@ -143,7 +143,7 @@ def contested(segments: Segments) -> Reason | None:
     takers: dict[tuple[str, str], Cell] = {}
     for cell, value in segments.goal.items():
         other = takers.setdefault((cell[0], value), cell)
-        if other != cell and _exclusive(segments, cell[0], value):
+        if other != cell and cell[0] not in program.rules and _exclusive(segments, cell[0], value):
             a, b = (Fact(Symbol(c[0], arguments_of(c[1])), value) for c in (other, cell))
             terms = (*a.symbol.arguments, *b.symbol.arguments, a.symbol.situation, value)
             return Reason(

@@ -27,46 +27,60 @@ class Model:
     Parameters
     ----------
     problem : Problem
-        Its `initial` gives the symbols; boolean symbols are completed.
+        Its `initial` gives the symbols; boolean symbols are completed. What is defined has a place behind them where it is a goal.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.symbols = _symbols(problem)
+        self.defined = tuple(sorted(s for s in problem.goal if s.situation in problem.domain.rules))
+        self.symbols = (*_symbols(problem), *self.defined)
         self.first_levels = tuple(map(problem.first_level, self.symbols))
-        self.cells = [(symbol.situation, key_of(symbol.arguments)) for symbol in self.symbols]
+        stated = self.symbols[: len(self.symbols) - len(self.defined)]
+        self.cells = [(symbol.situation, key_of(symbol.arguments)) for symbol in stated]
         self.index = {cell: i for i, cell in enumerate(self.cells)}
         self.writer = Writer(problem)
-        self.here = self.values(problem.initial)
-        self.table = Table(problem.domain.situations, self.state(self.here))
+        self.here = tuple(problem.initial.get(symbol, FALSE) for symbol in stated)
+        self.table = Table(problem.domain.situations, dict(zip(stated, self.here, strict=True)))
+        self.writer.define(self.table)
         lines = [line for b in problem.domain.behaviors.values() for line in self.writer.forward(b)]
         bind = self.writer.function(["forward = {}", *lines], "forward")
         self.forward: Mapping[str, Forward] = bind(self.table.now, self.table.who)
 
     def values(self, state: State) -> Values:
         """Return a state as the tuple that search works on."""
-        return tuple(state.get(symbol, FALSE) for symbol in self.symbols)
+        return self.completed(tuple(state.get(symbol, FALSE) for symbol in self.symbols[: len(self.cells)]))
 
     def state(self, values: Values) -> dict[Symbol, str]:
         """Return a tuple of values as a state."""
-        return dict(zip(self.symbols, values, strict=True))
+        return dict(zip(self.symbols[: len(self.cells)], values, strict=False))
 
-    def apply(self, ground: GroundBehavior, values: Values) -> Applied | None:
-        """Return what a ground behaviour does in a state, or None if it isn't applicable there."""
-        for cell, old, new in zip(self.cells, self.here, values, strict=True) if values is not self.here else ():
+    def completed(self, stated: Values) -> Values:
+        """Return the values of what is stated with those of what is defined behind them."""
+        if not self.defined:
+            return stated
+        self._move(stated)
+        return (*stated, *(self.table.now[s.situation].get(key_of(s.arguments), FALSE) for s in self.defined))
+
+    def _move(self, values: Values) -> None:
+        """Have the table say what some values say."""
+        for cell, old, new in zip(self.cells, self.here, values, strict=False) if values is not self.here else ():
             if old != new:
                 self.table.put(*cell, new)
         self.here = values
         self.table.trail.clear()
+
+    def apply(self, ground: GroundBehavior, values: Values) -> Applied | None:
+        """Return what a ground behaviour does in a state, or None if it isn't applicable there."""
+        self._move(values)
         done = self.forward[ground.behavior](*ground.arguments)
         if done is None:
             return None
-        after = list(values)
+        after = list(values[: len(self.cells)])
         for situation, key, value in done[1]:
             if (situation, key) in self.index:
                 after[self.index[situation, key]] = value
         bindings = dict(zip(self.writer.variables[ground.behavior], done[0], strict=True))
-        return Applied(ground, bindings, tuple(after))
+        return Applied(ground, bindings, self.completed(tuple(after)))
 
     def successors(self, grounds: Sequence[GroundBehavior], values: Values) -> Iterator[Applied]:
         """Yield what each applicable one of the ground behaviours does, in their order."""
@@ -80,7 +94,7 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
     """Return every symbol of the problem, in a fixed order."""
     found = set(problem.initial)
     for situation in problem.domain.situations.values():
-        if situation.boolean:
+        if situation.boolean and situation.name not in problem.domain.rules:
             kinds = (problem.classes.get(kind, ()) for kind in situation.arguments)
             found |= {Symbol(situation.name, arguments) for arguments in product(*kinds)}
     return tuple(sorted(found))

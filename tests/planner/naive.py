@@ -8,10 +8,12 @@ from fractions import Fraction
 from itertools import product
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, meets, written
+from reasoner.derivation import strata
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.symbols import (
     FALSE,
+    TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -40,7 +42,24 @@ def complete(problem: Problem) -> Facts:
         if s.boolean
         for arguments in product(*(problem.classes[kind] for kind in s.arguments))
     }
-    return state | dict(problem.initial)
+    return with_derived(problem, state | dict(problem.initial))
+
+
+def with_derived(problem: Problem, state: Facts) -> Facts:
+    """Return a state with all that follows from it, group by group of what needs each other, from nothing upwards."""
+    found = {symbol: FALSE if symbol.situation in problem.domain.rules else value for symbol, value in state.items()}
+    for group in strata(problem.domain.rules):
+        before = None
+        while found != before:
+            before = dict(found)
+            for rule in (rule for name in group for rule in problem.domain.rules[name]):
+                kinds = {t.name: t.kind for t in (*rule.parameters, *rule.variables)}
+                names = {*(p.name for p in rule.parameters), *outside(rule.conditions)}
+                for terms in bindings(problem, names, kinds, {}):
+                    symbol = Symbol(rule.situation, tuple(terms[p.name] for p in rule.parameters))
+                    if symbol in found and all(holds(problem, before, c, terms, kinds) for c in rule.conditions):
+                        found[symbol] = TRUE
+    return found
 
 
 def tabletop() -> Problem:
@@ -163,7 +182,7 @@ def results(problem: Problem, behavior: Behavior, state: Facts) -> Iterator[tupl
                         after[symbol] = trial.get(effect.value, effect.value)
         if not amounts(problem, behavior, state, terms, kinds, after):
             continue
-        yield tuple(terms[name] for name in parameters), after
+        yield tuple(terms[name] for name in parameters), with_derived(problem, after)
 
 
 def amounts(problem: Problem, behavior: Behavior, state: Facts, terms: Terms, kinds: Terms, after: Facts) -> bool:

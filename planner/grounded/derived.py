@@ -1,0 +1,189 @@
+"""Bits that follow from other bits: a disjunction that some condition asks for, a fact of a situation type that is defined.
+
+part          bits that need each other, mostly one; what a part needs besides stands in the parts before it
+alternatives  a bit is set where all bits of one of its alternatives are; an opposite where the one bit that it names isn't
+
+After a change only the parts are looked at that need a bit which changed. A part of several bits is worked out from nothing, by
+counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Bit:
+    """A bit, as a mask, that is set where a state has all bits of one of the masks; `opposite`: where it has none of them."""
+
+    mask: int
+    alternatives: tuple[int, ...]
+    opposite: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """The bits of a task that follow from others, in parts; each comes behind those that it needs."""
+
+    parts: tuple[tuple[Bit, ...], ...] = ()
+
+    @cached_property
+    def mask(self) -> int:
+        """All bits that follow from others."""
+        return sum(bit.mask for part in self.parts for bit in part)
+
+    def completed(self, state: int) -> int:
+        """Return a state with all these bits as they have to be."""
+        for part in self.parts:
+            state = _worked_out(part, state)
+        return state
+
+    def after(self, state: int, before: int) -> int:
+        """Return a state, made by changes from another one that was complete, with these bits as they have to be."""
+        users = self._users
+        waiting: list[int] = []
+        seen: set[int] = set()
+
+        def wake(changed: int) -> None:
+            changed &= self._needed
+            while changed:
+                low = changed & -changed
+                changed ^= low
+                for number in users[low]:
+                    if number not in seen:
+                        seen.add(number)
+                        heapq.heappush(waiting, number)
+
+        wake(state ^ before)
+        while waiting:
+            number = heapq.heappop(waiting)
+            new = _worked_out(self.parts[number], state)
+            if new != state:
+                wake(new ^ state)
+                state = new
+        return state
+
+    def renamed(self, small: Callable[[int], int]) -> Derived:
+        """Return the same over other bits."""
+        return Derived(
+            tuple(
+                tuple(Bit(small(bit.mask), tuple(map(small, bit.alternatives)), bit.opposite) for bit in part)
+                for part in self.parts
+            )
+        )
+
+    @cached_property
+    def _users(self) -> Mapping[int, Sequence[int]]:
+        """For each bit that is needed, the parts that need it and aren't its own."""
+        found: dict[int, dict[int, None]] = defaultdict(dict)
+        for number, part in enumerate(self.parts):
+            own = sum(bit.mask for bit in part)
+            needed = 0
+            for bit in part:
+                for wanted in bit.alternatives:
+                    needed |= wanted
+            for low in _single(needed & ~own):
+                found[low][number] = None
+        return {low: tuple(numbers) for low, numbers in found.items()}
+
+    @cached_property
+    def _needed(self) -> int:
+        return sum(self._users)
+
+
+def _single(mask: int) -> Iterable[int]:
+    while mask:
+        low = mask & -mask
+        mask ^= low
+        yield low
+
+
+def _worked_out(part: tuple[Bit, ...], state: int) -> int:
+    """Return a state with the bits of one part as they have to be."""
+    if len(part) == 1:
+        bit = part[0]
+        for wanted in bit.alternatives:
+            if state & wanted == wanted:
+                return state & ~bit.mask if bit.opposite else state | bit.mask
+        return state | bit.mask if bit.opposite else state & ~bit.mask
+    own = sum(bit.mask for bit in part)
+    state &= ~own
+    lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: how many are lacking, and of what
+    waiting: list[int] = []
+    for bit in part:
+        for wanted in bit.alternatives:
+            inside = wanted & own
+            if state & (wanted ^ inside) == wanted ^ inside:
+                if not inside:
+                    waiting.append(bit.mask)
+                    break
+                entry = [inside.bit_count(), bit.mask]
+                for low in _single(inside):
+                    lacking[low].append(entry)
+    while waiting:
+        mask = waiting.pop()
+        if state & mask:
+            continue
+        state |= mask
+        for entry in lacking.get(mask, ()):
+            entry[0] -= 1
+            if not entry[0]:
+                waiting.append(entry[1])
+    return state
+
+
+def in_parts(bits: Mapping[int, Bit]) -> Derived:
+    """Return bits, by number, in parts that need each other, each behind what it needs (Tarjan, SIAM J. Computing 1, 1972)."""
+    numbers = {bit.mask: number for number, bit in bits.items()}
+    needs = {
+        number: [numbers[low] for low in _single(_union(bit.alternatives)) if low in numbers]
+        for number, bit in bits.items()
+    }
+    index: dict[int, int] = {}
+    lowest: dict[int, int] = {}
+    stack: list[int] = []
+    on_stack: set[int] = set()
+    parts: list[tuple[Bit, ...]] = []
+    for root in bits:
+        if root in index:
+            continue
+        work = [(root, iter(needs[root]))]
+        index[root] = lowest[root] = len(index)
+        stack.append(root)
+        on_stack.add(root)
+        while work:
+            number, rest = work[-1]
+            for other in rest:
+                if other not in index:
+                    index[other] = lowest[other] = len(index)
+                    stack.append(other)
+                    on_stack.add(other)
+                    work.append((other, iter(needs[other])))
+                    break
+                if other in on_stack:
+                    lowest[number] = min(lowest[number], index[other])
+            else:
+                work.pop()
+                if work:
+                    lowest[work[-1][0]] = min(lowest[work[-1][0]], lowest[number])
+                if lowest[number] == index[number]:
+                    part = []
+                    while True:
+                        member = stack.pop()
+                        on_stack.discard(member)
+                        part.append(bits[member])
+                        if member == number:
+                            break
+                    parts.append(tuple(part))
+    return Derived(tuple(parts))
+
+
+def _union(masks: Iterable[int]) -> int:
+    found = 0
+    for mask in masks:
+        found |= mask
+    return found

@@ -1,0 +1,75 @@
+"""Which defined situation types need which others: they are worked out in this order, those that need each other together.
+
+A situation type may need the negation of another only if that one is worked out before it: else there would be no first one to
+work out, or two answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from reasoner.symbols import FALSE, AnyOf, Condition, Rule, ValueCondition, Witness
+
+
+def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
+    """Yield the situation types that conditions name, each with whether its being false is what helps them to hold.
+
+    >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
+    [('FULL', True)]
+    """
+    for condition in conditions:
+        flipped = negated is not condition.negated
+        match condition:
+            case ValueCondition(situation, _, value):
+                yield situation, flipped is not (value == FALSE)
+            case Witness(_, _, inner):
+                yield from needed(inner, flipped)
+            case AnyOf(alternatives):
+                for group in alternatives:
+                    yield from needed(group, flipped)
+
+
+def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
+    """Return the defined situation types in groups that need each other, what a group needs before it."""
+    needs = {
+        name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
+    }
+    below = {name: _closure(name, needs) for name in rules}
+    groups = {
+        name: tuple(other for other in rules if other == name or (other in below[name] and name in below[other]))
+        for name in rules
+    }
+    return sorted(dict.fromkeys(groups.values()), key=lambda group: len(below[group[0]] | set(group)))
+
+
+def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
+    """Return the situation types that need themselves, directly or by way of others."""
+    needs = {
+        name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
+    }
+    return {name for name in rules if name in _closure(name, needs)}
+
+
+def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
+    """Return each pair of a situation type and another whose negation it needs, though that one needs it in turn."""
+    together = {name: group for group in strata(rules) for name in group}
+    return sorted(
+        {
+            (name, other)
+            for name, its in rules.items()
+            for rule in its
+            for other, negated in needed(rule.conditions)
+            if negated and other in together[name]
+        }
+    )
+
+
+def _closure(name: str, needs: Mapping[str, set[str]]) -> set[str]:
+    found: set[str] = set()
+    waiting = list(needs[name])
+    while waiting:
+        other = waiting.pop()
+        if other not in found:
+            found.add(other)
+            waiting += needs[other]
+    return found

@@ -1,0 +1,146 @@
+"""Situation types that are defined: every evaluator works the same out, step by step, and a plan is found where there is one."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.grounded.grounding import ground
+from planner.grounded.task import Task
+from planner.hierarchical.operators import Program
+from planner.plan import Limits, Status
+from planner.solve import Request, solve
+from planner.transitions import Table, key_of
+from planner.validation import Facts
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Behavior,
+    Domain,
+    Parameter,
+    Problem,
+    Rule,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+)
+from tests.planner import naive
+from worlds.language import DEFINED, language
+
+State = Mapping[Symbol, str]
+
+
+def unrested(problem: Problem) -> Problem:
+    situations = {name: replace(s, rest=None) for name, s in problem.domain.situations.items()}
+    return replace(problem, domain=replace(problem.domain, situations=situations))
+
+
+def stated(state: State) -> dict[Symbol, str]:
+    return {symbol: value for symbol, value in state.items() if symbol.situation not in DEFINED}
+
+
+def walk(problem: Problem, rng: Random, steps: int) -> Iterator[State]:
+    """Yield states, one after the other, with all that follows from them."""
+    state: State = naive.complete(problem)
+    yield state
+    for _ in range(steps):
+        found = [
+            after for b in problem.domain.behaviors.values() for _, after in naive.results(problem, b, dict(state))
+        ]
+        if not found:
+            return
+        state = rng.choice(found)
+        yield state
+
+
+@given(seed=st.integers(0, 10**9))
+def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
+    problem = language(seed, defined=True)
+    table = Table(problem.domain.situations, problem.initial)
+    Program(problem).bind(table, {})
+    task = ground(replace(problem, goal={}))
+    assert isinstance(task, Task)
+    state, checked = task.initial, Facts(problem, problem.initial)
+    for truth in walk(problem, Random(seed), 4):
+        for symbol, value in stated(truth).items():
+            if table.now[symbol.situation].get(key_of(symbol.arguments), FALSE) != value:
+                table.put(symbol.situation, key_of(symbol.arguments), value)
+            checked.put(symbol.situation, symbol.arguments, value)
+        for symbol, value in truth.items():
+            if symbol.situation in DEFINED:
+                assert table.now[symbol.situation].get(key_of(symbol.arguments)) == value
+                assert checked.value(symbol.situation, symbol.arguments) == value
+        # The bits that follow are kept up to date step by step: as if worked out anew.
+        for operator in range(len(task)):
+            after = task.applied(state, operator)
+            if after is not None:
+                assert task.derived.completed(after) == after
+                state = after
+
+
+@given(seed=st.integers(0, 10**9))
+def test_a_goal_that_is_defined_holds_for_the_grounded_level_where_it_does(seed: int) -> None:
+    problem = language(seed, defined=True)
+    truth = naive.complete(problem)
+    wanted = Random(seed).sample(sorted(s for s in truth if s.situation in DEFINED), 2)
+    for symbol in wanted:
+        task = ground(problem, goal={symbol: truth[symbol]})
+        assert isinstance(task, Task), symbol
+        assert task.initial & task.goal == task.goal, symbol
+        contrary = ground(problem, goal={symbol: FALSE if truth[symbol] == TRUE else TRUE})
+        assert not isinstance(contrary, Task) or contrary.initial & contrary.goal != contrary.goal, symbol
+
+
+def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
+    """Return the states that can be reached, nearest first, and whether these are all."""
+    order: list[State] = [naive.complete(problem)]
+    seen = {frozenset(order[0].items())}
+    for state in order:
+        for behavior in problem.domain.behaviors.values():
+            for _, after in naive.results(problem, behavior, dict(state)):
+                if len(order) >= most:
+                    return order, False
+                if (key := frozenset(after.items())) not in seen:
+                    seen.add(key)
+                    order.append(after)
+    return order, True
+
+
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_plan_to_what_is_defined_is_found_where_there_is_one(seed: int, mode: str) -> None:
+    problem, rng = unrested(language(seed, defined=True)), Random(seed)
+    states, whole = reachable(problem, 60)
+    wanted = rng.choice([symbol for symbol in states[0] if symbol.situation in DEFINED])
+    for value in (TRUE, FALSE):
+        there = any(state[wanted] == value for state in states)
+        if there or whole:
+            found = solve(Request(replace(problem, goal={wanted: value}), mode, Limits(100_000, 20)))
+            assert (found.status is Status.SOLVED) is there
+
+
+def test_a_chain_of_a_thousand_is_followed_to_its_end_by_all() -> None:
+    boxes = tuple(f"box{i}" for i in range(1000))
+    inside = SituationType("INSIDE", ("Box", "Box"), "Truth", boolean=True)
+    direct = ValueCondition("IN", ("?x",), "?y")
+    pair = (Parameter("?x", "Box"), Parameter("?z", "Box"))
+    rules = (
+        Rule("INSIDE", pair, (), (ValueCondition("IN", ("?x",), "?z"),)),
+        Rule("INSIDE", pair, (Parameter("?y", "Box"),), (direct, ValueCondition("INSIDE", ("?y", "?z"), TRUE))),
+    )
+    situations = {"IN": SituationType("IN", ("Box",), "IN"), "INSIDE": inside}
+    initial = {Symbol("IN", (box,)): outer for box, outer in pairwise(boxes)}
+    opened = Behavior("OPEN", 1, (Parameter("?x", "Box"),), (), (), (ValueEffect("IN", ("?x",), "?x"),))
+    domain = Domain(situations, {"OPEN": opened}, rules={"INSIDE": rules})
+    problem = Problem("boxes", domain, {"Box": boxes, "IN": boxes}, {}, initial, {})
+    table = Table(situations, initial)
+    Program(problem).bind(table, {})
+    facts_ = Facts(problem, initial)
+    for pair_, held in (((boxes[0], boxes[-1]), TRUE), ((boxes[-1], boxes[0]), FALSE)):
+        assert table.now["INSIDE"].get(pair_) == held
+        assert facts_.value("INSIDE", pair_) == held
