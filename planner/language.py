@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from reasoner.amounts import terms_of
+from reasoner.amounts import Measure, inside, terms_of
 from reasoner.symbols import (
     AnyOf,
+    Behavior,
     ClassCondition,
     Comparison,
     Condition,
@@ -55,6 +56,15 @@ def terms(condition: Condition) -> tuple[str, ...]:
         case Comparison(one, _, other):
             return (*terms_of(one), *terms_of(other))
     return ()
+
+
+def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
+    """Return the relations that behaviours take for numbers: the last of a tuple is no individual."""
+    amounts = [effect.amount for behavior in behaviors for effect in behavior.amounts]
+    for behavior in behaviors:
+        for condition in behavior.conditions:
+            amounts += [side for c in walk(condition) if isinstance(c, Comparison) for side in (c.left, c.right)]
+    return frozenset(part.relation for amount in amounts for part in inside(amount) if isinstance(part, Measure))
 
 
 def mentions(condition: Condition) -> set[str]:

@@ -216,6 +216,7 @@ class Writer:
         self.constants: dict[str, object] = {}
         self.variables: dict[str, tuple[str, ...]] = {}
         self._fan: dict[str, float] = {}
+        self._measured: dict[str, Mapping[tuple[str, ...], Number]] = {}
         self._define = self.function(["rules = {}", *self._rules()], "rules") if problem.domain.rules else None
 
     def define(self, table: Table) -> None:
@@ -311,8 +312,7 @@ class Writer:
                 self.constants["number"] = number
                 return f"number({identifier('now', situation)}.get({key_written(arguments)}))"
             case Measure(relation, arguments):
-                rows = self.problem.relations.get(relation, ())
-                table = self.constant(("measure", relation), {row[:-1]: number(row[-1]) for row in rows})
+                table = self.constant(("measure", relation), self.measured(relation))
                 return (
                     f"{table}.get({tuple_written(map(written, arguments))}, {self.constant(('no', 'amount'), NOTHING)})"
                 )
@@ -322,6 +322,13 @@ class Writer:
                 return f"({self.amount(left)} {sign} {self.amount(right)})"
             case constant:
                 return self.constant(("number", amount_written(constant)), constant)
+
+    def measured(self, relation: str) -> Mapping[tuple[str, ...], Number]:
+        """Return the numbers that a relation gives."""
+        if relation not in self._measured:
+            rows = self.problem.relations.get(relation, ())
+            self._measured[relation] = {row[:-1]: number(row[-1]) for row in rows}
+        return self._measured[relation]
 
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str

@@ -218,15 +218,19 @@ class Behavior:
             object.__setattr__(self, "amounts", tuple(ordered))
 
     @cached_property
+    def every_effect(self) -> tuple[ValueEffect | AmountEffect, ...]:
+        """Its effects on values, then those on amounts."""
+        return (*self.effects, *self.amounts)
+
+    @cached_property
     def changes(self) -> frozenset[str]:
         """The situation types that it changes."""
-        return frozenset([e.situation for e in self.effects] + [e.situation for e in self.amounts])
+        return frozenset(effect.situation for effect in self.every_effect)
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Its preconditions, and the conditions of its effects."""
-        whens = [e.when for e in self.effects] + [e.when for e in self.amounts]
-        return (*self.preconditions, *(condition for when in whens for condition in when))
+        return (*self.preconditions, *(condition for effect in self.every_effect for condition in effect.when))
 
     @cached_property
     def kinds(self) -> Mapping[str, str]:

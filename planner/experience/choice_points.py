@@ -15,6 +15,7 @@ from planner.hierarchical.operators import Program
 from planner.hierarchical.subplans import Segments
 from planner.paper.learning import LearningError
 from planner.transitions import Cell, Table, key_of
+from reasoner.amounts import meets
 from reasoner.memory.counts import Candidate, Decision
 from reasoner.symbols import FALSE, Problem
 
@@ -47,7 +48,7 @@ class Field:
     def unmet(self) -> list[Cell]:
         """Return the goals that don't hold, in their order."""
         now = self.table.now
-        return [cell for cell, value in self.goal.items() if now[cell[0]].get(cell[1], FALSE) != value]
+        return [cell for cell, value in self.goal.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)]
 
     def proposals(self, cells: Sequence[Cell], reach: int = REACH, breadth: int = 1) -> list[Ground]:
         """Return what is applicable now and begins to work towards one of these goals.

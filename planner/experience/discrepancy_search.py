@@ -18,6 +18,7 @@ from typing import TypeAlias
 from planner.experience.choice_points import BROAD, Field, Ground
 from planner.experience.scoring import Judge
 from planner.transitions import Cell, Key, arguments_of
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE
 
 WEIGHT = 2  # open goals that one discrepancy weighs
@@ -149,7 +150,9 @@ class Stream:
     def _most_cogent(self, node: Node) -> Ground | None:
         """Return the most cogent candidate of all goals, looking again only at those near which something changed."""
         now, focus = self.field.table.now, self.focus
-        open_goals = [cell for cell, value in self.field.goal.items() if now[cell[0]].get(cell[1], FALSE) != value]
+        open_goals = [
+            cell for cell, value in self.field.goal.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)
+        ]
         for cell in open_goals:
             if cell in self.stale or cell not in focus or focus[cell][1] in node.tried:
                 self._look(cell, node)

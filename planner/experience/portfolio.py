@@ -30,6 +30,7 @@ from planner.hierarchical.operators import Program
 from planner.hierarchical.postoptimization import Improver
 from planner.hierarchical.subplans import LimitError
 from planner.plan import Counts, Limits, Outcome, Status
+from reasoner.amounts import meets
 from reasoner.memory.counts import Experience
 from reasoner.symbols import Problem
 
@@ -103,7 +104,7 @@ def stretch_for(problem: Problem) -> int:
 
 def unmet(problem: Problem) -> int:
     """Return how many goals are open in the beginning."""
-    return sum(problem.initial.get(symbol) != value for symbol, value in problem.goal.items())
+    return sum(not meets(problem.initial.get(symbol), value) for symbol, value in problem.goal.items())
 
 
 class ArrivedError(Exception):

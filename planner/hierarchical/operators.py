@@ -18,26 +18,32 @@ from math import prod
 from typing import TypeAlias
 
 from planner.hierarchical.symmetry import Alike, representatives
-from planner.language import mentions, terms, walk
+from planner.language import measures, mentions, terms, walk
 from planner.transitions import (
     Forward,
     Key,
     Table,
     Writer,
     identifier,
+    key_written,
     ready_condition,
     tuple_written,
     written,
 )
+from reasoner.amounts import Amount, done, inside, nearer, terms_of
+from reasoner.amounts import number as number_of
 from reasoner.symbols import (
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     Problem,
     RelationCondition,
     ValueCondition,
     Witness,
+    allowed,
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"
@@ -90,6 +96,8 @@ class Program:
         self.achievers: dict[tuple[int, str], list[Achiever]] = {}
         self.rules = {name: [self._rule(rule.behavior) for rule in its] for name, its in self.domain.rules.items()}
         self.named = named(problem)
+        rules = [rule.behavior for its in self.domain.rules.values() for rule in its]
+        self.measures = measures([*self.domain.behaviors.values(), *rules])
         self.alike = Alike(problem, self.named)
         self.writer = Writer(problem)
         self.variables = self.writer.variables
@@ -137,25 +145,26 @@ class Program:
         yield "forward, achieve = {}, {}"
         for behavior in self.domain.behaviors.values():
             yield from self.writer.forward(behavior)
-            for number in range(len(behavior.effects)):
+            for number in range(len(behavior.every_effect)):
                 yield from self._achieve(behavior, number)
 
     def _achieve(self, behavior: Behavior, number: int) -> Iterator[str]:
-        effect = behavior.effects[number]
+        effect = behavior.every_effect[number]
         kinds = behavior.kinds
+        given_to = effect.arguments if isinstance(effect, AmountEffect) else (*effect.arguments, effect.value)
         name = f"{identifier('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
         hard: set[str] = set()
         tests: list[str] = []
         lines: list[str] = []
-        for term, given in zip((*effect.arguments, effect.value), inputs, strict=True):
+        for term, given in zip(given_to, inputs, strict=False):  # behind them what is wanted of an amount
             if term.startswith("?") and term not in hard:
                 hard.add(term)
                 lines.append(f"{written(term)} = {given}")
                 tests.append(self.writer.member(term, kinds[term]))
             else:
                 tests.append(f"{given} == {written(term)}")
-        waiting = [*effect.when, *behavior.preconditions]
+        waiting = [*effect.when, *behavior.preconditions, *allowed(behavior, self.domain.situations)]
         free = [p.name for p in behavior.parameters if p.name not in hard]
         depth = 0
 
@@ -202,6 +211,12 @@ class Program:
                 test = self.writer.expression(condition, bound, kinds, behavior.name)
             emit(f"if not ({test}): unmet += ({len(soft)},)")
             soft.append(condition)
+        if isinstance(effect, AmountEffect):
+            self.writer.constants |= {"nearer": nearer, "done": done, "number": number_of}
+            old = f"{identifier('now', effect.situation)}.get({key_written(effect.arguments)})"
+            after = f"done({effect.operation!r}, number({old}), {self.writer.amount(effect.amount)})"
+            emit(f"if nearer({old}, {after}, {inputs[-1]}):")
+            depth += 1
         names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
         arguments = tuple_written(written(p.name) for p in behavior.parameters)
         emit(f"yield {arguments}, unmet, {{{names}}} if unmet else None")
@@ -275,6 +290,9 @@ class Program:
                 return not self.changeable(situation, arguments, kinds, behavior)
             case Witness(variable, kind, conditions):
                 return all(self._static(c, {**kinds, variable: kind}, behavior) for c in conditions)
+            case Comparison(left, _, right):
+                parts = [part for part in (*inside(left), *inside(right)) if isinstance(part, Amount)]
+                return not any(self.changeable(part.situation, part.arguments, kinds, behavior) for part in parts)
             case AnyOf(alternatives):
                 return all(self._static(c, kinds, behavior) for group in alternatives for c in group)
         return True
@@ -288,7 +306,7 @@ class Program:
         here = [self._possible(term, kinds, behavior) for term in arguments]
         for other in self.domain.at_level(behavior.level):
             others = other.kinds
-            for effect in other.effects:
+            for effect in other.every_effect:
                 if effect.situation == situation:
                     there = [self._possible(term, others, other) for term in effect.arguments]
                     if all(not a.isdisjoint(b) for a, b in zip(here, there, strict=True)):
@@ -322,11 +340,12 @@ def named(problem: Problem) -> list[str]:
 
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
     for behavior in (*problem.domain.behaviors.values(), *rules):
-        whens = [condition for effect in behavior.effects for condition in effect.when]
-        for condition in (*behavior.preconditions, *whens):
+        for condition in behavior.conditions:
             found.update(dict.fromkeys(term for inner in walk(condition) for term in terms(inner)))
         for effect in behavior.effects:
             found.update(dict.fromkeys((*effect.arguments, effect.value)))
+        for change in behavior.amounts:
+            found.update(dict.fromkeys((*change.arguments, *terms_of(change.amount))))
     for situation in problem.domain.situations.values():
         found.update(dict.fromkeys(value for value in (situation.rest, situation.default) if value is not None))
     return sorted(term for term in found if not term.startswith("?"))

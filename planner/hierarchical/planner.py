@@ -26,6 +26,7 @@ from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, Unsol
 from planner.hierarchical.subplans import LimitError, Watch, nobody
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem
 
 __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
@@ -139,7 +140,9 @@ def reordered(call: Call) -> list[RefinedStep]:
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
     tried uses the most abstract level alone and expands no more nodes than the call did.
     """
-    unmet = sum(call.problem.initial.get(symbol, FALSE) != value for symbol, value in call.problem.goal.items())
+    unmet = sum(
+        not meets(call.problem.initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items()
+    )
     if len(call.steps) <= DETOURS * unmet:
         return call.steps
     best = call.steps

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
 from planner.transitions import Cell, Change, key_of
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4, expansions=60)
@@ -80,7 +81,7 @@ class Refiner:
         self.templates = templates
         self.hits = 0
         self.misses = 0
-        changed = {effect.situation for b in segments.program.domain.behaviors.values() for effect in b.effects}
+        changed = frozenset[str]().union(*(b.changes for b in segments.program.domain.behaviors.values()))
         situations = segments.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.failed: dict[tuple[Ground, frozenset[Cell]], list[list[tuple[Cell, str]]]] = {}
@@ -104,7 +105,7 @@ class Refiner:
         for situation, key, value in changes:
             if now[situation].get(key) is not None or self.segments.exists(situation, key):
                 found[situation, key] = value
-        return {cell: value for cell, value in found.items() if now[cell[0]].get(cell[1], FALSE) != value}
+        return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def left_as_it_must(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
         """Return a symbol touched since a mark, or a target, that isn't what it must be; None if all are."""
@@ -114,9 +115,11 @@ class Refiner:
         now = self.table.now
         for cell, first in before.items():
             wanted = targets.get(cell) or keep(cell, first)
-            if wanted is not None and now[cell[0]][cell[1]] != wanted:
+            if wanted is not None and not meets(now[cell[0]][cell[1]], wanted):
                 return cell
-        return next((cell for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value), None)
+        return next(
+            (cell for cell, value in targets.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)), None
+        )
 
     def again(self, step: RefinedStep) -> RefinedStep | None:
         """Do a step once more by the same sub-steps, and return it with its present bindings; None if it can't be done."""

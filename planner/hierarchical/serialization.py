@@ -25,6 +25,7 @@ from planner.hierarchical.subproblem import Width
 from planner.hierarchical.unsolvability import impossible
 from planner.plan import Outcome, OutOfTimeError, Plan, Reason, Status, Step, TooLargeError
 from planner.transitions import Cell, Table, arguments_of, key_of
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
@@ -384,13 +385,14 @@ class Call:
 
     def met(self, cell: Cell) -> bool:
         """Whether a goal holds now."""
-        return self.table.now[cell[0]].get(cell[1], FALSE) == self.goal[cell]
+        return meets(self.table.now[cell[0]].get(cell[1], FALSE), self.goal[cell])
 
     def order(self) -> dict[Cell, list[Cell]]:
         """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""
         by_individual: dict[str, list[Cell]] = {}
         for cell in self.goal:
-            if cell not in self.kept and cell[0] not in self.program.rules:
+            plain = cell[0] not in self.program.rules and self.problem.domain.situations[cell[0]].quantity is None
+            if cell not in self.kept and plain:
                 for individual in {*arguments_of(cell[1]), self.goal[cell]}:
                     by_individual.setdefault(individual, []).append(cell)
         before: dict[Cell, list[Cell]] = {}

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any, TypeAlias
 
 from planner.hierarchical.operators import FEW, Achiever, Program
 from planner.hierarchical.symmetry import representatives
 from planner.language import mentions, needs, walk
 from planner.transitions import Cell, Key, Table, arguments_of, key_of, written
+from reasoner.amounts import NOTHING, Amount, Calculation, Expression, Measure, Number, divided, inside, number
+from reasoner.amounts import written as amount_written
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
+    Comparison,
     Condition,
     EqualityCondition,
     ValueCondition,
@@ -113,7 +117,7 @@ class Wants:
                     for individual in self._satisfying(achiever, condition, env):
                         inner = {**env, variable: individual}
                         for c in conditions:
-                            if isinstance(c, ValueCondition):
+                            if isinstance(c, ValueCondition | Comparison):
                                 yield from self.of(achiever, self._negation(c), inner, level)
                 else:
                     for individual in self.one_of_each(kind):
@@ -122,10 +126,12 @@ class Wants:
                             for c in conditions:
                                 if _fluent(c) and not self.holds(achiever, c, inner):
                                     yield from self.of(achiever, c, inner, level)
+            case Comparison():
+                yield from self._amounts(condition, env)
             case AnyOf(alternatives, negated):
                 for group in alternatives:
                     for c in group:
-                        if isinstance(c, ValueCondition) and self.holds(achiever, c, env) is negated:
+                        if isinstance(c, ValueCondition | Comparison) and self.holds(achiever, c, env) is negated:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
         yield from self._redetermined(achiever, condition, env)
 
@@ -158,6 +164,47 @@ class Wants:
             return found in self.program.members.get(rule.kinds[condition.value], ())
         return self.holds(rule, condition, env)
 
+    def _amounts(self, condition: Comparison, env: Env) -> Iterator[Want]:
+        """Yield for each amount in a comparison what it would have to be if the others stayed as they are."""
+        contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
+        sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
+        difference = Calculation("-", condition.left, condition.right)
+        for part in dict.fromkeys(inside(difference)):
+            key = self._key(part.arguments, env) if isinstance(part, Amount) else None
+            if not isinstance(part, Amount) or key not in self.table.now[part.situation]:
+                continue
+            now = self.worth(difference, env)
+            slope = self.worth(difference, env, (part.situation, key)) - now
+            if not isinstance(slope, Fraction) or not slope:
+                continue
+            limit = number(self.table.now[part.situation][key]) - now / slope
+            flipped = sign if slope > 0 else sign.translate(str.maketrans("<>", "><"))
+            if isinstance(limit, Fraction):
+                yield part.situation, key, (f"{flipped}{amount_written(limit)}".lstrip("="),)
+
+    def worth(self, expression: Expression, env: Env, more: Cell | None = None) -> Number:
+        """Return what an amount comes to now, or if one symbol had one more."""
+        match expression:
+            case Amount(situation, arguments):
+                key = self._key(arguments, env)
+                if key is None or key not in self.table.now[situation]:
+                    return NOTHING
+                return number(self.table.now[situation][key]) + ((situation, key) == more)
+            case Measure(relation, arguments):
+                return self.program.writer.measured(relation).get(tuple(env.get(a) or a for a in arguments), NOTHING)
+            case Calculation(sign, left, right):
+                one, other = self.worth(left, env, more), self.worth(right, env, more)
+                match sign:
+                    case "+":
+                        return one + other
+                    case "-":
+                        return one - other
+                    case "*":
+                        return one * other
+                return divided(one, other)
+            case constant:
+                return constant
+
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
         """Yield wants for other values of the symbols that determine a condition's variables."""
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
@@ -183,9 +230,9 @@ class Wants:
         """
         found = self._conditions.get(id(condition))
         if found is None:
-            inside = list(walk(condition))
-            static = not any(isinstance(inner, ValueCondition) for inner in inside)
-            compares = any(isinstance(inner, EqualityCondition) for inner in inside)
+            parts = list(walk(condition))
+            static = not any(isinstance(inner, ValueCondition | Comparison) for inner in parts)
+            compares = any(isinstance(inner, EqualityCondition) for inner in parts)
             found = static, compares, tuple(sorted(mentions(condition))), condition
             self._conditions[id(condition)] = found
         return found
@@ -281,4 +328,4 @@ class Wants:
 
 
 def _fluent(condition: Condition) -> bool:
-    return isinstance(condition, ValueCondition | Witness | AnyOf)
+    return isinstance(condition, ValueCondition | Comparison | Witness | AnyOf)

@@ -24,6 +24,7 @@ from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Want, Wants
 from planner.plan import Counts
 from planner.transitions import Cell, Change, Key, Table, arguments_of
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, TRUE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
@@ -94,7 +95,8 @@ class Segments:
         self.defined = [cell for cell in self.goal if cell[0] in self.program.rules]
         self.rest = {s.name: s.rest for s in self.program.domain.situations.values() if s.rest is not None}
         self.widest = {
-            level: max(len(b.effects) for b in self.program.domain.at_level(level)) for level in self.program.levels
+            level: max(len(b.every_effect) for b in self.program.domain.at_level(level))
+            for level in self.program.levels
         }
 
     def find(
@@ -144,7 +146,7 @@ class Segments:
             return False
 
         start = len(table.trail)
-        off = {cell: value for cell, value in targets.items() if now[cell[0]].get(cell[1], FALSE) != value}
+        off = {cell: value for cell, value in targets.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
         for depth in range(1, effort.depth + 1):
             found = deepen(depth, off, {})
             table.undo(start)
@@ -185,7 +187,7 @@ class Segments:
             else:
                 changes[cell] = value
             wanted = targets.get(cell) or keep(cell, first)
-            if wanted is None or wanted == value:
+            if wanted is None or wanted == value or meets(value, wanted):
                 still.pop(cell, None)
             else:
                 still[cell] = wanted

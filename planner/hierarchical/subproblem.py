@@ -22,6 +22,7 @@ from planner.hierarchical.subplans import Ground, Keep, Segments
 from planner.language import walk
 from planner.plan import Limits, OutOfTimeError, Reason, Status, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
+from reasoner.amounts import meets
 from reasoner.symbols import (
     FALSE,
     Parameter,
@@ -86,8 +87,9 @@ class World:
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
             wanted = keep((symbol.situation, key_of(symbol.arguments)), value)
-            if wanted == value:  # what isn't at rest may stay so; who touches it is found out by the caller
-                goal.setdefault(symbol, value)
+            # What isn't at rest may stay so; who touches it is found out by the caller.
+            if wanted is not None and meets(value, wanted):
+                goal.setdefault(symbol, wanted)
         for cell in segments.defined:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
@@ -167,10 +169,11 @@ def problem_of(
             classes[kind] = tuple(m for m in classes.get(parameter.kind, ()) if m in inside)
             parameters.append(Parameter(parameter.name, kind))
         behaviors[behavior.name] = replace(behavior, parameters=tuple(parameters))
-    relations = {
-        relation: frozenset(row for one in there for row in rows.get(one, ()) if there >= set(row))
-        for relation, rows in program.rows_of.items()
-    }
+    relations = {}
+    for relation, rows in program.rows_of.items():
+        individuals = -1 if relation in program.measures else None  # a number isn't one
+        within = (row for one in there for row in rows.get(one, ()) if there >= set(row[:individuals]))
+        relations[relation] = frozenset(within)
     initial = {
         Symbol(situation, arguments): table.now[situation][key]
         for situation in table.now
@@ -191,8 +194,7 @@ def with_frozen(segments: Segments, level: int, inside: AbstractSet[str]) -> set
     program, table = segments.program, segments.table
     behaviors = program.domain.at_level(level)
     behaviors += tuple(rule.behavior for its in program.domain.rules.values() for rule in its)
-    conditions = [c for b in behaviors for c in (*b.preconditions, *(c for e in b.effects for c in e.when))]
-    witnesses = [inner for c in conditions for inner in walk(c) if isinstance(inner, Witness)]
+    witnesses = [inner for b in behaviors for c in b.conditions for inner in walk(c) if isinstance(inner, Witness)]
     there, fresh = set(inside), set(inside)
     for _ in range(1 + max([depth(witness) for witness in witnesses], default=0)):
         met: set[str] = set()

@@ -40,9 +40,7 @@ def unattainable(segments: Segments) -> Reason | None:
     asked: Asked = {}
     achieve = program.bind(segments.table, {}, few=sys.maxsize).achieve
     for cell, value in segments.goal.items():
-        if segments.table.now[cell[0]].get(cell[1], FALSE) != value and not _attainable(
-            segments, achieve, level, cell, value, asked
-        ):
+        if not _attainable(segments, achieve, level, cell, value, asked):
             return _reason(segments, achieve, level, cell, value, asked)
     return None
 
@@ -50,6 +48,8 @@ def unattainable(segments: Segments) -> Reason | None:
 def _attainable(segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked) -> bool:
     if cell[0] in segments.program.rules or segments.table.now[cell[0]].get(cell[1], FALSE) == value:
         return True
+    if segments.program.domain.situations[cell[0]].quantity is not None:
+        return True  # what an effect makes of it depends on what it comes to be before
     known = asked.get((cell, value))
     if known is not None:
         return known
@@ -142,6 +142,8 @@ def contested(segments: Segments) -> Reason | None:
     program = segments.program
     takers: dict[tuple[str, str], Cell] = {}
     for cell, value in segments.goal.items():
+        if program.domain.situations[cell[0]].quantity is not None:
+            continue
         other = takers.setdefault((cell[0], value), cell)
         if other != cell and cell[0] not in program.rules and _exclusive(segments, cell[0], value):
             a, b = (Fact(Symbol(c[0], arguments_of(c[1])), value) for c in (other, cell))

@@ -19,6 +19,7 @@ from time import perf_counter
 
 from planner.paper.transitions import Applied, Values
 from planner.plan import Counts, Limits, Status
+from reasoner.amounts import meets
 
 Goal = Mapping[int, str]
 """Wanted values by position in the state."""
@@ -36,7 +37,7 @@ class Found:
 
 def mismatches(values: Values, goal: Goal) -> int:
     """Return h: how many symbols of the goal have another value (section IV-A of the paper)."""
-    return sum(values[i] != wanted for i, wanted in goal.items())
+    return sum(not meets(values[i], wanted) for i, wanted in goal.items())
 
 
 def a_star(
