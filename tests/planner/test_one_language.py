@@ -17,6 +17,7 @@ from planner.grounded.grounding import ground as grounded
 from planner.grounded.task import Task
 from planner.hierarchical.operators import Program
 from planner.paper.transitions import Model, ground
+from planner.solve import RejectedPlanError, Request, solve
 from planner.transitions import Table
 from planner.validation import successor
 from reasoner import symbols
@@ -25,7 +26,7 @@ from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from reasoner.reading.affordance import applicable_query, write_situation
 from reasoner.reading.problem import Reading, read
 from reasoner.symbols import FALSE, AnyOf, Condition, Fact, Problem, Symbol, Witness
-from tests.planner import naive
+from tests.planner import naive, small
 from tests.reasoner.worlds import graph_of, worlds
 from worlds.language import DEFINED, language
 
@@ -108,19 +109,50 @@ EVALUATORS: dict[str, Callable[[Problem], After]] = {
 """All that read behaviours, but for the naive reading, which they are held against."""
 
 
+def otherwise(problem: Problem) -> set[str]:
+    """Return the evaluators that say something else than the plain reading."""
+    now, truth = facts(problem.initial), by_naive(problem)
+    changing = {done: after for done, after in truth.items() if after != now}
+    found = {name: evaluator(problem) for name, evaluator in EVALUATORS.items()}
+    # The task drops what never changes anything.
+    found["task"] = {done: after for done, after in found["task"].items() if after != now}
+    return {name for name, after in found.items() if after != (changing if name == "task" else truth)}
+
+
 @given(seed=st.integers(0, 10**9))
 @settings(max_examples=settings().max_examples * 3)
 def test_every_evaluator_agrees_on_what_is_applicable_and_what_comes_of_it(seed: int) -> None:
-    problem = language(seed, defined=seed % 2 == 1)
-    now = facts(problem.initial)
-    truth = by_naive(problem)
-    changing = {done: after for done, after in truth.items() if after != now}
-    for name, evaluator in EVALUATORS.items():
-        found = evaluator(problem)
-        if evaluator is by_task:  # which drops what never changes anything
-            assert {done: after for done, after in found.items() if after != now} == changing, name
-        else:
-            assert found == truth, name
+    assert otherwise(language(seed, defined=seed % 2 == 1)) == set()
+
+
+@pytest.fixture
+def true_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let what becomes true do so before what becomes false, as in commit f43f953."""
+
+    def post_init(behavior: symbols.Behavior) -> None:
+        effects = sorted(behavior.effects, key=lambda effect: effect.value == FALSE)
+        object.__setattr__(behavior, "effects", tuple(effects))
+
+    monkeypatch.setattr(symbols.Behavior, "__post_init__", post_init)
+
+
+@pytest.mark.usefixtures("true_first")
+def test_effects_in_the_wrong_order_are_noticed() -> None:
+    noticed, seed = set[str](), 0
+    while len(noticed) < 3 and seed < 200:
+        noticed |= otherwise(language(seed))
+        seed += 1
+    assert noticed == {"paper", "operators", "task"}
+
+
+@pytest.mark.usefixtures("true_first")
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_a_plan_that_rests_on_them_never_leaves(mode: str) -> None:
+    driven = small.drive().problem
+    assert solve(Request(driven, mode)).plan is None  # though there is one
+    away = replace(driven, goal={Symbol("THERE", ("truck", "yard")): FALSE})
+    with pytest.raises(RejectedPlanError, match="isn't reached"):
+        solve(Request(away, mode))
 
 
 @given(world=worlds())
