@@ -135,10 +135,10 @@ def divided(left: Number, right: Number) -> Number:
 
 
 def done(operation: str, amount: Number, by: Number) -> Number:
-    """Return what an effect makes of an amount."""
+    """Return what an effect makes of an amount; of none, none."""
     match operation:
         case "assign":
-            return by
+            return by if isinstance(amount, Fraction) else NOTHING
         case "scale":
             return amount * by
         case "increase":
