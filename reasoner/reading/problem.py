@@ -613,6 +613,10 @@ class _Schema:
         return name
 
     def parameter(self, iri: str) -> Parameter:
+        if iri not in self.terms:
+            raise KnowledgeError(
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+            )
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
     def membership(self, iri: str) -> tuple[Condition, ...]:
@@ -820,6 +824,11 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
                     raise KnowledgeError(
                         f"{behavior.name} speaks of {situation} with {len(arguments)} arguments; it has {wanted}: "
                         "mend the condition or effect, or say what has that situation type"
+                    )
+                if domain.situations[situation].level > behavior.level:
+                    raise KnowledgeError(
+                        f"{behavior.name} on level {behavior.level} speaks of {situation}, which exists from level "
+                        f"{domain.situations[situation].level} on; mend the behaviour's :level or the situation type's :fromLevel"
                     )
                 said += part.when if isinstance(part, ValueEffect | AmountEffect) else ()
                 said += inside(part.amount) if isinstance(part, AmountEffect) else ()

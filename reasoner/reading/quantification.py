@@ -33,10 +33,17 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     found: list[GroundBehavior] = []
     number = domain.first_ids.get(level, 0)
     for behavior in domain.at_level(level):
+        kinds = [parameter.kind for parameter in behavior.parameters]
         for row in graph.solutions(query_for(reading, behavior), SCENE):
             if not len(found) % 4096:
                 graph.deadline.check(f"quantifying {behavior.name} ({len(found):,} so far)")
             arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(behavior.parameters)])
+            for argument, kind in zip(arguments, kinds, strict=True):
+                if argument not in reading.problem.members(kind):
+                    raise KnowledgeError(
+                        f"{argument} is of class {kind}, but is also a part of behaviours, goals or situation types; "
+                        "it can't be both: take one of its classes away, or the owl:sameAs that gives it"
+                    )
             found.append(GroundBehavior(number + len(found), behavior.name, arguments))
     return tuple(found)
 

@@ -469,7 +469,8 @@ class _Search:
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
     """Return what ends like an individual or class of a part of the scene, in any namespace that is known.
 
-    Each IRI that it can be is looked up by itself: no row is read of anything else.
+    Each IRI that it can be is looked up by itself: no row is read of anything else. A class counts if it has individuals that
+    aren't nodes of the schema, as in the whole scene.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -477,11 +478,18 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     if not candidates:
         return set()
     rows = graph.select(
-        f"SELECT ?x WHERE {{ VALUES ?x {{ {_values(candidates)} }} "
-        "FILTER(EXISTS { ?x a owl:NamedIndividual } || EXISTS { ?member a ?x }) }",
+        f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {_values(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual }} AS ?named) "
+        "FILTER(?named || EXISTS { ?member a ?x }) }",
         SCENE,
     )
-    return {text(x) for (x,) in rows}
+    found = {text(x) for x, _ in rows}
+    doubtful = {text(x) for x, named in rows if text(named) != TRUE}
+    doubtful &= {kind for node in schema.nodes.values() for kind in node.get(TYPE, ())}
+    if doubtful:
+        query = f"SELECT DISTINCT ?x ?member WHERE {{ VALUES ?x {{ {_values(doubtful)} }} ?member a ?x, owl:NamedIndividual }}"
+        found -= doubtful
+        found |= {text(x) for x, member in graph.select(query, SCENE) if text(member) not in schema.nodes}
+    return found
 
 
 def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[str]:

@@ -289,6 +289,13 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
             "c:parameter :B1_CARRY.thing,",
             "B1_CARRY.thing> is used as a parameter but",
         ),
+        ("", "c:parameter :B1_CARRY.item,", "c:parameter :PLACE,", "PLACE> is used as a parameter but"),
+        (
+            "",
+            ":PLACE a ",
+            ":PLACE c:fromLevel 3 . :PLACE a ",
+            "B1_CARRY on level 1 speaks of PLACE, which exists from level 3",
+        ),
         (
             "",
             "c:precondition :B1_CARRY.free",

@@ -254,3 +254,13 @@ def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_pat
         if "LOC" in str(s) and cup in str(s)
     )
     assert goal == f"<{cup}, LOCATION>"
+
+
+@pytest.mark.parametrize("word", ["Task", "Level", "Parameter"])
+def test_a_class_may_be_called_like_a_part_of_the_model(tmp_path: Path, word: str) -> None:
+    """The core's own classes of that name have no individuals that are planned with, so that they change no name."""
+    text = generate("served").replace(":cup1 a owl:NamedIndividual, k:Cup", f":cup1 a owl:NamedIndividual, :{word}", 1)
+    text += f":{word} a owl:Class ; rdfs:subClassOf k:Cup .\n"
+    (tmp_path / "scene.ttl").write_text(text, encoding="utf-8")
+    graph = load(tmp_path / "scene.ttl")
+    assert recognise(graph).problem.classes[word] == read(graph).problem.classes[word] == ("cup1",)
