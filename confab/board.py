@@ -34,6 +34,8 @@ MISSING = (
 class Sheet:
     """What of a scene can be turned, and what comes of it.
 
+    Examples
+    --------
     >>> from confab.scene import load
     >>> sheet = Sheet.of(load("beverage-serving"))
     >>> sheet.answer({"facts": {"cup1 LOCATION": "location7"}})["headline"].split(",")[0]
@@ -119,6 +121,8 @@ class Sheet:
     def intervention(turned: Mapping[str, Any]) -> str:
         """Return an intervention as people write it: after which step, of which symbol, which value, and what it is about.
 
+        Examples
+        --------
         >>> Sheet.intervention({"after": 28, "key": "cup2 LOCATION", "value": "location8", "what": "goal"})
         'after=28 goal cup2 LOCATION location8'
         """

@@ -27,6 +27,8 @@ SECONDS = 20.0
 def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, curve: Curve | None = None) -> Curve:
     """Plan in scenes and learn from the plans, some rounds long, and return how the effort of planning changed.
 
+    Examples
+    --------
     >>> import confab
     >>> scene = confab.load("beverage-serving")
     >>> curve = practise(scene, confab.Memory.of(scene), rounds=2)

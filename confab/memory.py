@@ -315,6 +315,8 @@ class Memory:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun.
 
+    Examples
+    --------
     >>> counted(1, "episode"), counted(2, "replica")
     ('1 episode', '2 replicas')
     """
@@ -324,6 +326,8 @@ def counted(number: int, noun: str) -> str:
 def endpoint(source: str | Path) -> str | None:
     """Return the URL of a SPARQL endpoint, even one that a path has cut short; None for a file.
 
+    Examples
+    --------
     >>> endpoint(Path("http://localhost:7878/query")), endpoint("memory.ttl")
     ('http://localhost:7878/query', None)
     """

@@ -107,6 +107,8 @@ class Scene:
     def objects(self) -> dict[str, str]:
         """The objects by name, each with its most specific class.
 
+        Examples
+        --------
         >>> list(load("beverage-serving").objects.items())[:3]
         [('bottle1', 'Bottle'), ('bottle2', 'Bottle'), ('cup1', 'Cup')]
         """
@@ -123,6 +125,8 @@ class Scene:
     def facts(self) -> list[str]:
         """What holds in the beginning, each as `with_fact` takes it.
 
+        Examples
+        --------
         >>> load("beverage-serving").facts[:2]
         ['bottle1 BEVERAGE beverage1', 'bottle1 LOCATION location4']
         """
@@ -133,6 +137,8 @@ class Scene:
     def goals(self) -> list[str]:
         """What is wanted, each as `with_goal` and `plan` take it.
 
+        Examples
+        --------
         >>> load("beverage-serving").goals[:2]
         ['bottle1 LOCATION location4', 'bottle2 LOCATION location3']
         """
@@ -142,13 +148,15 @@ class Scene:
     def with_fact(self, *facts: str) -> Scene:
         """Return a scene in which some facts hold, each in place of what was stated of its symbol; this one stays as it is.
 
-        >>> load("beverage-serving").with_fact("cup1 LOCATION location7").plan().plan.length
-        {1: 3, 2: 8, 3: 26}
-
         Raises
         ------
         KnowledgeError
             A word names nothing of its kind, or the store is a remote one.
+
+        Examples
+        --------
+        >>> load("beverage-serving").with_fact("cup1 LOCATION location7").plan().plan.length
+        {1: 3, 2: 8, 3: 26}
         """
         from reasoner.reading.restating import with_facts
 
@@ -157,13 +165,15 @@ class Scene:
     def with_goal(self, *goals: str) -> Scene:
         """Return a scene in which some facts are wanted, each in place of the goal of its symbol; this one stays as it is.
 
-        >>> load("beverage-serving").with_goal("cup2 LOCATION location8").plan().plan.length
-        {1: 5, 2: 12, 3: 38}
-
         Raises
         ------
         KnowledgeError
             As `with_fact`.
+
+        Examples
+        --------
+        >>> load("beverage-serving").with_goal("cup2 LOCATION location8").plan().plan.length
+        {1: 5, 2: 12, 3: 38}
         """
         from reasoner.reading.restating import with_goals
 
@@ -289,18 +299,20 @@ class Scene:
         Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
         no such name. It is answered in a process of its own: see `reasoner.graph.apart`.
 
-        >>> scene = load("beverage-serving")
-        >>> scene.query("SELECT ?where WHERE { :cup1 k:location ?where }")[0]
-        ('location2',)
-        >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
-        False
-
         Raises
         ------
         KnowledgeError
             The query isn't SPARQL; the message has line and column. Or it asks another endpoint without leave.
         LimitError
             It takes more time, rows or memory than the limits allow.
+
+        Examples
+        --------
+        >>> scene = load("beverage-serving")
+        >>> scene.query("SELECT ?where WHERE { :cup1 k:location ?where }")[0]
+        ('location2',)
+        >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
+        False
         """
         from reasoner.graph.apart import ask, unheard_of
 
@@ -594,6 +606,8 @@ class Scene:
         scratch are made with `memory`; `Memory.live` learns from what came of it. `watch` shows what happens while it
         happens, in a notebook or a terminal; `tell` is a display of one's own.
 
+        Examples
+        --------
         >>> run = load("beverage-serving").execute(interventions="after=28 cup2 LOCATION location8")
         >>> run.reached, [change.kind for change in run.episode.replans]
         (True, ['repair'])
@@ -619,14 +633,16 @@ class Scene:
     def serve(self, port: int = 0, limits: QueryLimits | None = None) -> Iterator[str]:
         """Serve this scene as a read-only SPARQL 1.1 endpoint on loopback until the end of the block, whose URL is given.
 
-        >>> with load("beverage-serving").serve() as url:
-        ...     load(url).plan().plan.length
-        {1: 4, 2: 10, 3: 32}
-
         Raises
         ------
         KnowledgeError
             The port is taken, or the scene is at an endpoint already.
+
+        Examples
+        --------
+        >>> with load("beverage-serving").serve() as url:
+        ...     load(url).plan().plan.length
+        {1: 4, 2: 10, 3: 32}
         """
         from confab.serving import serving
 
@@ -684,13 +700,15 @@ class Result:
     def in_order(self, *ids: int) -> Plan:
         """Return the plan with its steps of the first level in another order, as somebody may have shown it.
 
-        >>> [step.id for step in load("beverage-serving").plan().in_order(22, 34, 28, 39).steps]
-        [22, 34, 28, 39]
-
         Raises
         ------
         KnowledgeError
             These aren't the IDs of the steps of the first level, each once; or the plan can't be done in that order.
+
+        Examples
+        --------
+        >>> [step.id for step in load("beverage-serving").plan().in_order(22, 34, 28, 39).steps]
+        [22, 34, 28, 39]
         """
         waiting = list(self.plan.steps)
         there = [step.id for step in waiting]
@@ -880,6 +898,8 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
 def scenes() -> list[str]:
     """Return the names of the shipped scenes, which `load` takes.
 
+    Examples
+    --------
     >>> "beverage-serving" in scenes()
     True
     """

@@ -26,6 +26,8 @@ class Table(Sequence[tuple[str | None, ...]]):
     `terms` are the rows as the store answered them, with IRIs and datatypes; `truth` is the answer of an ASK query, which is then
     also what the table counts as in a condition.
 
+    Examples
+    --------
     >>> import confab
     >>> table = confab.load("beverage-serving").query("SELECT ?b ?level WHERE { ?b c:level ?level } ORDER BY ?level ?b")
     >>> table[0], table.values()[0]

@@ -1,0 +1,45 @@
+"""What the paper's equations are worth on the paper's table: expansions by episode, with memory, and without levels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import confab
+from planner.plan import Limits, Outcome
+from planner.solve import Request, solve
+from reasoner.reading.quantification import quantify
+from reasoner.symbols import Problem
+
+EPISODES = 5
+FLAT = 200_000
+
+
+def flat(scene: confab.Scene) -> Outcome:
+    """Return what the paper's search does where primitives are the only level."""
+    problem = scene.problem
+    lowest = problem.domain.levels[-1]
+    behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level == lowest}
+    alone: Problem = replace(problem, domain=replace(problem.domain, behaviors=behaviors))
+    grounds = {lowest: quantify(scene.knowledge, scene.reading, lowest)}
+    return solve(Request(alone, "paper", Limits(expansions=FLAT), None, None, grounds))
+
+
+def main() -> None:
+    """Print the tables."""
+    scene = confab.load("beverage-serving")
+    curve = confab.practise(scene, confab.Memory.of(scene), rounds=EPISODES)
+    print("| episode | " + " | ".join(str(number + 1) for number in range(EPISODES)) + " |")
+    print("|---" * (EPISODES + 1) + "|")
+    for name, values in (
+        ("the paper's mode, no memory", curve.without["paper"]),
+        ("the paper's mode, what was learned before", curve.with_memory["paper"]),
+        ("the default planner, no memory", curve.without["guarded"]),
+    ):
+        print(f"| {name} | " + " | ".join(str(value) for value in values) + " |")
+    outcome = flat(scene)
+    expanded = sum(counts.expanded for counts in outcome.search.values())
+    print(f"\nPrimitives alone, without levels: {outcome.status.value} after {expanded:,} expansions.")
+
+
+if __name__ == "__main__":
+    main()

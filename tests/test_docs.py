@@ -1,0 +1,93 @@
+"""The site: each page in its navigation once, commands and calls that exist, a tutorial that prints what it says, no warning."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import re
+import shlex
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+import pytest
+
+import confab
+from confab.cli import app
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+SITE = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+COMMAND = re.compile(r"`confab ([^`]+)`|^\$ confab (.+)$", re.MULTILINE)
+CALL = re.compile(r"`(?:with )?(scene|result|confab|run|report|memory)\.(\w+)\(([^`]*)\)[^`]*`")
+HOMES = {"scene": confab.Scene, "result": confab.Result, "run": confab.Execution, "report": confab.Report}
+
+
+def test_every_page_is_in_the_navigation_once() -> None:
+    listed = re.findall(r"(\S+\.md)$", SITE[SITE.index("\nnav:") :], re.MULTILINE)
+    assert sorted(listed) == sorted(path.name for path in DOCS.glob("*.md"))
+
+
+def test_the_reference_has_every_public_name() -> None:
+    there = set(re.findall(r"^::: confab\.(\w+)$", (DOCS / "reference.md").read_text(), re.MULTILINE))
+    assert there == set(confab.__all__)
+    for home, name in re.findall(r"^::: (\S+)\.(\w+)$", (DOCS / "reference.md").read_text(), re.MULTILINE):
+        assert inspect.getdoc(getattr(importlib.import_module(home), name)), name
+
+
+def test_what_can_be_called_has_an_example_or_says_where_one_is() -> None:
+    without = [
+        f"{name}.{member}" if member else name
+        for name in confab.__all__
+        for member, of in [("", getattr(confab, name)), *inspect.getmembers(getattr(confab, name), inspect.isfunction)]
+        if callable(of) and not member.startswith("_") and not issubclass_of_error(of) and not inspect.getdoc(of)
+    ]
+    assert without == []
+    for function in (confab.load, confab.scenes, confab.generate, confab.practise, confab.new_domain, confab.validate):
+        assert ">>>" in (inspect.getdoc(function) or ""), function
+
+
+def issubclass_of_error(of: object) -> bool:
+    return isinstance(of, type) and issubclass(of, Exception)
+
+
+@pytest.mark.parametrize("page", ["tutorial", "how-to"])
+def test_every_command_and_call_of_a_page_exists(page: str) -> None:
+    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
+    commands = [one or other for one, other in COMMAND.findall(text)]
+    assert len(commands) >= 6
+    for line in commands:
+        words = [word for word in shlex.split(line.replace("…", "x")) if word]
+        command: click.Command | None = app
+        while isinstance(command, click.Group) and words:
+            command = command.get_command(click.Context(command), words.pop(0))
+        assert command is not None, f"confab {line}"
+        options = {word.split("=")[0] for word in words if word.startswith("-") and word != "-"}
+        known = {option for parameter in command.params for option in parameter.opts}
+        assert options <= known, f"confab {line}: {options - known}"
+    for home, name, given in CALL.findall(text):
+        where = HOMES.get(home, confab if home == "confab" else confab.Memory)
+        function = getattr(where, name)
+        named = {word.arg for word in ast.parse(f"f({given})", mode="eval").body.keywords}  # type: ignore[attr-defined]
+        takes = inspect.signature(function).parameters
+        assert named <= takes.keys() or "options" in takes, f"{home}.{name}({given})"
+
+
+def test_the_tutorial_prints_what_it_says() -> None:
+    page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    example = doctest.DocTestParser().get_doctest(code, {}, "tutorial", "tutorial.md", 0)
+    result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example)
+    assert result.attempted >= 15
+    assert result.failed == 0
+
+
+@pytest.mark.skipif(find_spec("mkdocs") is None or find_spec("material") is None, reason="needs the extra docs")
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "LOCATION" in (tmp_path / "reference.html").read_text()
