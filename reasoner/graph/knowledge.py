@@ -24,6 +24,7 @@ import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
 from reasoner.names import nearest
+from reasoner.updates.compiling import Fault, Place, compiled
 from reasoner.vocabulary import CORE, PREFIXES
 
 BASE = "urn:confab:graph:"
@@ -79,6 +80,8 @@ class KnowledgeGraph:
         What the files declare, the scene's own first; the empty prefix is that of the scene's own file.
     faults : list of str
         Why the scene can only be asked and not be planned in, if it was loaded in spite of them.
+    written : mapping of individual to place
+        Where in the SPARQL update of a behaviour an individual stands that was made from it.
     remote : Remote, optional
         The store that answers instead of `store`; it is only read.
     round_trips : int
@@ -93,6 +96,7 @@ class KnowledgeGraph:
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
     declared: dict[str, str] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
+    written: dict[str, Place] = field(default_factory=dict)
     remote: Remote | None = None
     round_trips: int = 0
     deadline: Deadline = field(default_factory=Deadline)
@@ -189,7 +193,11 @@ class KnowledgeGraph:
 
 
 def load(
-    source: str | Path, store: ox.Store | None = None, deadline: Deadline | None = None, tolerant: bool = False
+    source: str | Path,
+    store: ox.Store | None = None,
+    deadline: Deadline | None = None,
+    tolerant: bool = False,
+    faults: list[Fault] | None = None,
 ) -> KnowledgeGraph:
     """Load a scene with all that it imports, and its reach file if there is one.
 
@@ -203,6 +211,8 @@ def load(
         When loading ends, done or not.
     tolerant : bool
         Load any file of RDF, and note in `faults` what keeps it from being a scene: imports that aren't found, no ontology.
+    faults : list of Fault, optional
+        Gets what is wrong with behaviours that are written as updates; without it, that is an error.
 
     Raises
     ------
@@ -213,7 +223,40 @@ def load(
     graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
     with graph.until(deadline or Deadline()):
         _load(graph, path, tolerant)
+        found = write_out(graph)
+    if faults is not None:
+        faults += found
+    elif found and tolerant:
+        graph.faults += map(str, found)
+    elif found:
+        raise KnowledgeError(str(found[0]))
     return graph
+
+
+def write_out(graph: KnowledgeGraph) -> list[Fault]:
+    """Add to a graph as individuals what its behaviours say as SPARQL updates; return what can't be read of it."""
+    texts = [ox.NamedNode(CORE + name) for name in ("update", "extends")]
+    if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
+        return []
+    found = compiled(lambda query: graph.select(query, SCENE), _spelled(graph), graph.prefixes)
+    asserted = ox.NamedNode(BASE + "asserted")
+    graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, asserted) for t in found.triples)
+    graph.written |= found.places
+    return found.faults
+
+
+def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
+    """Return for each behaviour that is written as an update the prefixes of the file that does so."""
+    prefixes: dict[str, dict[str, str]] = {}
+    for file in graph.files.values():
+        with readable(file) as (content, form):
+            if b"update" not in content:
+                continue
+            parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
+            behaviors = [str(quad.subject)[1:-1] for quad in parser if quad.predicate.value == CORE + "update"]
+            own = dict(parser.prefixes)
+            prefixes |= dict.fromkeys(behaviors, own)
+    return prefixes
 
 
 def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:

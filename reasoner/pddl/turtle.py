@@ -26,6 +26,7 @@ from reasoner.symbols import (
     Symbol,
     ValueCondition,
     Witness,
+    substituted,
 )
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS
 
@@ -227,6 +228,10 @@ class _Writer:
             case EqualityCondition(left, right):
                 said = f"c:EqualityCondition ; c:about {self.put(left)} ; c:value {self.put(right)}"
             case Witness(variable, kind, conditions):
+                if variable in self.terms:  # of another part of the behaviour: a node is one term
+                    own = f"{variable}_{position}"
+                    conditions = tuple(substituted(c, {variable: own}) for c in conditions)
+                    variable = own
                 self.terms[variable] = f":{self.where}.{variable[1:]}"
                 self.nodes.append(self.term(self.terms[variable][1:], "c:Variable", None, kind))
                 inner = [self.condition(c) for c in conditions]

@@ -59,6 +59,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
+from reasoner.updates.compiling import compiled
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, TYPE
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
@@ -116,10 +117,10 @@ SELECT DISTINCT ?fact ?property ?value WHERE {
   ?fact a :SituatedObjectInstance ; ?property ?value
 }"""
 
-DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost"))
+DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update"))
 DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
-"""What the core says of its nodes in numbers, signs and truth values; all else that it says leads to other nodes."""
+"""What the core says of its nodes in numbers, signs, truth values and text; all else that it says leads to other nodes."""
 SIGNS = ("+", "-", "*", "/")
 DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})?")
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
@@ -221,6 +222,12 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
     for part, *row in graph.solutions(SCHEMA, SCENE):
         parts[text(part)].append(_core_triple(row))
+    written = [triple for triple in parts["node"] if graph.remote and triple[1] in (CORE + "update", CORE + "extends")]
+    if written:  # a store elsewhere has the text alone
+        found = compiled(lambda query: graph.select(query, SCENE), {}, graph.prefixes)
+        if found.faults:
+            raise KnowledgeError(str(found.faults[0]))
+        parts["node"] += [_core_triple(triple) for triple in found.triples]  # type: ignore[arg-type]
     return Schema(
         nodes=_nodes(parts["node"]),
         supers=_superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
@@ -236,6 +243,24 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         expressions=_nodes(parts["expression"]),
         ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
     )
+
+
+class _Whole(Names):
+    """Names that are IRIs, but for truth values."""
+
+    def short(self, iri: str) -> str:
+        return {CORE + TRUE: TRUE, CORE + FALSE: FALSE}.get(iri, iri)
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
+    """Return behaviours as they are written: with IRIs for names, and classes that situations define left as they are named."""
+    names = _Whole(())
+    terms = set(schema.of_kind("Parameter", "Variable"))
+    parts = _Schema(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names))
+    return {iri: parts.behavior(iri) for iri in behaviors}
 
 
 @dataclass(frozen=True)

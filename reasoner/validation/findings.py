@@ -12,13 +12,15 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import KnowledgeGraph, readable
 from reasoner.names import local_name
-from reasoner.vocabulary import RDFS
+from reasoner.updates.compiling import Place
+from reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")
 """Rules whose findings come first: others may follow from them."""
 
 LABEL = ox.NamedNode(RDFS + "label")
+UPDATE = ox.NamedNode(CORE + "update")
 
 
 @dataclass(frozen=True, order=True)
@@ -74,9 +76,22 @@ class Places:
         self.graph = graph
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
-        """Return a finding on a node, with its file, line and label filled in."""
+        """Return a finding on a node, with its file, line and label filled in; of one that an update says, its place in that."""
+        if node in self.graph.written:
+            return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
         file = self._files.get(node) or self.graph.path
         return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
+
+    def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
+        """Return a finding on a part of an update: its behaviour is the node, and the file's line that of the part."""
+        node = place.behavior
+        file = self._files.get(node) or self.graph.path
+        line = _line(file, node)
+        said = self.graph.store.quads_for_pattern(ox.NamedNode(node), UPDATE, None, None)
+        texts = [quad.object.value for quad in said if isinstance(quad.object, ox.Literal)]
+        if file and line and texts and (begin := file.read_text(encoding="utf-8").find(texts[0])) >= 0:
+            line = file.read_text(encoding="utf-8").count("\n", 0, begin) + place.line
+        return Finding(str(file or ""), line, node, self.label(node), rule, f"{what} ({place})", why, remedy, severity)
 
     def label(self, node: str) -> str:
         """Return a node's label, English before others; its short name if it has none."""

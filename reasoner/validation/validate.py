@@ -31,6 +31,7 @@ from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
+from reasoner.updates.compiling import Fault
 from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
 from reasoner.validation.rules import RULES, Case, misread
 from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
@@ -50,6 +51,8 @@ CONSEQUENCES = {
     "relation-outside-range",
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
+NEEDS_ALL_BEHAVIORS = {"level-gap", "rest-value-out-of-reach"}
+"""What isn't said as long as the update of some behaviour can't be read."""
 
 STAGES = 4
 """Of the validation of a file."""
@@ -114,14 +117,18 @@ def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
 def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -> Iterator[Finding]:
     path = scene_file(file)
     done(f"reading {path.name}")
+    faults: list[Fault] = []
     try:
-        graph = load(path)
+        graph = load(path, faults=faults)
     except KnowledgeError as error:
         why = "nothing else can be checked before this is mended"
         said = str(error).removeprefix(f"{path}: ")
         yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
         return
     places = Places(graph)
+    for fault in faults:
+        why = "a behaviour whose update can't be read does nothing"
+        yield places.in_update("update", fault.place, fault.what, why, fault.remedy)
     done(f"checking {path.name}")
     yield from _merged(graph, places)
     found = [*_violations(graph, places)]
@@ -131,7 +138,13 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     reading, problem = _read(graph)
     case = Case(graph, reading)
     unsure = misread(case)
+    unread = {fault.place.behavior for fault in faults}
+    if faults:
+        found = [f for f in found if f.node not in unread and f.rule not in NEEDS_ALL_BEHAVIORS]
     yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
+    if faults:
+        yield from (finding for finding in _by_rules(case, places) if finding.rule == "undeclared-term")
+        return
     if problem and not any(finding.serious for finding in found):
         why = "the planner reads the file in the same way"
         yield Finding(

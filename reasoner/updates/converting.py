@@ -1,0 +1,355 @@
+"""A Turtle file whose behaviours are written anew, as updates or as individuals; all else in it stays as it stands.
+
+The file is taken apart into statements. Those of a behaviour and its parts are exchanged; a behaviour that the other form can't
+say in the same way stays, with a note why.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, text
+from reasoner.names import local_name
+from reasoner.reading.problem import Schema, as_written, read_schema
+from reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
+from reasoner.updates.compiling import compiled
+from reasoner.updates.writing import Situations, update
+from reasoner.vocabulary import CORE, INDIVIDUAL, LABEL, SKOS, TYPE, XSD
+
+TOKEN = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*"""|\'\'\'(?:[^\'\\]|\\.|\'(?!\'\'))*\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\''
+    r"|<[^<>\s]*>|#[^\n]*|(?P<end>\.(?=\s|#|$))|[^\"'<#.]+|.",
+    re.DOTALL,
+)
+LINKS = tuple(CORE + name for name in ("parameter", "precondition", "postcondition"))
+TEXT = (CORE + "update", CORE + "extends")
+LOCAL = re.compile(r"[A-Za-z_]([\w.-]*[\w-])?")
+Form = Literal["sparql", "individuals"]
+Triples = Sequence[tuple[ox.NamedNode | ox.BlankNode, ox.NamedNode, ox.NamedNode | ox.BlankNode | ox.Literal]]
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A file as it should be, which behaviours were written anew, and why others stay as they are."""
+
+    text: str
+    behaviors: Sequence[str]
+    notes: Sequence[str]
+
+
+@dataclass
+class _Statement:
+    """A part of a file up to a full stop; its triples are none for a prefix and for comments."""
+
+    text: str
+    triples: Triples = ()
+    subject: str = ""
+
+
+@dataclass
+class _File:
+    """A Turtle file in statements, with what spells its names."""
+
+    statements: list[_Statement]
+    prefixes: Mapping[str, str]
+    said: dict[str, list[_Statement]] = field(default_factory=dict)
+
+    def spell(self, iri: str) -> str:
+        """Return how an IRI is written in this file, and in its updates."""
+        for prefix, namespace in sorted(self.prefixes.items(), key=lambda pair: -len(pair[1])):
+            local = iri.removeprefix(namespace)
+            if iri.startswith(namespace) and LOCAL.fullmatch(local):
+                return f"{prefix}:{local}"
+        return f"<{iri}>"
+
+    def term(self, term: ox.NamedNode | ox.BlankNode | ox.Literal) -> str:
+        if isinstance(term, ox.NamedNode):
+            return self.spell(term.value)
+        if not isinstance(term, ox.Literal):
+            return str(term)
+        if term.datatype.value in (XSD + "integer", XSD + "boolean", XSD + "decimal"):
+            return term.value
+        if "\n" in term.value:
+            quoted = term.value.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
+            return f'"""{quoted}"""' + (f"@{term.language}" if term.language else "")
+        if term.datatype.value.startswith(XSD) and term.datatype.value != XSD + "string":
+            return f"{ox.Literal(term.value)}^^{self.spell(term.datatype.value)}"
+        return str(term)
+
+    def statement(self, subject: str, triples: Triples) -> str:
+        """Return some triples of a subject as one statement."""
+        said: dict[str, list[str]] = {}
+        for _, predicate, value in triples:
+            name = "a" if predicate.value == TYPE else self.spell(predicate.value)
+            said.setdefault(name, []).append(self.term(value))
+        parts = [f"{name} {', '.join(dict.fromkeys(values))}" for name, values in said.items()]
+        return f"{self.spell(subject)} " + " ; ".join(parts) + " ."
+
+
+def convert(path: Path, form: Form) -> Converted:
+    """Return a Turtle file with its behaviours in one form.
+
+    Parameters
+    ----------
+    path : Path
+    form : str
+        ``sparql`` for updates, ``individuals`` for conditions and effects that are individuals.
+
+    Raises
+    ------
+    KnowledgeError
+        It is no Turtle file, it or what it imports can't be read, or an update in it has a fault.
+    """
+    if path.suffix != ".ttl":
+        raise KnowledgeError(f"{path}: only Turtle files are converted; save it as Turtle (Protégé: File, Save as …)")
+    graph = load(path)
+    file = _file(path)
+    schema = read_schema(graph)
+    typed = {iri for iri, said in file.said.items() if any(t[1].value == TYPE for s in said for t in s.triples)}
+    own = [iri for iri in schema.of_kind("Behavior") if iri in typed]
+    return _to_updates(file, graph, schema, own) if form == "sparql" else _to_individuals(file, graph, own)
+
+
+def _file(path: Path) -> _File:
+    with readable(path) as (content, form):
+        parser = ox.parse(content, format=form, base_iri=path.as_uri())
+        list(parser)
+        prefixes = dict(parser.prefixes)
+    head = "".join(f"@prefix {prefix}: <{namespace}> .\n" for prefix, namespace in prefixes.items())
+    file = _File([], prefixes)
+    piece = ""
+    for token in TOKEN.finditer(content.decode()):
+        piece += token.group()
+        if token.lastgroup == "end":
+            file.statements.append(_Statement(piece))
+            piece = ""
+    for statement in file.statements:
+        quads = list(ox.parse(head + statement.text, format=form, base_iri=path.as_uri()))
+        subjects = {quad.subject.value for quad in quads if isinstance(quad.subject, ox.NamedNode)}
+        if len(subjects) == 1 and all(isinstance(quad.subject, ox.NamedNode) for quad in quads):
+            statement.triples = [(q.subject, q.predicate, q.object) for q in quads]
+            statement.subject = subjects.pop()
+            file.said.setdefault(statement.subject, []).append(statement)
+    file.statements.append(_Statement(piece))
+    return file
+
+
+def _to_updates(file: _File, graph: KnowledgeGraph, schema: Schema, own: Sequence[str]) -> Converted:
+    situations = situations_of(schema)
+    done, notes, kept = [], [], set[str]()
+    gone: set[str] = set()
+    for iri in own:
+        node = schema.nodes[iri]
+        if any(name in node for name in TEXT) or not any(name in node for name in LINKS):
+            continue
+        parts = _parts(iri, schema)
+        try:
+            (behavior,) = as_written(schema, [iri]).values()
+            labels = [_label(graph, condition) for condition in schema.nodes[iri].get(CORE + "precondition", ())]
+            written = update(behavior, situations, file.spell, labels)
+            why = _why_not(iri, parts, file, schema) or _differs(graph, iri, behavior, written, file.prefixes)
+        except KnowledgeError as error:
+            why = str(error)
+        if why:
+            notes.append(f"{local_name(iri)} stays as it is: {why}")
+            kept |= parts
+            continue
+        done.append(iri)
+        gone |= parts
+        _exchange(file, iri, [(CORE + "update", ox.Literal("\n" + written))], [])
+    for part in sorted(gone - kept):
+        for statement in file.said.get(part, ()):
+            rest = [t for t in statement.triples if not _replaced(t, _is_term(part, schema))]
+            lead = _lead(statement.text)
+            statement.text = lead + file.statement(part, rest) if rest else lead.rstrip(" ") if "#" in lead else ""
+    return Converted(_joined(file), done, notes)
+
+
+def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> Converted:
+    done = []
+    for iri in own:
+        stated = [t for s in file.said[iri] for t in s.triples]
+        if not any(predicate.value in TEXT for _, predicate, _ in stated):
+            continue
+        links: list[tuple[str, ox.NamedNode | ox.Literal]] = []
+        nodes: dict[str, list[tuple[ox.NamedNode, ox.NamedNode, ox.NamedNode | ox.Literal]]] = {}
+        for node in [iri, *(node for node in graph.written if node.startswith(f"{iri}.") and node not in file.said)]:
+            for quad in graph.store.quads_for_pattern(ox.NamedNode(node), None, None, None):
+                subject, predicate, value = quad.subject, quad.predicate, quad.object
+                if node != iri:
+                    nodes.setdefault(node, []).append((subject, predicate, value))  # type: ignore[arg-type]
+                elif predicate.value in LINKS and (subject, predicate, value) not in stated:
+                    links.append((predicate.value, value))  # type: ignore[arg-type]
+        links.sort(key=lambda link: (LINKS.index(link[0]), str(link[1])))
+        order = (TYPE, CORE + "index", CORE + "termType", CORE + "negated")
+        for said in nodes.values():
+            said.sort(
+                key=lambda t: (order.index(t[1].value) if t[1].value in order else len(order), t[1].value, str(t[2]))
+            )
+            said.sort(key=lambda t: t[1].value == TYPE and t[2].value != INDIVIDUAL)
+            said.sort(key=lambda t: t[1].value != TYPE)
+        made = [file.statement(node, said) for node, said in nodes.items()]
+        _exchange(file, iri, links, made)
+        done.append(iri)
+    return Converted(_joined(file), done, [])
+
+
+def _exchange(
+    file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
+) -> None:
+    """Put other parts into the statements of a behaviour, and its own statements behind the first of them."""
+    node = ox.NamedNode(iri)
+    for number, statement in enumerate(file.said[iri]):
+        rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]
+        if number == 0:
+            rest += [(node, ox.NamedNode(name), value) for name, value in links]
+        lead = _lead(statement.text)
+        lines = [file.statement(iri, rest), *(behind if number == 0 else ())] if rest else []
+        statement.text = lead + "\n".join(lines) if lines else ""
+
+
+def _lead(statement: str) -> str:
+    """Return the space and the comments before a statement."""
+    found = ""
+    for token in (match.group() for match in TOKEN.finditer(statement)):
+        if token.startswith("#"):
+            found += token
+        elif token.strip():
+            return found + token[: len(token) - len(token.lstrip())]
+        else:
+            found += token
+    return found
+
+
+def _joined(file: _File) -> str:
+    return re.sub(r"\n{3,}", "\n\n", "".join(statement.text for statement in file.statements)).rstrip() + "\n"
+
+
+def _parts(iri: str, schema: Schema) -> set[str]:
+    """Return the terms, conditions and effects of a behaviour."""
+    found: set[str] = set()
+    waiting = [part for name in LINKS for part in schema.nodes[iri].get(name, ())]
+    while waiting:
+        part = waiting.pop()
+        if part in found or part not in schema.nodes or not (_is_term(part, schema) or _is_said(part, schema)):
+            continue
+        found.add(part)
+        waiting += [v for name, values in schema.nodes[part].items() if name.startswith(CORE) for v in values]
+    return found
+
+
+def _is_term(iri: str, schema: Schema) -> bool:
+    return bool({CORE + "Parameter", CORE + "Variable"} & set(schema.nodes[iri][TYPE]))
+
+
+def _is_said(iri: str, schema: Schema) -> bool:
+    return any(
+        kind.startswith(CORE) and kind.endswith(("Condition", "Effect", "Of", "Witness"))
+        for kind in schema.nodes[iri][TYPE]
+    )
+
+
+def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str:
+    """Return why the parts of a behaviour can't go; nothing if they can."""
+    for part in sorted(parts):
+        if part not in file.said:
+            return f"{local_name(part)} isn't stated in this file"
+        if _is_term(part, schema):
+            if part.rpartition(".")[0] != iri:
+                return f"its term {local_name(part)} isn't called {local_name(iri)}.…"
+        elif any(not _replaced(t, False) for s in file.said[part] for t in s.triples):
+            return f"something else is said of {local_name(part)}"
+    return ""
+
+
+def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
+    """Tell whether the other form says a triple of a part, or leaves it out since it is a label of a condition."""
+    predicate = triple[1].value
+    return (
+        predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
+    )
+
+
+def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
+    """Return what an update doesn't say as the behaviour does; nothing if it says the same."""
+    again = compiled_again(graph, iri, written, prefixes)
+    if isinstance(again, str):
+        return again
+    return "" if plainly(again) == plainly(behavior) else "its update would say something else"
+
+
+def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapping[str, str]) -> Behavior | str:
+    """Return the behaviour that an update stands for in a graph that has it as individuals, or why there is none."""
+
+    def ask(query: str) -> Sequence[Sequence[object]]:
+        if "?text" in query:
+            return []
+        if "VALUES ?property" in query:
+            return [(ox.NamedNode(iri), ox.NamedNode(CORE + "update"), ox.Literal(written))]
+        return graph.select(query, SCENE)
+
+    found = compiled(ask, {iri: prefixes}, graph.prefixes)
+    if found.faults:
+        return f"{found.faults[0].what} ({found.faults[0].place})"
+    nodes: dict[str, dict[str, list[str]]] = {}
+    for triple in found.triples:
+        nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
+    schema = read_schema(graph)
+    nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
+    others = {node: said for node, said in schema.nodes.items() if not node.startswith(f"{iri}.") and node != iri}
+    return as_written(replace(schema, nodes={**others, **nodes}), [iri])[iri]
+
+
+def situations_of(schema: Schema) -> Situations:
+    """Return how the situations of a schema are said, by their IRIs."""
+    properties = {
+        iri: prop
+        for iri in schema.of_kind("SituationType")
+        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
+    }
+    return Situations(properties, schema.pairs)
+
+
+def plainly(behavior: Behavior) -> object:
+    """Return what a behaviour says, whatever its bound variables are called, and in whatever order it says it."""
+    effects = ((e.situation, e.arguments, e.value, _plain(e.when)) for e in behavior.effects)
+    return (
+        behavior.name,
+        behavior.level,
+        behavior.parameters,
+        frozenset(behavior.variables),
+        behavior.cost,
+        _plain(behavior.preconditions),
+        frozenset(effects),
+    )
+
+
+def _plain(conditions: Iterable[Condition], depth: int = 0) -> frozenset[object]:
+    """Return what a conjunction says; alternatives of which there is only one are it."""
+    found: set[object] = set()
+    for condition in conditions:
+        match condition:
+            case Witness(variable, kind, inner, negated):
+                bound = [substituted(c, {variable: f"?bound{depth}"}) for c in inner]
+                found.add(("some", kind, _plain(bound, depth + 1), negated))
+            case AnyOf((group,), False):
+                found |= _plain(group, depth)
+            case AnyOf(((one,),), True):
+                found |= _plain([replace(one, negated=not one.negated)], depth)
+            case AnyOf(alternatives, negated):
+                found.add(("any", frozenset(_plain(group, depth) for group in alternatives), negated))
+            case _:
+                found.add(condition)
+    return frozenset(found)
+
+
+def _label(graph: KnowledgeGraph, node: str) -> str:
+    quads = graph.store.quads_for_pattern(ox.NamedNode(node), ox.NamedNode(LABEL), None, None)
+    found = [quad.object for quad in quads if isinstance(quad.object, ox.Literal)]
+    return min(found, key=lambda label: (label.language != "en", label.value)).value if found else ""

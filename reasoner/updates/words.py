@@ -1,0 +1,272 @@
+"""The text of a SPARQL update, parsed by rdflib, as a tree whose words know where they stand.
+
+rdflib's grammar forgets places. Of a copy of it, what parses a variable or a name yields a `Word` instead: the text as it was
+written, and its place. What else there is in the tree (groups, filters, unions) is rdflib's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from copy import deepcopy
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import pyparsing
+
+from reasoner.vocabulary import RDF
+
+A = "a"
+FIRST, REST, NIL = (RDF + name for name in ("first", "rest", "nil"))
+
+
+class Word(str):
+    """A variable (``?cup``), a name (``:Cup``, ``<https://…>``) or ``a``, as it is written, and where."""
+
+    at: int = 0
+
+    @property
+    def variable(self) -> bool:
+        """Whether it is a variable."""
+        return self.startswith("?")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """``true`` or ``false``."""
+
+    value: bool
+
+
+Said = Word | Truth
+Value = Word | Truth | tuple[Said, ...]
+
+
+@dataclass(frozen=True)
+class Triple:
+    """A pattern; its object is a tuple where it was written as a list, ``(?shelf true)``."""
+
+    subject: Word
+    predicate: Word
+    object: Value
+
+
+@dataclass(frozen=True)
+class Operation:
+    """``DELETE { … } INSERT { … } WHERE { … }``; `where` has the parts of the group."""
+
+    delete: Sequence[Triple]
+    insert: Sequence[Triple]
+    where: Sequence[Any]
+    at: int
+
+
+class UpdateError(ValueError):
+    """An update can't be read: what is wrong, what to do, and at which character."""
+
+    def __init__(self, what: str, remedy: str, at: int) -> None:
+        super().__init__(f"{what}; {remedy}")
+        self.what, self.remedy, self.at = what, remedy, at
+
+
+def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
+    """Return the prefixes that an update declares, and its operations in order.
+
+    >>> prefixes, (operation,) = parsed("PREFIX : <urn:x#> DELETE { ?a :p ?b } INSERT { ?a :p :c } WHERE { ?a :p ?b }")
+    >>> prefixes, operation.delete[0].object, operation.insert[0].object.at
+    ({'': 'urn:x#'}, '?b', 53)
+
+    Raises
+    ------
+    UpdateError
+        It is no SPARQL update, or one that does something else than delete and insert.
+    """
+    try:
+        tree = _grammar().parse_string(text, parse_all=True)[0]
+    except pyparsing.ParseBaseException:
+        at = _stuck(text)
+        near = text[at:].split()
+        found = f"'{near[0][:30]}' isn't expected here" if near else "something is missing at the end"
+        raise UpdateError(
+            f"this is no SPARQL update: {found}", "write DELETE { … } INSERT { … } WHERE { … }", at
+        ) from None
+    if not tree.request:
+        raise UpdateError("the update says nothing", "write DELETE { … } INSERT { … } WHERE { … }", 0)
+    prefixes = {}
+    for prologue in tree.prologue or ():
+        for declared in prologue:
+            if declared.name == "Base":
+                raise UpdateError("BASE isn't read here", "write whole IRIs, or PREFIX lines", 0)
+            prefixes[str(declared.prefix or "")] = str(declared.iri).strip("<>")
+    return prefixes, [_operation(request, text) for request in tree.request or ()]
+
+
+@cache
+def _grammar() -> pyparsing.ParserElement:
+    from rdflib.plugins.sparql import parser
+
+    unit, variable, name, iri, a = deepcopy(
+        (parser.UpdateUnit, parser.Var, parser.PrefixedName, parser.IRIREF, parser.A)
+    )
+
+    def word(element: pyparsing.ParserElement, spelled: Any) -> None:
+        def placed(text: str, at: int, tokens: pyparsing.ParseResults) -> Word:
+            found = Word(spelled(tokens[0]))
+            found.at = _skipped(text, at)
+            return found
+
+        element.add_parse_action(placed)
+
+    word(variable, lambda token: f"?{token}")
+    word(name, lambda token: f"{token.prefix or ''}:{token.localname or ''}")
+    word(iri, lambda token: f"<{token}>")
+    word(a, lambda _: A)
+    unit.parse_with_tabs()
+    assert isinstance(unit, pyparsing.ParserElement)
+    return unit
+
+
+def _stuck(text: str) -> int:
+    """Return how far any part of the grammar gets in a text that isn't of its language."""
+    from rdflib.plugins.sparql import parser
+
+    unit, farthest = deepcopy(parser.UpdateUnit).parse_with_tabs(), 0
+
+    def failed(_: str, at: int, *__: object) -> None:
+        nonlocal farthest
+        farthest = max(farthest, at)
+
+    for element in unit.visit_all():  # type: ignore[no-untyped-call]
+        element.set_fail_action(failed)
+    with suppress(pyparsing.ParseBaseException):
+        unit.parse_string(text, parse_all=True)
+    return _skipped(text, farthest)
+
+
+def _skipped(text: str, at: int) -> int:
+    """Return where something stands that begins behind the space at some character."""
+    return len(text) - len(text[at:].lstrip())
+
+
+def _operation(request: Any, text: str) -> Operation:
+    if request.name == "DeleteWhere":
+        delete = _quads(request.quads)
+        return Operation(delete, (), [_Block(delete)], _least(delete, 0))
+    if request.name == "InsertData":
+        insert = _quads(request.quads)
+        return Operation((), insert, (), _least(insert, 0))
+    if request.name != "Modify" or request.withClause or request.using:
+        raise UpdateError(
+            "a behaviour deletes and inserts in the situation that it is done in",
+            "write DELETE { … } INSERT { … } WHERE { … } without WITH, USING, GRAPH and other operations",
+            0,
+        )
+    delete = _quads(request.delete.quads) if request.delete else []
+    insert = _quads(request.insert.quads) if request.insert else []
+    return Operation(delete, insert, parts(request.where), _least([*delete, *insert], 0))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The triples of DELETE WHERE, as a group has them."""
+
+    triples: Sequence[Triple]
+    name: str = "Read"
+
+
+def _least(triples: Sequence[Triple], otherwise: int) -> int:
+    return min((triple.subject.at for triple in triples), default=otherwise)
+
+
+def _quads(quads: Any) -> list[Triple]:
+    if quads.quadsNotTriples:
+        raise UpdateError("GRAPH isn't read here", "a behaviour speaks of one situation; leave GRAPH out", 0)
+    return [triple for block in quads.triples or () for triple in triples(block)]
+
+
+def parts(group: Any) -> Sequence[Any]:
+    """Return the parts of a group graph pattern."""
+    if group.name == "SubSelect":
+        raise UpdateError("a SELECT inside isn't read here", "write its patterns themselves", 0)
+    return group.part or ()
+
+
+def triples(block: Sequence[Any]) -> Iterator[Triple]:
+    """Yield the triples of a flat list of terms, lists put together again."""
+    cells: dict[object, list[Any]] = {}
+    rows = [(block[i], block[i + 1], block[i + 2]) for i in range(0, len(block), 3)]
+    for subject, predicate, value in rows:
+        if str(predicate) in (FIRST, REST):
+            cells.setdefault(subject, [None, None])[str(predicate) == REST] = value
+    for subject, predicate, value in rows:
+        if str(predicate) in (FIRST, REST):
+            continue
+        where = _predicate(predicate)
+        if not isinstance(subject, Word):
+            raise UpdateError(
+                "a pattern begins with something that has no name",
+                "begin it with a variable or an individual",
+                where.at,
+            )
+        yield Triple(subject, where, _value(value, cells, where.at))
+
+
+def _value(value: Any, cells: Mapping[object, list[Any]], at: int) -> Value:
+    if value not in cells:
+        return term(value, at)
+    found = []
+    while str(value) != NIL:
+        first, value = cells[value]
+        found.append(term(first, at))
+    return tuple(found)
+
+
+def term(value: Any, at: int) -> Said:
+    """Return a variable, a name or a truth value.
+
+    Raises
+    ------
+    UpdateError
+        It is something else.
+    """
+    if isinstance(value, Word):
+        return value
+    if isinstance(getattr(value, "value", None), bool):
+        return Truth(value.value)
+    shown = f"'{value}'" if type(value).__name__ == "Literal" else "something without a name"
+    raise UpdateError(f"{shown} stands where an individual belongs", "name an individual, or use a variable", at)
+
+
+def _predicate(path: Any) -> Word:
+    """Return the one property of a path that consists of one."""
+    while not isinstance(path, Word):
+        inner = path.part if isinstance(path.part, Word) else (path.part or [None])
+        if path.mod or path.name == "PathEltOrInverse" or (not isinstance(inner, Word) and len(inner) != 1):
+            raise UpdateError("a path isn't read here", "write a pattern for each step of it", place(path))
+        path = inner if isinstance(inner, Word) else inner[0]
+        if path is None:
+            raise UpdateError("a path isn't read here", "write a pattern for each step of it", 0)
+    return path
+
+
+def words(tree: Any) -> Iterator[Word]:
+    """Yield the words of a part of the tree.
+
+    >>> _, (operation,) = parsed("INSERT {} WHERE { FILTER NOT EXISTS { ?a <urn:p> ?b } }")
+    >>> [str(word) for word in words(operation.where)]
+    ['?a', '<urn:p>', '?b']
+    """
+    if isinstance(tree, Word):
+        yield tree
+    elif isinstance(tree, Triple):
+        said = tree.object if isinstance(tree.object, tuple) else (tree.object,)
+        yield from (word for word in (tree.subject, tree.predicate, *said) if isinstance(word, Word))
+    elif not isinstance(tree, str) and isinstance(tree, Iterable):
+        for part in tree.values() if isinstance(tree, dict) else tree:
+            yield from words(part)
+
+
+def place(tree: Any) -> int:
+    """Return where a part of the tree begins, as far as its words tell."""
+    return min((word.at for word in words(tree)), default=0)

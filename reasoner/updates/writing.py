@@ -1,0 +1,254 @@
+"""A behaviour written as the SPARQL update that `reasoner.updates.compiling` reads as the same behaviour.
+
+Parameters come first, each with its type; then one condition a line. What the situation determines has its type behind the
+condition that determines it, unless every value of the situation will do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    substituted,
+)
+
+Spell = Callable[[str], str]
+"""Returns how an individual, class or property is written."""
+
+
+@dataclass(frozen=True)
+class Situations:
+    """How situations are said: the property of each type that has one, and the types whose property takes many values."""
+
+    properties: Mapping[str, str]
+    pairs: Collection[str]
+
+
+def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Sequence[str] = ()) -> str:
+    """Return a behaviour as a SPARQL update.
+
+    Parameters
+    ----------
+    behavior : Behavior
+    situations : Situations
+        By the names that the behaviour uses.
+    spell : callable
+        Returns how a name is written, e.g. ``:cup1``; its truth values are `TRUE` and `FALSE`.
+    labels : sequence of str
+        Of its preconditions, in order; they become comments.
+    """
+    writer = _Writer(behavior, situations, spell)
+    (_, effects), *conditional = _operations(behavior)
+    operations = [writer.main(effects, labels), *(writer.conditional(when, made) for when, made in conditional)]
+    return " ;\n".join(operations) + "\n"
+
+
+def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect]]]:
+    """Return what has to hold, besides the preconditions, and the effects of each operation; the first has no condition.
+
+    Their order is that in which effects are made: only where nothing becomes false can it matter.
+    """
+    found: list[tuple[tuple[Condition, ...], list[ValueEffect]]] = [((), [])]
+    for effect in (e for e in behavior.effects if e.value != FALSE):
+        if effect.when != found[-1][0]:
+            found.append((effect.when, []))
+        found[-1][1].append(effect)
+    for effect in (e for e in behavior.effects if e.value == FALSE):
+        group = next((effects for when, effects in found if when == effect.when), None)
+        if group is None:
+            group = []
+            found.append((effect.when, group))
+        group.append(effect)
+    return found
+
+
+@dataclass
+class _Writer:
+    behavior: Behavior
+    situations: Situations
+    spell: Spell
+    names: dict[str, str] = field(default_factory=dict)
+
+    def main(self, effects: Sequence[ValueEffect], labels: Sequence[str]) -> str:
+        """Return the first operation: it says parameters and preconditions."""
+        behavior = self.behavior
+        for term in (*behavior.parameters, *behavior.variables):
+            self.put(term.name)
+        chosen = " ".join(f"{self.put(p.name)} a {self.spell(p.kind)} ." for p in behavior.parameters)
+        lines = self.group(behavior.preconditions, self.chosen(), labels)
+        return self.operation(effects, behavior.preconditions, [chosen, *lines] if chosen else lines)
+
+    def conditional(self, when: tuple[Condition, ...], effects: Sequence[ValueEffect]) -> str:
+        """Return a further operation."""
+        known = self.chosen()
+        self.group(self.behavior.preconditions, known)
+        return self.operation(effects, (*self.behavior.preconditions, *when), self.group(when, known))
+
+    def chosen(self) -> dict[str, bool]:
+        return {parameter.name: True for parameter in self.behavior.parameters}
+
+    def operation(self, effects: Sequence[ValueEffect], asked: Sequence[Condition], lines: Sequence[str]) -> str:
+        delete = [old for effect in effects if (old := self.before(effect, asked)) is not None]
+        insert = [self.situation(e.situation, e.arguments, e.value) for e in effects if e.value != FALSE]
+        head = [f"DELETE {{ {' . '.join(dict.fromkeys(delete))} }}"] if delete else []
+        head += [f"INSERT {{ {' . '.join(insert)} }}"] if insert or not delete else []
+        return "\n".join([*head, "WHERE {", *(f"  {line}" for line in lines), "}"])
+
+    def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
+        """Return what an effect deletes: what it makes false, or the value that the conditions say was there."""
+        if effect.value == FALSE:
+            return self.situation(effect.situation, effect.arguments, TRUE)
+        if effect.value == TRUE:
+            return None
+        for one in asked:
+            match one:
+                case ValueCondition(effect.situation, effect.arguments, value, False) if value != effect.value:
+                    return self.situation(one.situation, one.arguments, value)
+        return None
+
+    def put(self, term: str) -> str:
+        """Return how a term is written; a variable is called by letters, digits and underscores."""
+        if term in (TRUE, FALSE):
+            return term
+        if not term.startswith("?"):
+            return self.spell(term)
+        if term not in self.names:
+            name = "?" + re.sub(r"\W", "_", term[1:])
+            while name in self.names.values():
+                name += "_"
+            self.names[term] = name
+        return self.names[term]
+
+    def situation(self, situation: str, arguments: Sequence[str], value: str) -> str:
+        subject, *rest = map(self.put, arguments)
+        prop = self.situations.properties.get(situation)
+        if situation in self.situations.pairs:
+            return f"{subject} {self.spell(prop or situation)} {rest[0]}"
+        if prop and not rest:
+            return f"{subject} {self.spell(prop)} {self.put(value)}"
+        return f"{subject} {self.spell(situation)} {_listed([*rest, self.put(value)])}"
+
+    def group(self, conditions: Sequence[Condition], known: dict[str, bool], labels: Sequence[str] = ()) -> list[str]:
+        """Return a line for each of some conditions.
+
+        `known` are the variables that mean something already, and whether their type was said; what the conditions determine
+        is added, also for those before it: in a group the order of lines means nothing, but that a class asked of what the
+        group determines comes behind that.
+        """
+        said = list(_flat(zip(conditions, [*labels, *[""] * len(conditions)], strict=False)))
+        for one, _ in said:
+            if isinstance(one, ValueCondition) and not one.negated and one.situation not in self.situations.pairs:
+                known.setdefault(one.value, False)
+        begun = dict(known)
+
+        def later(one: Condition) -> bool:
+            return isinstance(one, ClassCondition) and not one.negated and not begun.get(one.term, True)
+
+        said.sort(key=lambda pair: later(pair[0]))
+        return [self.line(one, known) + (f"   # {' '.join(label.split())}" if label else "") for one, label in said]
+
+    def line(self, condition: Condition, known: dict[str, bool]) -> str:
+        if condition.negated and isinstance(condition, EqualityCondition):
+            return f"FILTER({self.put(condition.left)} != {self.put(condition.right)})"
+        if condition.negated:
+            return f"FILTER NOT EXISTS {{ {self.said(condition, dict.fromkeys(known, True))} }}"
+        if isinstance(condition, Witness):
+            return f"FILTER EXISTS {{ {self.said(condition, dict.fromkeys(known, True))} }}"
+        return self.said(condition, known)
+
+    def said(self, condition: Condition, known: dict[str, bool]) -> str:
+        """Return a condition without its negation."""
+        match condition:
+            case ValueCondition(situation, arguments, value):
+                line = f"{self.situation(situation, arguments, value)} ."
+                return " ".join([line, *self.typed(situation, value, known)])
+            case RelationCondition(relation, arguments):
+                subject, *rest = map(self.put, arguments)
+                return f"{subject} {self.spell(relation)} {_listed(rest or ['true'])} ."
+            case ClassCondition(term, kind):
+                return f"{self.put(term)} a {self.spell(kind)} ."
+            case EqualityCondition(left, right):
+                return f"FILTER({self.put(left)} = {self.put(right)})"
+            case Witness(variable, kind, conditions):
+                if variable in known or variable in self.behavior.kinds:  # here it is another one
+                    own = f"{variable}_inside"
+                    inner = tuple(substituted(one, {variable: own}) for one in conditions)
+                    return self.said(Witness(own, kind, inner), known)
+                sought = f"{self.put(variable)} a {self.spell(kind)} ."
+                return " ".join([sought, *self.group(conditions, {**dict.fromkeys(known, True), variable: True})])
+            case AnyOf(alternatives):
+                return self.any_of(alternatives, known, condition.negated)
+
+    def any_of(self, alternatives: Sequence[Sequence[Condition]], known: dict[str, bool], negated: bool) -> str:
+        if chosen := _choice(alternatives):
+            return f"VALUES {self.put(chosen[0])} {{ {' '.join(map(self.put, chosen[1]))} }}"
+        groups = [" ".join(self.group(group, dict.fromkeys(known, True))) for group in alternatives]
+        if len(groups) == 1:
+            return groups[0]
+        return " UNION ".join(f"{{ {group} }}" for group in groups)
+
+    def typed(self, situation: str, value: str, known: dict[str, bool]) -> Iterator[str]:
+        """Yield the type of a variable behind what determines it, where its situation doesn't say it."""
+        if not value.startswith("?") or known.get(value, True):
+            return
+        known[value] = True
+        kind = self.behavior.kinds.get(value, situation)
+        if kind != situation or self.asked_of_class(value):
+            yield f"{self.put(value)} a {self.spell(kind)} ."
+
+    def asked_of_class(self, term: str) -> bool:
+        """Tell whether some condition asks of which class a term is: such a line isn't to be taken for its type."""
+        waiting: list[Condition] = [*self.behavior.preconditions, *(c for e in self.behavior.effects for c in e.when)]
+        while waiting:
+            match waiting.pop():
+                case ClassCondition(one):
+                    if one == term:
+                        return True
+                case Witness(_, _, inner):
+                    waiting += inner
+                case AnyOf(alternatives):
+                    waiting += (c for group in alternatives for c in group)
+        return False
+
+
+def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:
+    """Yield labelled conditions, the only alternative in the place of an `AnyOf` that has no other."""
+    for condition, label in conditions:
+        match condition:
+            case AnyOf((group,), False):
+                yield from _flat((inner, label) for inner in group)
+            case _:
+                yield condition, label
+
+
+def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
+    """Return the variable and the individuals of alternatives that only say which individual it is."""
+    found: list[str] = []
+    name = ""
+    for group in alternatives:
+        match group:
+            case (EqualityCondition(left, right, False),) if left.startswith("?") and not right.startswith("?"):
+                if name and left != name:
+                    return None
+                name = left
+                found.append(right)
+            case _:
+                return None
+    return (name, found) if len(found) > 1 else None
+
+
+def _listed(terms: Sequence[str]) -> str:
+    return terms[0] if len(terms) == 1 else f"({' '.join(terms)})"

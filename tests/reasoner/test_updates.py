@@ -1,0 +1,222 @@
+"""A behaviour written as a SPARQL update is the same as one written as individuals, both ways; its faults have line and column."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ontology
+from planner.solve import Request, solve
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from reasoner.names import local_name
+from reasoner.pddl.turtle import turtle
+from reasoner.reading.problem import as_written, read, read_schema
+from reasoner.symbols import Behavior
+from reasoner.updates.compiling import Fault
+from reasoner.updates.converting import compiled_again, convert, plainly, situations_of
+from reasoner.updates.writing import update
+from reasoner.validation.validate import validate
+from reasoner.vocabulary import CORE
+from worlds.language import language
+
+ROOT = Path(__file__).resolve().parents[2]
+LABORATORY = ROOT / "docs" / "examples" / "laboratory"
+RANDOM = "https://example.org/random"
+
+
+def behaviors(graph: KnowledgeGraph) -> dict[str, Behavior]:
+    schema = read_schema(graph)
+    return as_written(schema, schema.of_kind("Behavior"))
+
+
+def again(graph: KnowledgeGraph, iri: str, behavior: Behavior, prefixes: dict[str, str]) -> tuple[str, object]:
+    """Return the update of a behaviour, and what that says."""
+
+    def spell(term: str) -> str:
+        found = [f"{prefix}:{term.removeprefix(ns)}" for prefix, ns in prefixes.items() if term.startswith(ns)]
+        return found[0] if found else f"<{term}>"
+
+    written = update(behavior, situations_of(read_schema(graph)), spell)
+    found = compiled_again(graph, iri, written, prefixes)
+    return written, found if isinstance(found, str) else plainly(found)
+
+
+@given(seed=st.integers(0, 10**9))
+@settings(max_examples=settings().max_examples // 5)
+def test_any_behavior_comes_back_from_its_update_as_it_was(seed: int) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "random.ttl"
+        path.write_text(turtle(replace(language(seed, 1), scene=RANDOM), "random", "random"))
+        graph = load(path)
+    for iri, behavior in behaviors(graph).items():
+        written, found = again(graph, iri, behavior, {"": f"{RANDOM}#", "c": CORE})
+        assert found == plainly(behavior), written
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ontology.ROOT / "domains").glob("*.ttl")))
+def test_every_shipped_behavior_comes_back_from_its_update_as_it_was(name: str) -> None:
+    graph = load(ontology.ROOT / "domains" / f"{name}.ttl")
+    for iri, behavior in behaviors(graph).items():
+        if iri.rpartition("#")[0] == graph.scene:
+            written, found = again(graph, iri, behavior, graph.declared)
+            assert found == plainly(behavior), written
+
+
+def test_a_file_converted_there_and_back_says_the_same_and_keeps_what_isnt_a_behavior(tmp_path: Path) -> None:
+    path = ontology.ROOT / "domains" / "towers.ttl"
+    before, short, long = behaviors(load(path)), tmp_path / "short.ttl", tmp_path / "long.ttl"
+    short.write_text(convert(path, "sparql").text)
+    long.write_text(convert(short, "individuals").text)
+    for file in (short, long):
+        found = behaviors(load(file))
+        assert {iri: plainly(behavior) for iri, behavior in found.items()} == {
+            iri: plainly(behavior) for iri, behavior in before.items()
+        }
+    kept = [line for line in path.read_text().splitlines() if "rdfs:subClassOf" in line or line.startswith("#")]
+    assert kept
+    assert set(kept) <= set(short.read_text().splitlines())
+    assert len(short.read_text().splitlines()) < len(path.read_text().splitlines())
+    assert "c:ValueCondition" not in short.read_text()
+    assert "c:update" not in long.read_text()
+
+
+def test_the_laboratory_in_updates_is_under_a_hundred_lines_and_plans_like_its_individuals(tmp_path: Path) -> None:
+    assert len((LABORATORY / "lab.ttl").read_text().splitlines()) < 100
+    (tmp_path / "lab.ttl").write_text(convert(LABORATORY / "lab.ttl", "individuals").text)
+    (tmp_path / "lab-scene.ttl").write_text((LABORATORY / "lab-scene.ttl").read_text())
+    plans = []
+    for folder in (LABORATORY, tmp_path):
+        graph = load(folder / "lab-scene.ttl")
+        infer(graph)
+        outcome = solve(Request(read(graph).problem))
+        assert outcome.plan is not None
+        plans.append([str(step) for step in outcome.plan.walk()])
+    assert plans[0] == plans[1]
+    assert len(plans[0]) == 9 + 30 + 60
+    assert validate([LABORATORY / "lab-scene.ttl"]) == []
+
+
+SMALL = """
+@prefix : <https://example.org/small#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/small> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> .
+:Tube a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :SPOT ; rdfs:label "tube"@en .
+:Slot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :SPOT ; rdfs:label "slot"@en .
+:SPOT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :spot .
+:spot a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual .
+:fits a owl:ObjectProperty, owl:NamedIndividual, c:Relation .
+:MOVE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update \"\"\"TEXT\"\"\" .
+"""
+HEAD = "DELETE { ?tube :spot ?from } INSERT { ?tube :spot ?slot } WHERE { ?tube a :Tube . ?slot a :Slot . ?tube :spot ?from "
+
+
+def faults(folder: Path, text: str) -> list[Fault]:
+    found: list[Fault] = []
+    (folder / "small.ttl").write_text(SMALL.replace("TEXT", text))
+    load(folder / "small.ttl", faults=found)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "remedy", "place"),
+    [
+        (HEAD + "; :spto ?x }", ":spto is neither a property", "mend the name", (1, len(HEAD) + 3)),
+        (HEAD + "}\nFILTER (?a)", "'FILTER' isn't expected here", "write DELETE", (2, 1)),
+        (HEAD + ".\n ?a :fits ?slot }", "nothing says what ?a stands for", "give it a type", (2, 2)),
+        (HEAD + ".\n ?tube :fits/:fits ?slot }", "a path isn't read here", "a pattern for each step", (2, 8)),
+        (HEAD + ".\n OPTIONAL { ?tube :fits ?slot } }", "OPTIONAL isn't read here", "a further operation", (2, 13)),
+        (HEAD + ".\n MINUS { ?tube :fits ?slot } }", "MINUS isn't read here", "FILTER NOT EXISTS", (2, 10)),
+        (HEAD + ".\n FILTER(REGEX(?a, 'b')) }", "this FILTER isn't read here", "compare two terms", (2, 15)),
+        (HEAD + ".\n ?tube :spot 3 }", "'3' stands where an individual belongs", "name an individual", (2, 8)),
+        (HEAD + ".\n ?tube x:spot ?y }", "nothing says what the prefix 'x:' stands for", "declare it", (2, 8)),
+        ("DELETE { ?t :spot ?s } WHERE { ?t a :Tube ; :spot ?s }", "would have none", "insert the one", (1, 13)),
+        ("INSERT { ?t :fits ?s } WHERE { ?t a :Tube . ?s a :Slot }", "nothing changes", "property of a situation", (1, 13)),
+        ("INSERT { ?t a :Tube } WHERE { ?t a :Tube }", "doesn't change", "property of a situation", (1, 13)),
+        (HEAD + "} ; INSERT { ?t :spot ?slot } WHERE { ?t a :Tube }", "would stand for all", "a parameter", (1, len(HEAD) + 14)),
+        ("CLEAR ALL", "deletes and inserts", "without WITH", (1, 1)),
+    ],
+)  # fmt: skip
+def test_a_fault_in_an_update_has_line_and_column(
+    tmp_path: Path, text: str, what: str, remedy: str, place: tuple[int, int]
+) -> None:
+    (fault,) = faults(tmp_path, text)
+    assert what in fault.what
+    assert remedy in fault.remedy
+    assert (fault.place.line, fault.place.column) == place
+
+
+ALIKE = [
+    ("FILTER(?tube IN (:a, :b))", "VALUES ?tube { :a :b }"),
+    ("FILTER(?tube NOT IN (:a, :b))", "FILTER(?tube != :a) FILTER(?tube != :b)"),
+    ("FILTER(?tube = :a || ?tube = :b)", "{ FILTER(?tube = :a) } UNION { FILTER(?tube = :b) }"),
+    ("VALUES (?tube ?slot) { (:a :b) (:c UNDEF) }", "FILTER(?tube = :a && ?slot = :b || ?tube = :c)"),
+    ("FILTER(! EXISTS { ?tube :fits ?slot })", "FILTER NOT EXISTS { ?tube :fits ?slot }"),
+    ("FILTER EXISTS { ?tube :fits ?slot }", "{ ?tube :fits ?slot }"),
+    (
+        "FILTER NOT EXISTS { ?t a :Tube . ?s a :Slot . ?t :spot ?s FILTER(?s != ?slot) FILTER(?t != ?tube) }",
+        "FILTER NOT EXISTS { ?t a :Tube FILTER(?t != ?tube) FILTER EXISTS { ?s a :Slot . ?t :spot ?s FILTER(?s != ?slot) } }",
+    ),
+    ("FILTER(! (?tube = :a && ?slot = :b))", "FILTER NOT EXISTS { FILTER(?tube = :a) FILTER(?slot = :b) }"),
+    ("FILTER NOT EXISTS { ?anyone a :Tube ; :spot ?slot }", "FILTER NOT EXISTS { ?t a :Tube ; :spot ?slot }"),
+]
+
+
+@pytest.mark.parametrize(("one", "other"), ALIKE)
+def test_what_sparql_can_say_in_two_ways_is_the_same_condition(tmp_path: Path, one: str, other: str) -> None:
+    found = []
+    for said in (one, other):
+        assert faults(tmp_path, f"{HEAD} {said} }}") == []
+        (behavior,) = behaviors(load(tmp_path / "small.ttl")).values()
+        found.append(plainly(behavior))
+    assert found[0] == found[1]
+    assert found[0] != plainly(only(tmp_path, f"{HEAD} }}"))
+
+
+def only(folder: Path, text: str) -> Behavior:
+    assert faults(folder, text) == []
+    (behavior,) = behaviors(load(folder / "small.ttl")).values()
+    return behavior
+
+
+def test_parameters_are_what_begins_with_its_type_in_that_order(tmp_path: Path) -> None:
+    text = "INSERT { ?tube :spot ?to } WHERE { ?to a :Slot . ?tube a :Tube ; :spot ?from ; :fits ?to . ?from a :Slot }"
+    said = only(tmp_path, text)
+    assert [(p.name, local_name(p.kind)) for p in said.parameters] == [("?to", "Slot"), ("?tube", "Tube")]
+    assert [(v.name, local_name(v.kind)) for v in said.variables] == [("?from", "Slot")]
+
+
+def test_what_two_levels_share_is_said_once(tmp_path: Path) -> None:
+    faults(tmp_path, f"{HEAD}}}")
+    text = (tmp_path / "small.ttl").read_text()
+    more = (
+        ":LOW a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:extends :MOVE ; c:update "
+        '"INSERT {} WHERE { ?tube :fits ?slot }" .\n'
+    )
+    (tmp_path / "small.ttl").write_text(text + more)
+    low, move = sorted(behaviors(load(tmp_path / "small.ttl")).values(), key=lambda behavior: behavior.name)
+    assert low.parameters == move.parameters
+    assert low.effects == move.effects
+    assert set(move.preconditions) < set(low.preconditions)
+    assert len(low.preconditions) == len(move.preconditions) + 1
+    (tmp_path / "small.ttl").write_text(text.replace("c:update", "c:extends :LOW ; c:update") + more)
+    with pytest.raises(KnowledgeError, match="extends itself"):
+        load(tmp_path / "small.ttl")
+
+
+def test_validation_and_loading_say_a_fault_with_the_line_of_the_file(tmp_path: Path) -> None:
+    assert faults(tmp_path, HEAD + ".\n ?tube :spto ?slot }")
+    path = tmp_path / "small.ttl"
+    (finding,) = (finding for finding in validate([path]) if finding.serious)
+    assert finding.what.endswith("did you mean 'spot'? (line 2, column 8 of the update of MOVE)")
+    line = next(n for n, text in enumerate(path.read_text().splitlines(), 1) if ":spto" in text)
+    assert (finding.rule, finding.line, local_name(finding.node)) == ("update", line, "MOVE")
+    with pytest.raises(KnowledgeError, match=r"small#MOVE>: :spto is .*\(line 2, column 8 of the update of MOVE\)"):
+        load(path)
