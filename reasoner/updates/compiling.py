@@ -377,10 +377,9 @@ class _Writer:
         names = list(group.chosen)
         depth = {name: level for level, name in enumerate(names)}
         for one in [part for part in group.parts if isinstance(part, Triple)] * len(group.determined):
-            for name in _variables(one):
-                if name in group.determined and name == _last(one):
-                    others = [depth.get(other, 0) for other in _variables(one) if other != name]
-                    depth[name] = max([depth.get(name, 0), *others])
+            last = _last(one)
+            if last in group.determined:
+                depth[str(last)] = max(depth.get(word, 0) for word in _variables(one))
         levels: list[list[Any]] = [[] for _ in names]
         for part in group.parts:
             levels[max((depth.get(name, 0) for name in _mentioned(part)), default=0)].append(part)

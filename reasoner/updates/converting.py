@@ -154,7 +154,7 @@ def _to_updates(file: _File, graph: KnowledgeGraph, schema: Schema, own: Sequenc
             labels = [_label(graph, condition) for condition in schema.nodes[iri].get(CORE + "precondition", ())]
             written = update(behavior, situations, file.spell, labels)
             why = _why_not(iri, parts, file, schema) or _differs(graph, iri, behavior, written, file.prefixes)
-        except KnowledgeError as error:
+        except ValueError as error:
             why = str(error)
         if why:
             notes.append(f"{local_name(iri)} stays as it is: {why}")

@@ -16,6 +16,7 @@ from reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     RelationCondition,
@@ -50,6 +51,8 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     labels : sequence of str
         Of its preconditions, in order; they become comments.
     """
+    if behavior.amounts:
+        raise ValueError("it changes amounts, which an update can't say")
     writer = _Writer(behavior, situations, spell)
     (_, effects), *conditional = _operations(behavior)
     operations = [writer.main(effects, labels), *(writer.conditional(when, made) for when, made in conditional)]
@@ -190,9 +193,11 @@ class _Writer:
                 sought = f"{self.put(variable)} a {self.spell(kind)} ."
                 return " ".join([sought, *self.group(conditions, {**dict.fromkeys(known, True), variable: True})])
             case AnyOf(alternatives):
-                return self.any_of(alternatives, known, condition.negated)
+                return self.any_of(alternatives, known)
+            case Comparison():
+                raise ValueError("it compares amounts, which an update can't say")
 
-    def any_of(self, alternatives: Sequence[Sequence[Condition]], known: dict[str, bool], negated: bool) -> str:
+    def any_of(self, alternatives: Sequence[Sequence[Condition]], known: dict[str, bool]) -> str:
         if chosen := _choice(alternatives):
             return f"VALUES {self.put(chosen[0])} {{ {' '.join(map(self.put, chosen[1]))} }}"
         groups = [" ".join(self.group(group, dict.fromkeys(known, True))) for group in alternatives]
