@@ -1,0 +1,52 @@
+"""From a clone to the first verified plan: how long that takes where nothing is installed, and nothing cached.
+
+    python -m benchmarks.first_plan
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
+    """Run a command; return its seconds, those of the processor, and what it printed."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")}
+    begin, before = perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        command, cwd=folder, env={**environment, "PIP_NO_CACHE_DIR": "1"}, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}: {done.stderr[-500:]}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return perf_counter() - begin, cpu, done.stdout
+
+
+def main() -> None:
+    """Print a table: cloning, installing, and the main job, with all that it films and writes."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        rows = {"`git clone`": timed(["git", "clone", "-q", str(ROOT), "confab"], folder)}
+        house = folder / "confab"
+        rows["`make .venv/installed`: Python packages, from the index"] = timed(["make", ".venv/installed"], house)
+        rows["`make demo`: validate, plan, verify, film, learn, report"] = timed(["make", "demo"], house)
+        if "✓" not in rows["`make demo`: validate, plan, verify, film, learn, report"][2]:
+            sys.exit("the demo's plan wasn't verified")
+    print("| step | s | CPU s |\n|---|---|---|")
+    for what, (seconds, cpu, _) in rows.items():
+        print(f"| {what} | {seconds:.0f} | {cpu:.0f} |")
+    total, work = (sum(row[i] for row in rows.values()) for i in (0, 1))
+    print(f"| from nothing to the first verified plan | {total:.0f} | {work:.0f} |")
+
+
+if __name__ == "__main__":
+    main()
