@@ -1,6 +1,8 @@
 """From a clone to the first verified plan: how long that takes where nothing is installed, and nothing cached.
 
     python -m benchmarks.first_plan
+
+Cloning, installing from the package index, and `make demo`, which films and reports besides.
 """
 
 from __future__ import annotations
