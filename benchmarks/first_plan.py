@@ -46,7 +46,7 @@ def main() -> None:
     print("| step | s | CPU s |\n|---|---|---|")
     for what, (seconds, cpu, _) in rows.items():
         print(f"| {what} | {seconds:.0f} | {cpu:.0f} |")
-    total, work = (sum(row[i] for row in rows.values()) for i in (0, 1))
+    total, work = sum(row[0] for row in rows.values()), sum(row[1] for row in rows.values())
     print(f"| from nothing to the first verified plan | {total:.0f} | {work:.0f} |")
 
 
