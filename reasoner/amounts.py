@@ -19,6 +19,10 @@ NOTHING = float("nan")
 """What has no amount: all that is worked out from it is nothing, and it compares with nothing."""
 
 
+LARGEST = 10**60
+"""No amount gets larger than this, nor its denominator: else doubling again and again would fill the memory."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What the amounts of a situation type are: of which unit, whether whole numbers only, and between which bounds."""
@@ -35,6 +39,8 @@ class Quantity:
             and (self.least is None or amount >= self.least)
             and (self.most is None or amount <= self.most)
             and (not self.whole or amount.denominator == 1)
+            and abs(amount.numerator) <= LARGEST
+            and amount.denominator <= LARGEST
         )
 
 
@@ -170,9 +176,16 @@ def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
 
 
 def bounds_written(wanted: str) -> str:
-    """Return the one text of what is wanted of an amount: bounds, or a number."""
-    found = sorted(set(bounds(wanted)))
-    return ",".join(written(limit) if sign == "=" else f"{sign}{written(limit)}" for sign, limit in found)
+    """Return the one text of what is wanted of an amount: a number, or bounds.
+
+    >>> bounds_written("=2.0"), bounds_written("<5, >=2"), bounds_written("=2,<5")
+    ('2', '<5,>=2', '<5,<=2,>=2')
+    """
+    found = set(bounds(wanted))
+    if len(found) == 1:
+        return "".join(written(limit) if sign == "=" else f"{sign}{written(limit)}" for sign, limit in found)
+    both = {(one, limit) for sign, limit in found for one in (("<=", ">=") if sign == "=" else (sign,))}
+    return ",".join(f"{sign}{written(limit)}" for sign, limit in sorted(both))
 
 
 def meets(value: str | None, wanted: str) -> bool:

@@ -21,14 +21,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from itertools import product
 
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, terms_of, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -37,6 +41,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    allowed,
     substituted,
 )
 
@@ -122,7 +127,11 @@ class _Action:
 class _Export:
     def __init__(self, problem: Problem, level: int) -> None:
         self.problem, self.level = problem, level
-        self.situations = {s.name: s for s in problem.domain.situations.values() if s.level <= level}
+        here = [s for s in problem.domain.situations.values() if s.level <= level]
+        self.situations = {s.name: s for s in here if s.quantity is None}
+        self.quantities = {s.name for s in here if s.quantity is not None}
+        self.functions: dict[str, int] = {}  # and how many arguments each has
+        self.measured: dict[str, str] = {}  # relations that give a number, and their functions
         self.behaviors = problem.domain.at_level(level)
         self.sets = {kind: frozenset(members) for kind, members in problem.classes.items()}
         self.world = {name for name in problem.classes.get(WORLD, ()) if len(problem.classes[WORLD]) == 1}
@@ -164,6 +173,8 @@ class _Export:
         for symbol, value in self.problem.goal.items():  # it may name predicates that no action does
             if symbol.situation in self.situations:
                 self.predicate(symbol.situation, symbol.arguments, value)
+            elif symbol.situation in self.quantities:
+                self.function("situation", symbol.situation, symbol.arguments)
         return Exported(
             domain=self.domain_text(domain_name, texts),
             problem=self.problem_text(domain_name, individuals),
@@ -268,6 +279,27 @@ class _Export:
             case _:
                 where.append(self.formula(one))
 
+    def function(self, kind: str, ours: str, arguments: Sequence[str]) -> str:
+        """Return the function that is an amount, or what a relation gives."""
+        name = self.name("function", f"{kind} {ours}", ours)
+        words = [self.term(t) for t in arguments if t not in self.world]
+        self.functions[name] = len(words)
+        if kind == "relation":
+            self.measured[ours] = name
+        return f"({' '.join([name, *words])})"
+
+    def amount(self, one: Expression) -> str:
+        """Return an amount as PDDL."""
+        match one:
+            case Amount(situation, arguments):
+                return self.function("situation", situation, arguments)
+            case Measure(relation, arguments):
+                return self.function("relation", relation, arguments)
+            case Calculation(sign, left, right):
+                return f"({sign} {self.amount(left)} {self.amount(right)})"
+            case constant:
+                return decimal(constant)
+
     def absence(self, kind: str, situation: str, value: str, action: _Action, where: list[str]) -> None:
         """Add "no individual of the class has the value"."""
         if self.situations[situation].boolean:
@@ -355,6 +387,8 @@ class _Export:
             case AnyOf(alternatives, negated):
                 text = f"(or {' '.join(_and([self.formula(c) for c in group]) for group in alternatives)})"
                 no = negated
+            case Comparison(left, sign, right, negated):
+                text, no = f"({sign} {self.amount(left)} {self.amount(right)})", negated
         return f"(not {text})" if no else text
 
     def fresh(self, action: _Action, wanted: str, kind: str = "object") -> str:
@@ -373,13 +407,15 @@ class _Export:
             declared = {t.name: t for t in behavior.variables}
             used = {t for c in (*behavior.preconditions, *extra) for t in _terms(c)}
             used |= {t for _, effects, _ in cases for e in effects for t in (*e.arguments, e.value)}
+            used |= {t for e in behavior.amounts if not e.when for t in (*e.arguments, *terms_of(e.amount))}
             terms = {p.name: self.type_of.get(p.kind, "object") for p in behavior.parameters}
             terms |= {n: self.type_of.get(v.kind, "object") for n, v in declared.items() if n in used}
             action = _Action(behavior, terms)
             for t in (*behavior.parameters, *(v for n, v in declared.items() if n in used)):
                 if t.kind not in self.type_of:
                     action.needs.append(self.is_a(t.name, t.kind))
-            conditions = list(dict.fromkeys((*behavior.preconditions, *extra)))
+            limits = allowed(behavior, self.problem.domain.situations)
+            conditions = list(dict.fromkeys((*behavior.preconditions, *limits, *extra)))
             for c in conditions:
                 self.condition(c, action, action.needs)
             for _, effects, conditional in cases:
@@ -387,6 +423,8 @@ class _Export:
                     self.effect(effect, conditions, action)
                 for effect in conditional:
                     self.conditional(effect, action)
+            for change in behavior.amounts:
+                self.changed(change, action)
             if "(or)" not in action.needs and (
                 action.ends or action.begins or action.effects
             ):  # one that does something
@@ -498,6 +536,24 @@ class _Export:
             changes += [f"?contrary {situation.name} {' '.join((*effect.arguments, v))}" for v in members]
         action.effects.append("\n".join([self.typed({self.term(n): k for n, k in own.items()}), _and(when), *changes]))
 
+    def changed(self, change: AmountEffect, action: _Action) -> None:
+        """Add an effect on an amount."""
+        at = self.function("situation", change.situation, change.arguments)
+        head, by = change.operation, self.amount(change.amount)
+        alone = [e.situation for e in action.behavior.amounts].count(change.situation) == 1
+        if head == "scale":  # which many don't read
+            head, by = ("assign", f"(* {at} {by})") if alone else ("scale-up", by)
+        text = f"({head} {at} {by})"
+        if not change.when:
+            action.begins.append(text)
+            return
+        inside = {t for c in change.when for t in _terms(c)} | {*change.arguments, *terms_of(change.amount)}
+        own = {v.name: v.kind for v in action.behavior.variables if v.name not in action.terms and v.name in inside}
+        when = [self.is_a(n, kind) for n, kind in own.items() if kind not in self.type_of]
+        when += [self.formula(c) for c in change.when]
+        typed = self.typed({self.term(n): self.type_of.get(kind, "object") for n, kind in own.items()})
+        action.effects.append("\n".join([typed, _and(when), text]))
+
     # ------------------------------------------------------------------------------------------------------ texts
 
     def resolve(self, text: str) -> list[str]:
@@ -554,6 +610,8 @@ class _Export:
         kinds = {*self.types, *(k for s in used for k in (*s.arguments, s.range))} - {"Truth", WORLD}
         found = [o for kind, members in self.problem.classes.items() if kind in kinds for o in members]
         found += [o for predicate in sorted(self.statics) for row in sorted(self.statics[predicate]) for o in row]
+        amounts = [s for s in self.problem.initial if s.situation in self.quantities]
+        found += [o for symbol in amounts for o in symbol.arguments]
         for states in (self.problem.initial, self.problem.goal):
             found += [o for s, v in states.items() if s.situation in self.situations for o in (*s.arguments, v)]
         return [o for o in dict.fromkeys(found) if o not in self.world and o not in (TRUE, FALSE)]
@@ -571,12 +629,15 @@ class _Export:
             ":conditional-effects": "(when " in body,
             ":equality": "(= " in body,
             ":action-costs": self.costs,
+            ":numeric-fluents": bool(self.functions),
         }
         requirements = " ".join([":strips", ":typing", *(key for key, needed in wanted.items() if needed)])
         types = "\n    ".join(f"{kind} - {above}" for kind, above in self.above.items())
         constants = [o for o in self.individuals() if self.name("object", o) in self.mentioned(body)]
         said = f"  (:constants\n    {self.objects_text(constants)})\n" if constants else ""
-        functions = "  (:functions (total-cost) - number)\n" if self.costs else ""
+        declared = [f"({name}{''.join(f' ?x{i}' for i in range(n))})" for name, n in sorted(self.functions.items())]
+        declared += ["(total-cost)"] * self.costs
+        functions = f"  (:functions {' '.join(declared)} - number)\n" if declared else ""
         return (
             f"(define (domain {name})\n  (:requirements {requirements})\n  (:types\n    {types})\n{said}"
             f"  (:predicates\n    {chr(10).join(predicates).replace(chr(10), chr(10) + '    ')})\n{functions}{body})\n"
@@ -593,6 +654,9 @@ class _Export:
         facts: list[str] = []
         true: set[tuple[str, tuple[str, ...]]] = set()
         for symbol, value in self.problem.initial.items():
+            if symbol.situation in self.quantities and ("function", f"situation {symbol.situation}") in self.names:
+                at = self.function("situation", symbol.situation, symbol.arguments)
+                facts.append(f"(= {at} {decimal(Fraction(value), False)})")
             if symbol.situation not in self.situations:
                 continue
             if self.situations[symbol.situation].boolean:
@@ -615,10 +679,18 @@ class _Export:
                 v for v in self.problem.classes[self.situations[situation].range] if v in self.asked[kind, situation]
             )
             facts += [f"({self.free_name(kind, situation)} {self.term(v)})" for v in values if v not in held]
+        for relation in sorted(self.measured):
+            for row in sorted(self.problem.relations.get(relation, ())):
+                at = self.function("relation", relation, row[:-1])
+                facts.append(f"(= {at} {decimal(Fraction(row[-1]), False)})")
         for predicate, rows in sorted(self.statics.items()):
             facts += [f"({' '.join([predicate, *map(self.term, row)])})" for row in sorted(rows)]
         goals = []
         for symbol, value in self.problem.goal.items():
+            if symbol.situation in self.quantities:
+                at = self.function("situation", symbol.situation, symbol.arguments)
+                goals += [f"({sign} {at} {decimal(limit)})" for sign, limit in bounds(value)]
+                continue
             atom = self.predicate(symbol.situation, symbol.arguments, value)
             goals.append(f"(not {atom})" if value == FALSE and self.situations[symbol.situation].boolean else atom)
         costs = ["(= (total-cost) 0)"] if self.costs else []
@@ -634,6 +706,16 @@ class _Export:
         )
 
 
+def decimal(number: Fraction, calculated: bool = True) -> str:
+    """Return a number as PDDL; one without end as a quotient, or where that can't be, cut off behind thirty places."""
+    text = written(number)
+    if "/" not in text:
+        return text
+    if calculated:
+        return f"(/ {number.numerator} {number.denominator})"
+    return written(Fraction(round(number * 10**30), 10**30))
+
+
 def _and(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"(and {' '.join(parts)})"
 
@@ -647,7 +729,7 @@ def _absent(condition: Condition) -> tuple[str, str] | None:
 
 
 def _all(behavior: Behavior) -> Iterator[Condition]:
-    waiting = [*behavior.preconditions, *(c for e in behavior.effects for c in e.when)]
+    waiting = [*behavior.conditions]
     while waiting:
         one = waiting.pop()
         yield one
@@ -672,4 +754,6 @@ def _terms(condition: Condition) -> set[str]:
             found = {t for c in conditions for t in _terms(c)} - {variable}
         case AnyOf():
             found = set()
+        case Comparison(one, _, other):
+            found = {*terms_of(one), *terms_of(other)}
     return {t for t in found if t.startswith("?")}

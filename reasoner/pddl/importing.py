@@ -10,6 +10,8 @@ one holds of an object          a value of its own where none does
 any other predicate             boolean situation type
 action                          behaviour on level 1, all of whose variables are parameters
 cost that depends on objects    one behaviour per cost
+function that never changes     static relation, its number behind the arguments
+any other function              situation type whose values are amounts, unless it only counts costs
 goal that is no conjunction     the behaviour ``REACH_GOAL``, whose effect is the goal
 ==============================  ================================================================
 
@@ -25,16 +27,21 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from fractions import Fraction
+from functools import cached_property, reduce
 from itertools import combinations, product
+from math import prod
 
-from reasoner.pddl.syntax import Action, Form, Pddl, PddlError, Typed, Word, either
+from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
+from reasoner.pddl.syntax import CHANGES, COMPARISONS, Action, Form, Pddl, PddlError, Typed, Word, either, is_number
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     Domain,
     EqualityCondition,
@@ -68,6 +75,17 @@ class Effect:
 
     atom: Atom
     true: bool
+    when: tuple[Form, ...] = ()
+    variables: tuple[Typed, ...] = ()
+
+
+@dataclass(frozen=True)
+class NumericEffect:
+    """A function changed as `head` (of `CHANGES`) says, where its condition holds."""
+
+    head: str
+    function: Form
+    amount: Word | Form
     when: tuple[Form, ...] = ()
     variables: tuple[Typed, ...] = ()
 
@@ -136,6 +154,19 @@ class _Import:
 
     def __post_init__(self) -> None:
         self.effects = {name: tuple(_effects(action.effect)) for name, action in self.pddl.actions.items()}
+        self.numeric = {name: tuple(_numeric(action.effect)) for name, action in self.pddl.actions.items()}
+        forms = [f for a in self.pddl.actions.values() for f in (a.precondition, a.effect)]
+        read = {word for form in (*forms, self.pddl.goal) for word in _functions_read(form)}
+        changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
+        self.weights = self.costing(changed)
+        self.amounts = changed & (read | (changed - self.weights.keys()))
+        counted = [e.amount for effects in self.numeric.values() for e in effects if e.function.head in self.amounts]
+        conditions = [a.precondition for a in self.pddl.actions.values()]
+        whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
+        whens += [f for effects in self.effects.values() for e in effects for f in e.when]
+        asked = [self.pddl.goal, *conditions, *whens, *(a for a in counted if isinstance(a, Form))]
+        heads = {form.head for form in asked if form} | {word for form in asked for word in _functions_read(form)}
+        self.measures = (heads & self.pddl.functions.keys()) - self.amounts
         self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects}
         self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
         self.facts = dict.fromkeys(self.pddl.initial)
@@ -191,6 +222,10 @@ class _Import:
                 parents[kind] = (self.kind("object"),)
             else:
                 relations[self.name("static", predicate)] = frozenset(rows)
+        for function in sorted(self.measures):
+            numbers = {words[1:]: n for words, n in pddl.numbers.items() if words[0] == function}
+            measured = {(*(self.name("object", w) for w in words), written(n)) for words, n in numbers.items()}
+            relations[self.name("static", f"({function})", function)] = frozenset(measured)
         situations = self.situations(classes, parents)
         behaviors = {b.name: b for name in pddl.actions for b in self.behaviors(name, relations)}
         initial = self.initial(situations, classes)
@@ -240,6 +275,10 @@ class _Import:
             arguments = tuple(map(self.kind, signature)) or (WORLD,)
             found[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
             self.places[predicate] = Place(name)
+        for function in sorted(self.amounts):
+            arguments = tuple(self.kind(one.type) for one in self.pddl.functions[function]) or (WORLD,)
+            name = self.name("situation", f"({function})", function.upper())
+            found[name] = SituationType(name, arguments, name, quantity=Quantity())
         return found
 
     def common(self, kinds: Sequence[str]) -> str:
@@ -252,9 +291,13 @@ class _Import:
         found = {
             Symbol(s.name, (name,)): s.default or FALSE
             for s in situations.values()
-            if not s.boolean
+            if not s.boolean and s.quantity is None
             for name in classes[s.arguments[0]]
         }
+        for words, number in self.pddl.numbers.items():
+            if words[0] in self.amounts:
+                terms = tuple(self.name("object", w) for w in words[1:]) or (THE_WORLD,)
+                found[Symbol(self.name("situation", f"({words[0]})"), terms)] = written(number)
         for fact in self.facts:
             if fact[0] in self.places:
                 condition = self.atom(fact)
@@ -279,7 +322,19 @@ class _Import:
         return goal, reach
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
-        """Add a conjunct of the goal to what was found, if it is a fact or a negated boolean one that agrees with the rest."""
+        """Add a conjunct of the goal to what was found, if it is a fact or a negated boolean one that agrees with the rest.
+
+        So is a function that changes compared with a number.
+        """
+        if part.head in COMPARISONS and part.items[1:] and isinstance(part.items[1], Form):
+            function, limit = part.items[1:]
+            if not isinstance(function, Form) or function.head not in self.amounts or not isinstance(limit, Word):
+                return False
+            terms = tuple(self.term(w) for w in _words(function)[1:]) or (THE_WORLD,)
+            symbol = Symbol(self.name("situation", f"({function.head})"), terms)
+            wanted = f"{part.head}{limit.text}"
+            found[symbol] = bounds_written(f"{found[symbol]},{wanted}" if symbol in found else wanted)
+            return True
         inner = part.items[1] if part.head == "not" else part
         if not isinstance(inner, Form) or inner.head not in self.places:
             return False
@@ -478,16 +533,25 @@ class _Import:
         conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form))
         conditions = tuple(dict.fromkeys(conditions))
         effects = self.value_effects(name, variables, conditions)
+        amounts = self.amount_effects(name, variables)
         used = {word for atom in _words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
-        behavior = Behavior(self.name("action", name, name.upper()), self.level, parameters, (), conditions, effects)
-        constant, functions = 0.0, []
-        for amount in _increases(action.effect):
-            if isinstance(amount, Word):
-                constant += float(amount.text)
-            else:
-                functions.append(_words(amount))
+        named = self.name("action", name, name.upper())
+        behavior = Behavior(named, self.level, parameters, (), conditions, effects, amounts=amounts)
+        constant, functions, weight = 0.0, [], 1.0
+        for effect in self.numeric[name]:
+            if effect.function.head not in self.weights or effect.when or effect.variables:
+                continue
+            weight = float(self.weights[effect.function.head])
+            if isinstance(effect.amount, Word):
+                number = Fraction(effect.amount.text) * self.weights[effect.function.head]
+                constant += float(number if effect.head == "increase" else -number)
+            elif effect.amount.head in self.pddl.functions and effect.amount.head not in self.amounts:
+                functions.append(_words(effect.amount))
+            elif effect.function.head == "total-cost":
+                raise PddlError(f"action '{name}': a cost that is calculated is not supported")
+        constant = max(constant, 0.0)
         if not self.pddl.minimize and not functions and not constant:
             constant = 1.0
         if not functions:
@@ -499,17 +563,75 @@ class _Import:
         by_cost = defaultdict(set)
         for words, number in self.pddl.numbers.items():
             if words[0] == function:
-                by_cost[number].add(tuple(self.name("object", w) for w in words[1:]))
+                by_cost[weight * float(number)].add(tuple(self.name("object", w) for w in words[1:]))
         if not terms or len(by_cost) > MOST_COSTS:
             yield replace(behavior, cost=constant + sum(by_cost) / max(len(by_cost), 1))
             return
-        for number, rows in sorted(by_cost.items()):
-            text = f"{number:g}".replace(".", "_").replace("-", "minus_")
-            relation = self.name("static", f"{function} = {number}", f"{function}_is_{text}")
+        for price, rows in sorted(by_cost.items()):
+            text = f"{price:g}".replace(".", "_").replace("-", "minus_")
+            relation = self.name("static", f"{function} = {price}", f"{function}_is_{text}")
             relations[relation] = frozenset(rows)
             more = RelationCondition(relation, terms)
-            own = self.name("action", f"{name} = {number}", f"{name}_at_{text}".upper())
-            yield replace(behavior, name=own, preconditions=(*conditions, more), cost=constant + number)
+            own = self.name("action", f"{name} = {price}", f"{name}_at_{text}".upper())
+            yield replace(behavior, name=own, preconditions=(*conditions, more), cost=constant + price)
+
+    def costing(self, changed: set[str]) -> dict[str, Fraction]:
+        """Return the functions that what is minimised adds up, with their factors: whoever increases one costs that."""
+        found: dict[str, Fraction] = {"total-cost": Fraction(1)} if "total-cost" in changed else {}
+        waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
+        while waiting:
+            form, factor = waiting.pop()
+            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, Word)]
+            forms = [item for item in form.items[1:] if isinstance(item, Form)]
+            if form.head == "+":
+                waiting += [(one, factor) for one in forms]
+            elif form.head == "*" and len(forms) == 1 and numbers:
+                waiting.append((forms[0], factor * prod(numbers)))
+            elif form.head in changed:
+                found[form.head] = factor
+        return found
+
+    def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
+        """Return what a number, a function or a calculation is here."""
+        if isinstance(item, Word):
+            return Fraction(item.text)
+        if item.head in ("+", "-", "*", "/"):
+            parts = [self.number(one, named) for one in item.items[1:]]
+            if len(parts) == 1:
+                parts.insert(0, Fraction(0))
+            return reduce(lambda left, right: Calculation(item.head, left, right), parts)
+        terms = tuple(named.get(t, t) for t in map(self.term, _words(item)[1:]))
+        if item.head in self.amounts:
+            return Amount(self.name("situation", f"({item.head})"), terms or (THE_WORLD,))
+        return Measure(self.name("static", f"({item.head})"), terms)
+
+    def amount_effects(self, name: str, variables: _Variables) -> tuple[AmountEffect, ...]:
+        """Return an action's effects on amounts."""
+        found = []
+        for effect in self.numeric[name]:
+            if effect.function.head not in self.amounts:
+                continue
+            if effect.head == "assign" and not self.everywhere(effect.function.head):
+                raise PddlError(
+                    f"action '{name}': it assigns '{effect.function.head}', which has no first value for some objects; "
+                    "state one of each in :init"
+                )
+            for named in self.instances(effect):
+                when = tuple(
+                    c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, named)
+                )
+                at, by = self.number(effect.function, named), self.number(effect.amount, named)
+                assert isinstance(at, Amount)
+                if effect.head == "scale-down":
+                    by = Calculation("/", Fraction(1), by)
+                operation = effect.head.split("-")[0]
+                found.append(AmountEffect(at.situation, at.arguments, operation, by, when))
+        return tuple(found)
+
+    def everywhere(self, function: str) -> bool:
+        """Return whether a function has a first value for all objects."""
+        things = prod(len(self.pddl.of_type(one.type)) for one in self.pddl.functions[function])
+        return sum(words[0] == function for words in self.pddl.numbers) == things
 
     def value_effects(
         self, name: str, variables: _Variables, conditions: Sequence[Condition]
@@ -536,7 +658,7 @@ class _Import:
                 ends.append(ValueEffect(at.situation, at.arguments, none, when if known else (*when, at)))
         return tuple(dict.fromkeys((*ends, *begins)))
 
-    def instances(self, effect: Effect) -> Iterator[dict[str, str]]:
+    def instances(self, effect: Effect | NumericEffect) -> Iterator[dict[str, str]]:
         """Yield each way to put individuals in for the variables that an effect is quantified over."""
         names = [self.term(v.name) for v in effect.variables]
         things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
@@ -597,6 +719,9 @@ class _Variables:
                 yield AnyOf((conditions,), negated is not flip)
             else:
                 yield Witness(inner[table.term(first.name)], table.kind(first.type), conditions, negated is not flip)
+        elif head in COMPARISONS and (rest or any(is_number(item) for item in form.items[1:])):
+            left, right = (table.number(item, named) for item in form.items[1:])
+            yield Comparison(left, head, right, negated)
         else:
             yield from self.literal(_words(form), named, negated)
 
@@ -672,18 +797,36 @@ def _effects(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Ty
         yield from _effects(rest[1], when, (*variables, *_typed(rest[0])))
     elif form.head == "not":
         yield Effect(_words(rest[0]), False, when, variables)
-    elif form.head != "increase":
+    elif form.head not in CHANGES:
         yield Effect(_words(form), True, when, variables)
 
 
-def _increases(form: Form | None) -> Iterator[Word | Form]:
-    """Yield the amounts by which an effect increases the total cost."""
-    if form is not None and form.head == "increase":
-        yield form.items[2]
-    elif form is not None and form.head == "and":
-        for item in form.items[1:]:
-            if isinstance(item, Form):
-                yield from _increases(item)
+def _numeric(
+    form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()
+) -> Iterator[NumericEffect]:
+    """Yield the effects on functions."""
+    rest = [] if form is None else [item for item in form.items[1:] if isinstance(item, Form)]
+    if form is None or form.head in ("", "not"):
+        return
+    if form.head == "and":
+        for item in rest:
+            yield from _numeric(item, when, variables)
+    elif form.head == "when":
+        yield from _numeric(rest[1], (*when, rest[0]), variables)
+    elif form.head == "forall":
+        yield from _numeric(rest[1], when, (*variables, *_typed(rest[0])))
+    elif form.head in CHANGES:
+        yield NumericEffect(form.head, rest[0], form.items[2], when, variables)
+
+
+def _functions_read(form: Form | None) -> Iterator[str]:
+    """Yield the heads of all lists in a form, but for the functions that an effect changes."""
+    if form is None:
+        return
+    for item in form.items[2 if form.head in CHANGES else 0 :]:
+        if isinstance(item, Form):
+            yield item.head
+            yield from _functions_read(item)
 
 
 def _slug(text: str) -> str:

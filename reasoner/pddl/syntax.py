@@ -14,10 +14,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")  # a variable begins at its '?', as in (aircraft?a)
+COMPARISONS = ("<", "<=", "=", ">=", ">")
+CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 SECTIONS = {
     ":durative-action": "durative actions",
     ":derived": "derived predicates",
@@ -89,9 +92,9 @@ class Pddl:
     objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
     actions: dict[str, Action] = field(default_factory=dict)
     initial: list[tuple[str, ...]] = field(default_factory=list)
-    numbers: dict[tuple[str, ...], float] = field(default_factory=dict)
+    numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
     goal: Form | None = None
-    minimize: bool = False
+    minimize: Form | None = None  # what is to be as little as can be
 
     def above(self, name: str) -> Sequence[str]:
         """Return a type and those above it, from the nearest to ``object``."""
@@ -252,9 +255,6 @@ class _Reader:
         for wanted in (":init", ":goal"):
             if wanted not in sections:
                 raise self.fail(form, f"the problem has no ({wanted} …)")
-        named = sections.get(":domain")
-        if named and len(named.items) == 2 and self.word(named.items[1], "a name").text != self.pddl.domain:
-            raise self.fail(named, f"the problem is of domain '{named.items[1].text}', not of '{self.pddl.domain}'")  # type: ignore[union-attr]
         for item in sections[":init"].items[1:]:
             self.fact(item)
         goal = sections[":goal"]
@@ -267,10 +267,14 @@ class _Reader:
     def metric(self, form: Form) -> None:
         words = form.items[1:]
         wanted = words[1] if len(words) == 2 and self.word(words[0], "minimize").text == "minimize" else None
-        head = wanted.head if isinstance(wanted, Form) else wanted.text if wanted else ""
-        if head not in ("total-cost", "total-time"):
-            raise self.fail(form, "the only metric supported is (:metric minimize (total-cost))")
-        self.pddl.minimize = head == "total-cost"
+        if isinstance(wanted, Word):  # (:metric minimize total-cost), without the brackets
+            wanted = Form((wanted,), wanted.line, wanted.column)
+        if wanted is None:
+            raise self.fail(form, "the only metric supported is (:metric minimize …)")
+        if wanted.head != "total-time":
+            if wanted.head != "total-cost":
+                self.number(wanted, {})
+            self.pddl.minimize = wanted
 
     def typed(self, items: Sequence[Word | Form], declaring: bool = False) -> list[Typed]:
         """Return ``a b - t c`` as typed names; without a type they are objects."""
@@ -404,12 +408,16 @@ class _Reader:
         elif head == "=":
             if len(rest) != 2:
                 raise self.fail(form, f"(= …) takes 2 terms, got {len(rest)}")
-            if any(isinstance(item, Form) for item in rest):
-                raise self.fail(form, "numeric conditions are not supported")
             for item in rest:
-                self.term(item, variables)
-        elif head in ("<", ">", "<=", ">="):
-            raise self.fail(form, "numeric conditions are not supported")
+                if any(isinstance(one, Form) or is_number(one) for one in rest):
+                    self.number(item, variables)
+                else:
+                    self.term(item, variables)
+        elif head in COMPARISONS:
+            if len(rest) != 2:
+                raise self.fail(form, f"({head} …) takes 2 numbers, got {len(rest)}")
+            for item in rest:
+                self.number(item, variables)
         elif head == "preference":
             raise self.fail(form, "preferences are not supported")
         else:
@@ -439,32 +447,32 @@ class _Reader:
         elif head == "forall":
             inner, body = self.quantified(form, variables)
             self.effect(body, inner)
-        elif head == "increase":
-            self.increase(form, variables)
-        elif head in ("decrease", "assign", "scale-up", "scale-down"):
-            raise self.fail(form, f"numeric effects are not supported ({head})")
+        elif head in CHANGES:
+            if len(rest) != 2 or not isinstance(rest[0], Form):
+                raise self.fail(form, f"wanted ({head} (function …) NUMBER)")
+            self.atom(rest[0], variables, self.pddl.functions, "function")
+            self.number(rest[1], variables)
         else:
             self.atom(form, variables)
 
-    def increase(self, form: Form, variables: Mapping[str, str]) -> None:
-        target = form.items[1] if len(form.items) == 3 else form
-        if (
-            not isinstance(target, Form)
-            or (target.items != form.items and target.head != "total-cost")
-            or target is form
-        ):
-            raise self.fail(form, "numeric effects are not supported, except (increase (total-cost) …)")
-        amount = form.items[2]
-        if isinstance(amount, Form):
-            self.atom(amount, variables, self.pddl.functions, "function")
+    def number(self, item: Word | Form, variables: Mapping[str, str]) -> None:
+        """Check a number, a function, or what is calculated from them."""
+        if isinstance(item, Word):
+            self.constant(item)
+        elif item.head in ("+", "-", "*", "/"):
+            many = item.head in "+*"
+            if len(item.items) < 3 - (item.head == "-") or (len(item.items) > 3 and not many):
+                raise self.fail(item, f"({item.head} …) takes 2 numbers, got {len(item.items) - 1}")
+            for one in item.items[1:]:
+                self.number(one, variables)
         else:
-            self.number(amount)
+            self.atom(item, variables, self.pddl.functions, "function")
 
-    def number(self, word: Word | Form) -> float:
-        try:
-            return float(self.word(word, "a number").text)
-        except ValueError:
-            raise self.fail(word, f"wanted a number, got '{word.text}'") from None  # type: ignore[union-attr]
+    def constant(self, word: Word | Form) -> Fraction:
+        text = self.word(word, "a number").text
+        if not re.fullmatch(r"[+-]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})(e[+-]?\d{1,2})?", text):
+            raise self.fail(word, f"wanted a number, got '{text}'")
+        return Fraction(text)
 
     def atom(
         self,
@@ -515,7 +523,7 @@ class _Reader:
         """Take one entry of ``:init``."""
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
-        if item.head == "at" and len(item.items) == 3 and _is_number(item.items[1]):
+        if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]):
             raise self.fail(item, "timed initial literals are not supported")
         if item.head == "=":
             names = [word.text for word in item.items[1:] if isinstance(word, Word)]
@@ -524,7 +532,7 @@ class _Reader:
             if len(item.items) != 3 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (= (function …) NUMBER)")
             words = self.atom(item.items[1], {}, self.pddl.functions, "function")
-            self.pddl.numbers[words] = self.number(item.items[2])
+            self.pddl.numbers[words] = self.constant(item.items[2])
         elif item.head == "not":
             if len(item.items) != 2 or not isinstance(item.items[1], Form):
                 raise self.fail(item, "wanted (not (predicate …))")
@@ -533,5 +541,6 @@ class _Reader:
             self.pddl.initial.append(self.atom(item, {}))
 
 
-def _is_number(item: Word | Form) -> bool:
-    return isinstance(item, Word) and re.fullmatch(r"[0-9.]+", item.text) is not None
+def is_number(item: Word | Form) -> bool:
+    """Return whether a word is a number."""
+    return isinstance(item, Word) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
 
 import pyoxigraph as ox
 
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, inside, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Fact,
@@ -28,7 +32,7 @@ from reasoner.symbols import (
     Witness,
     substituted,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS, XSD
 
 HEADER = f"""\
 @prefix :        <{{scene}}#> .
@@ -36,6 +40,7 @@ HEADER = f"""\
 @prefix owl:     <{OWL}> .
 @prefix rdfs:    <{RDFS}> .
 @prefix skos:    <{SKOS}> .
+@prefix xsd:     <{XSD}> .
 @prefix dcterms: <http://purl.org/dc/terms/> .
 
 <{{scene}}> a owl:Ontology ;
@@ -125,6 +130,9 @@ class _Writer:
             yield self.node(kind, "owl:Class, owl:NamedIndividual", text, *pairs)
 
     def situation(self, one: SituationType) -> Iterator[str]:
+        if one.quantity is not None:
+            yield from self.amount(one)
+            return
         single = len(one.arguments) == 1
         pairs: list[tuple[str, str | Sequence[str]]] = []
         if one.level != 1:
@@ -154,6 +162,49 @@ class _Writer:
             for i, kind in enumerate(one.arguments, start=1):
                 yield self.term(f"{one.name}.{i}", "c:Parameter", i, kind)
 
+    def amount(self, one: SituationType) -> Iterator[str]:
+        """Yield a situation type whose values are numbers."""
+        quantity, single = one.quantity, len(one.arguments) == 1
+        assert quantity is not None
+        pairs: list[tuple[str, str | Sequence[str]]] = [("c:fromLevel", str(one.level))] if one.level != 1 else []
+        limits = (("least", quantity.least), ("most", quantity.most), ("default", Fraction(one.default or 0)))
+        for name, limit in limits:
+            if limit is not None and (name != "default" or one.default is not None):
+                pairs.append((f"c:{name}Amount", decimal(limit)))
+        pairs += [("c:unit", _quoted(quantity.unit))] if quantity.unit else []
+        if single:
+            pairs.append(("c:valueProperty", f":{one.name}.value"))
+        else:
+            pairs.append(("c:parameter", [f":{one.name}.{i}" for i in range(1, len(one.arguments) + 1)]))
+            pairs += [("c:wholeNumbers", "true")] if quantity.whole else []
+        yield self.node(one.name, "owl:NamedIndividual, c:SituationType, c:Amount", "How much it is.", *pairs)
+        if single:
+            yield self.node(
+                f"{one.name}.value",
+                "owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual",
+                f"Says how much {one.name} is.",
+                ("rdfs:domain", self.iri(one.arguments[0])),
+                ("rdfs:range", "xsd:integer" if quantity.whole else "xsd:decimal"),
+            )
+        for i, kind in enumerate(() if single else one.arguments, start=1):
+            yield self.term(f"{one.name}.{i}", "c:Parameter", i, kind)
+
+    @cached_property
+    def measures(self) -> frozenset[str]:
+        """The relations that behaviours take for numbers."""
+        behaviors = self.problem.domain.behaviors.values()
+        amounts = [effect.amount for behavior in behaviors for effect in behavior.amounts]
+        waiting = [condition for behavior in behaviors for condition in behavior.conditions]
+        while waiting:
+            match waiting.pop():
+                case Comparison(left, _, right):
+                    amounts += [left, right]
+                case Witness(_, _, conditions):
+                    waiting += conditions
+                case AnyOf(alternatives):
+                    waiting += [condition for group in alternatives for condition in group]
+        return frozenset(part.relation for amount in amounts for part in inside(amount) if isinstance(part, Measure))
+
     def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
         said = [f":{name} a owl:NamedIndividual, {kind_of_term}"]
         said += [f"c:index {index}"] if index is not None else []
@@ -162,9 +213,8 @@ class _Writer:
     def relations(self) -> Iterator[str]:
         for relation, tuples in self.problem.relations.items():
             binary = all(len(row) == 2 for row in tuples)
-            kinds = (
-                "owl:ObjectProperty, owl:NamedIndividual, c:Relation" if binary else "owl:NamedIndividual, c:Relation"
-            )
+            prop = "owl:DatatypeProperty" if relation in self.measures else "owl:ObjectProperty"
+            kinds = f"{prop}, owl:NamedIndividual, c:Relation" if binary else "owl:NamedIndividual, c:Relation"
             yield self.node(relation, kinds, "Holds or not, whatever is done.")
 
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
@@ -177,6 +227,14 @@ class _Writer:
             iri = f":{one.name}.effect{position:03}"
             at = self.value(Symbol(effect.situation, effect.arguments), effect.value)
             self.nodes.append(f"{iri} a owl:NamedIndividual, c:ValueEffect ; {at}{_some('c:when', when)} .")
+            effects.append(iri)
+        for position, change in enumerate(one.amounts, start=len(one.effects) + 1):
+            when = [self.condition(c) for c in change.when]
+            iri = f":{one.name}.effect{position:03}"
+            at = " ; ".join([f"c:situationType {self.iri(change.situation)}", *self.arguments(change.arguments)])
+            by = self.side("right", change.amount)
+            said = f'c:AmountEffect ; {at} ; c:change "{change.operation}" ; {by}{_some("c:when", when)}'
+            self.nodes.append(f"{iri} a owl:NamedIndividual, {said} .")
             effects.append(iri)
         cost = [] if one.cost == 1 else [f"{one.cost:f}"]
         yield self.node(
@@ -239,8 +297,36 @@ class _Writer:
             case AnyOf(alternatives):
                 groups = [self.group(group) for group in alternatives]
                 said = f"c:AnyOf{_some('c:alternative', groups)}"
+            case Comparison(left, sign, right):
+                said = f'c:Comparison ; c:sign "{sign}" ; {self.side("left", left)} ; {self.side("right", right)}'
         self.nodes[position] = f"{iri} a owl:NamedIndividual, {said}{no} ."
         return iri
+
+    def side(self, name: str, one: Expression) -> str:
+        """Return the property that leads to an amount; a number on the right, and a symbol on the left, needs no node."""
+        if name == "right" and isinstance(one, Fraction) and _ends(one):
+            return f"c:amount {decimal(one)}"
+        if name == "left" and isinstance(one, Amount | Measure):
+            return self.measured(one)
+        position = len(self.nodes)
+        self.nodes.append("")
+        iri = f":{self.where}.amount{position:03}"
+        match one:
+            case Calculation(sign, left, right):
+                said = f'c:sign "{sign}" ; {self.side("left", left)} ; {self.side("right", right)}'
+            case Amount() | Measure():
+                said = self.measured(one)
+            case number if _ends(number):
+                said = f"c:amount {decimal(number)}"
+            case number:
+                whole = Calculation("/", Fraction(number.numerator), Fraction(number.denominator))
+                said = f'c:sign "/" ; {self.side("left", whole.left)} ; {self.side("right", whole.right)}'
+        self.nodes[position] = f"{iri} a owl:NamedIndividual, c:Calculation ; {said} ."
+        return f"c:{name} {iri}"
+
+    def measured(self, one: Amount | Measure) -> str:
+        key, name = ("situationType", one.situation) if isinstance(one, Amount) else ("relation", one.relation)
+        return " ; ".join([f"c:{key} {self.iri(name)}", *self.arguments(one.arguments)])
 
     def group(self, conditions: Sequence[Condition]) -> str:
         if len(conditions) == 1:
@@ -285,7 +371,15 @@ class _Writer:
             situation = situations[symbol.situation]
             if value in (situation.default, situation.rest) or (situation.boolean and value == FALSE):
                 continue
-            if len(symbol.arguments) == 1 and not situation.boolean:
+            if situation.quantity is not None:
+                amount = decimal(Fraction(value))
+                if len(symbol.arguments) == 1:
+                    yield f"{self.iri(symbol.arguments[0])} :{situation.name}.value {amount} ."
+                    continue
+                number += 1
+                said = self.measured(Amount(symbol.situation, symbol.arguments))
+                yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {said} ; c:amount {amount} ."
+            elif len(symbol.arguments) == 1 and not situation.boolean:
                 yield f"{self.iri(symbol.arguments[0])} :{situation.name}.value {self.iri(value)} ."
             else:
                 number += 1
@@ -293,6 +387,15 @@ class _Writer:
         for relation, tuples in self.problem.relations.items():
             binary = all(len(row) == 2 for row in tuples)
             for row in sorted(tuples):
+                if relation in self.measures:
+                    amount = decimal(Fraction(row[-1]))
+                    if binary:
+                        yield f"{self.iri(row[0])} {self.iri(relation)} {amount} ."
+                        continue
+                    number += 1
+                    said = self.measured(Measure(relation, row[:-1]))
+                    yield f":fact{number} a owl:NamedIndividual, c:SituatedObjectInstance ; {said} ; c:amount {amount} ."
+                    continue
                 if binary:
                     yield f"{self.iri(row[0])} {self.iri(relation)} {self.iri(row[1])} ."
                     continue
@@ -303,11 +406,29 @@ class _Writer:
                 yield f":fact{number} a {kinds} ; c:relation {self.iri(relation)} ; {parts} ."
 
     def task(self) -> Iterator[str]:
-        goals = [Fact(symbol, value) for symbol, value in self.problem.goal.items()]
+        goals = [Fact(symbol, part) for symbol, value in self.problem.goal.items() for part in value.split(",")]
         iris = [f":goal{i}" for i in range(1, len(goals) + 1)]
         yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{_some("c:goal", iris)} .'
         for iri, fact in zip(iris, goals, strict=True):
+            if self.problem.domain.situations[fact.symbol.situation].quantity is not None:
+                [(sign, limit)] = bounds(fact.value)
+                at = self.measured(Amount(fact.symbol.situation, fact.symbol.arguments))
+                yield f'{iri} a owl:NamedIndividual, c:Comparison ; {at} ; c:sign "{sign}" ; c:amount {decimal(limit)} .'
+                continue
             yield f"{iri} a owl:NamedIndividual, c:ValueCondition ; {self.value(fact.symbol, fact.value)} ."
+
+
+def _ends(number: Fraction) -> bool:
+    """Return whether a number can be written as a decimal."""
+    return "/" not in written(number)
+
+
+def decimal(number: Fraction) -> str:
+    """Return a number as a decimal in Turtle; one without end is cut off behind thirty places."""
+    text = written(number)
+    if "/" in text:
+        text = written(Fraction(round(number * 10**30), 10**30))
+    return text if "." in text else f"{text}.0"
 
 
 def _some(key: str, values: Sequence[str]) -> str:

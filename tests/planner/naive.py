@@ -208,6 +208,8 @@ def amounts(problem: Problem, behavior: Behavior, state: Facts, terms: Terms, ki
             return False
         if (limits.least is not None and amount < limits.least) or (limits.most is not None and amount > limits.most):
             return False
+        if max(abs(amount.numerator), amount.denominator) > 10**60:
+            return False
         after[symbol] = written(amount)
     return True
 
