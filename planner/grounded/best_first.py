@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 from operator import or_
 from time import perf_counter
@@ -26,6 +26,7 @@ from typing import TypeAlias
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate
 from planner.grounded.hff_amounts import heuristic as with_amounts
+from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
@@ -121,14 +122,15 @@ def search(
     counts = Counts()
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
-    if task.amounts is not None:
+    bits = _bits(task)
+    work, by_arrays = effort(bits)
+    if task.amounts is not None and repeats(task):
         evaluate = often = evaluate or with_amounts(task)
-        work = quick = len(task.needs.items) + len(task.adds.items)
+        quick = work
     else:
-        work, by_arrays = effort(task)
         arrays = evaluate is None and by_arrays < work
-        evaluate = evaluate or automatic(task)
-        often, quick = (dense(task), by_arrays) if arrays else (evaluate, work)
+        evaluate = evaluate or _on_bits(task, automatic(bits))
+        often, quick = (_on_bits(task, dense(bits)), by_arrays) if arrays else (evaluate, work)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     tree = successors(task)
@@ -168,6 +170,19 @@ def search(
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
             return Flat(Status.GAVE_UP, (), Reason("the time limit came first"), counts)
+
+
+def _bits(task: Task) -> Task:
+    """Return a task without amounts, in which what may make a comparison true does so at once."""
+    if task.amounts is None:
+        return task
+    return replace(task, amounts=None, initial=task.initial & (1 << task.size) - 1)
+
+
+def _on_bits(task: Task, evaluate: Evaluate) -> Evaluate:
+    """Return a function of a state's bits as one of a state that has amounts besides."""
+    low = (1 << task.size) - 1
+    return evaluate if task.amounts is None else lambda state: evaluate(state & low)
 
 
 def _best_first(

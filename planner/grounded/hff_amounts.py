@@ -96,6 +96,12 @@ def heuristic(task: Task) -> Evaluate:
     return evaluate
 
 
+def repeats(task: Task) -> bool:
+    """Whether the relaxed plan of the initial state does something more than once: else h of FF says the same, and faster."""
+    evaluation = heuristic(task)(task.initial)
+    return evaluation is not None and len(set(evaluation[1])) < len(evaluation[1])
+
+
 def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
     """Return how far a relaxed operator moves a difference; None if that depends on the state."""
     amounts = task.amounts
