@@ -29,23 +29,23 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     1 B2_PICK left_hand bottle2
     2 B2_PICK left_hand cup1
     """
-    domain = reading.problem.domain
-    found: list[GroundBehavior] = []
-    number = domain.first_ids.get(level, 0)
-    for behavior in domain.at_level(level):
+    problem = reading.problem
+    found: dict[int, GroundBehavior] = {}
+    for behavior in problem.domain.at_level(level):
         kinds = [parameter.kind for parameter in behavior.parameters]
-        for row in graph.solutions(query_for(reading, behavior), SCENE):
-            if not len(found) % 4096:
+        for count, row in enumerate(graph.solutions(query_for(reading, behavior), SCENE)):
+            if not count % 4096:
                 graph.deadline.check(f"quantifying {behavior.name} ({len(found):,} so far)")
-            arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(behavior.parameters)])
+            arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(kinds)])
             for argument, kind in zip(arguments, kinds, strict=True):
-                if argument not in reading.problem.members(kind):
+                if argument not in problem.members(kind):
                     raise KnowledgeError(
                         f"{argument} is of class {kind}, but is also a part of behaviours, goals or situation types; "
                         "it can't be both: take one of its classes away, or the owl:sameAs that gives it"
                     )
-            found.append(GroundBehavior(number + len(found), behavior.name, arguments))
-    return tuple(found)
+            number = problem.id_of(behavior.name, arguments)
+            found[number] = GroundBehavior(number, behavior.name, arguments)
+    return tuple(found[number] for number in sorted(found))
 
 
 def behavior_named(reading: Reading, name: str) -> Behavior:
@@ -57,7 +57,9 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
 
 
 def query_for(reading: Reading, behavior: Behavior) -> str:
-    """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment, in order of IDs.
+    """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
+
+    The rows are in the order of IDs, but where individuals share an index, or have none and lie in several ontologies.
 
     If the reading isn't of the whole scene, its individuals are the only ones that are asked for.
 

@@ -88,9 +88,7 @@ def given(problem: Path) -> Imported:
 
 def assert_refused_for_cause(message: str) -> None:
     """Whether a refusal names the place of a feature outside of classical planning, and that feature stands there."""
-    match = re.match(
-        r"(.+):(\d+):(\d+): (derived predicates) are not supported", message
-    )
+    match = re.match(r"(.+):(\d+):(\d+): (derived predicates) are not supported", message)
     assert match, message
     file, line, column, feature = match.groups()
     words = Path(file).read_text().splitlines()[int(line) - 1][int(column) - 1 :].lower()

@@ -66,3 +66,19 @@ def test_query_and_enumeration_give_the_same_behaviours_on_a_table(tmp_path: Pat
     for reading in (read(graph), recognise(graph)):
         for level in reading.problem.domain.levels:
             assert quantify(graph, reading, level) == ground(reading.problem, level)
+
+
+def test_individuals_of_several_namespaces_and_of_two_indices_are_numbered_once(tmp_path: Path) -> None:
+    """What SPARQL orders by its IRI has the ID that its short name gives it; a second index makes no second row."""
+    path = tmp_path / "scene.ttl"
+    write_scene(path, "served")
+    far = "".join(
+        f"<https://a.org/x#{name}> a owl:NamedIndividual, k:Cup ; k:location {place} ; k:beverage k:no_beverage .\n"
+        for name, place in (("zebra", ":location7"), ("cup1", ":location8"))
+    )
+    text = path.read_text(encoding="utf-8") + ":cup1 c:index 9 .\n:aardvark a owl:NamedIndividual, k:Location .\n" + far
+    path.write_text(text, encoding="utf-8")
+    graph = load(path)
+    reading = read(graph)
+    for level in reading.problem.domain.levels:
+        assert quantify(graph, reading, level) == ground(reading.problem, level)
