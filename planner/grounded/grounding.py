@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +111,10 @@ class _Assembly:
         for i, schema in enumerate(self.reached.schemas):
             rows[i], needs[i] = self._needs(schema, self.reached.rows[i])
         wanted = self._goal(goal)
+        derived, cases, means = self._derived(rows, needs)
+        if means is not None and wanted is not None:
+            needs = {i: _expanded(*pairs, means) for i, pairs in needs.items()}
+            wanted = tuple(sorted({one for bit in wanted for one in means[bit]}))
         if wanted is None:
             return Reason("the goals exclude one another, or what is wanted to end can't")
         # Number the operators, then the conditional effects behind them; those whose operator fell away fall away too.
@@ -134,7 +139,6 @@ class _Assembly:
                 rows[i], owners[i] = rows[i][keep], first[parent] + place[keep]
                 first[i] = count
                 count += len(keep)
-        derived, cases = self._derived(rows, needs)
         return self._build(rows, needs, owners, first, operators, count, wanted, derived, cases)
 
     def _number_facts(self) -> None:
@@ -231,8 +235,11 @@ class _Assembly:
 
     def _derived(
         self, rows: Mapping[int, Ints], needs: Mapping[int, tuple[Ints, Ints]]
-    ) -> tuple[Derived, list[tuple[tuple[int, ...], int]]]:
-        """Return the bits that follow from others, and for the relaxed task each way in which one does."""
+    ) -> tuple[Derived, list[tuple[tuple[int, ...], int]], Grouped | None]:
+        """Return the bits that follow from others; for the relaxed task each way in which one does; and what each bit means.
+
+        A bit that follows in one way only stands for what that way asks, and isn't kept itself.
+        """
         formulas = self.formulas
         ways: dict[int, dict[tuple[int, ...], None]] = {}  # of each bit of a situation type that is defined
         for name in self.reached.defined:
@@ -247,24 +254,34 @@ class _Assembly:
                     if place >= 0:
                         ways[int(self.fact_bit[effect.situation][place])][tuple(found)] = None
         if not ways and not formulas.derived:
-            return Derived(), []
-        self._opposites(ways)
+            return Derived(), [], None
+        circular = self._circular()
+        self._opposites(ways, circular)
         for groups, bit in formulas.derived.items():
             ways[bit] = dict.fromkeys(groups)
-        bits = {bit: Bit(1 << bit, tuple(_mask(found) for found in its)) for bit, its in ways.items()}
-        cases = [(found, bit) for bit, its in ways.items() for found in its]
+        means: dict[int, tuple[int, ...]] = {}
+        for bit in ways:
+            _meaning(bit, ways, circular, means)
+        kept = {
+            bit: dict.fromkeys(
+                tuple(sorted({one for other in way for one in means.get(other, (other,))})) for way in its
+            )
+            for bit, its in ways.items()
+            if means[bit] == (bit,)
+        }
+        bits = {bit: Bit(1 << bit, tuple(_mask(found) for found in its)) for bit, its in kept.items()}
+        cases = [(found, bit) for bit, its in kept.items() for found in its]
         for bit, opposite in formulas.complements.items():
-            if bit in ways and opposite not in ways:
+            if bit in kept and opposite not in ways:
                 bits[opposite] = Bit(1 << opposite, (1 << bit,), opposite=True)
                 cases.append(((), opposite))
-        return in_parts(bits), cases
+        all_of = [means.get(bit, (bit,)) for bit in range(formulas.size)]
+        starts = np.concatenate([[0], np.cumsum([len(found) for found in all_of])]).astype(np.int64)
+        return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
 
-    def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]]) -> None:
+    def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
         """Add what it takes for what is defined not to hold, where that is asked for and it doesn't follow from itself."""
         formulas = self.formulas
-        circular = {
-            bit for name in self.reached.defined for bit in self.fact_bit[name].tolist() if name in self._circular()
-        }
         waiting = [bit for bit in formulas.complements if bit in ways]
         for bit in waiting:  # which grows
             self.reached.check_time()
@@ -275,14 +292,14 @@ class _Assembly:
             ways[formulas.complements[bit]] = {} if found is None else {found: None}
             waiting += [other for other in list(formulas.complements)[known:] if other in ways]
 
-    def _circular(self) -> set[str]:
-        """Return the situation types that are defined by themselves, or by others that are defined by them."""
+    def _circular(self) -> set[int]:
+        """Return the bits of situation types that are defined by themselves, or by others that are defined by them."""
         rules: dict[str, list[Rule]] = {name: [] for name in self.reached.defined}
         for schema in self.reached.schemas:
             if schema.rule:
                 behavior = schema.behavior
                 rules[behavior.effects[0].situation].append(Rule(behavior.name, (), (), behavior.preconditions))
-        return circular(rules)
+        return {bit for name in circular(rules) for bit in self.fact_bit[name].tolist()}
 
     def _goal(self, goal: State) -> Literals:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
@@ -527,6 +544,35 @@ def _with_derived(
     ends = add.starts[-1] + np.arange(1, len(cases) + 1)
     add = Grouped(np.concatenate([add.starts, ends]), np.concatenate([add.items, np.array([bit for _, bit in cases])]))
     return need, add, np.concatenate([owner, np.full(len(cases), -1)])
+
+
+def _meaning(
+    bit: int,
+    ways: Mapping[int, Mapping[tuple[int, ...], None]],
+    circular: AbstractSet[int],
+    means: dict[int, tuple[int, ...]],
+) -> None:
+    """Put into `means` what a bit stands for: what its only way asks if it has one, or else the bit itself."""
+    waiting = [bit]
+    while waiting:
+        one = waiting[-1]
+        its = ways.get(one, {})
+        if one in means or one in circular or not its or (len(its) > 1 and () not in its):
+            means.setdefault(one, (one,))
+            waiting.pop()
+            continue
+        way = () if () in its else next(iter(its))
+        missing = [other for other in way if other not in means]
+        waiting += missing
+        if not missing:
+            means[one] = tuple(sorted({found for other in way for found in means[other]}))
+            waiting.pop()
+
+
+def _expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
+    """Return pairs of row and bit with what each bit means in its place."""
+    counts = np.diff(means.starts)[bit]
+    return np.repeat(row, counts), means.items[_ranges(means.starts[bit], counts)]
 
 
 def _mask(bits: Sequence[int]) -> int:

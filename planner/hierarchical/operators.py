@@ -65,6 +65,7 @@ class Achiever:
     determined: Mapping[str, tuple[str, tuple[str, ...]]]
     kinds: Mapping[str, str]
     determining: Sequence[Condition] = ()
+    rule: bool = False
 
 
 @dataclass
@@ -246,7 +247,7 @@ class Program:
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
                 determining.append(condition)
-        return parameters, Achiever(rule.name, 0, tuple(soft), determined, rule.kinds, determining)
+        return parameters, Achiever(rule.name, 0, tuple(soft), determined, rule.kinds, determining, True)
 
     def _generator(
         self,

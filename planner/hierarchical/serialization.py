@@ -346,7 +346,8 @@ class Call:
             if isinstance(task, Reason):
                 raise UnsolvableError(task)
             if len(task) <= FEW_OPERATORS:
-                found = shortest(task, most=FEW_STATES, deadline=deadline)
+                most = FEW_STATES // (1 + len(task.derived.parts) // 10)  # a state costs what follows from it, too
+                found = shortest(task, most=most, deadline=deadline)
                 if found.plan is None and found.bound == math.inf:
                     raise UnsolvableError(
                         Reason(f"all {found.states} states of level {level} that can be reached were looked at")

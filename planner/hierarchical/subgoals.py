@@ -17,6 +17,7 @@ from planner.language import mentions, needs, walk
 from planner.transitions import Cell, Key, Table, arguments_of, key_of, written
 from reasoner.amounts import NOTHING, Amount, Calculation, Expression, Measure, Number, divided, inside, number
 from reasoner.amounts import written as amount_written
+from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -60,6 +61,8 @@ class Wants:
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str, int], list[str]] = {}
         self._tests: dict[tuple[int, tuple[str, ...], bool], Callable[..., Any]] = {}
+        self._concern: frozenset[str] = frozenset()
+        self._circular = circular(program.domain.rules)
         self._age = -1
         self.wanted: dict[str, dict[str, None]] = {}
         for (situation, _), value in goal.items():
@@ -120,12 +123,15 @@ class Wants:
                             if isinstance(c, ValueCondition | Comparison):
                                 yield from self.of(achiever, self._negation(c), inner, level)
                 else:
+                    lacking: list[tuple[str, list[Condition]]] = []
                     for individual in self.one_of_each(kind):
                         inner = {**env, variable: individual}
                         if all(self.holds(achiever, c, inner) for c in conditions if not _fluent(c)):
-                            for c in conditions:
-                                if _fluent(c) and not self.holds(achiever, c, inner):
-                                    yield from self.of(achiever, c, inner, level)
+                            unmet = [c for c in conditions if _fluent(c) and not self.holds(achiever, c, inner)]
+                            lacking.append((individual, unmet))
+                    for individual, unmet in self._nearest(lacking) if achiever.rule else lacking:
+                        for c in unmet:
+                            yield from self.of(achiever, c, {**env, variable: individual}, level)
             case Comparison():
                 yield from self._amounts(condition, env)
             case AnyOf(alternatives, negated):
@@ -135,8 +141,18 @@ class Wants:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
         yield from self._redetermined(achiever, condition, env)
 
-    def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:
-        """Yield wants, any of which may make something that is defined true, or false."""
+    def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
+        """Return wants, any of which may make something that is defined true, or false."""
+        if situation in self._circular:  # then it depends on where one comes from
+            return list(dict.fromkeys(self._defining(situation, key, wanted, level)))
+        self._forget()
+        asked = situation, key, wanted, level, self.breadth
+        found = self._fresh.get(asked)
+        if found is None:
+            found = self._fresh[asked] = list(dict.fromkeys(self._defining(situation, key, wanted, level)))
+        return found
+
+    def _defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:
         cell = situation, key, wanted
         if cell in self._open or len(self._open) >= DEEPEST:
             return
@@ -154,6 +170,17 @@ class Wants:
                         if not self._about(condition)[0] and condition not in rule.determining:
                             yield from self.of(rule, self._negation(condition), env, level)
         self._open.discard(cell)
+
+    def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
+        """Return of those who could satisfy a rule's witness the ones that it is about, or else a few that lack least."""
+        found = [pair for pair in lacking if pair[0] in self._concern]
+        return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
+
+    def concern(self, individuals: frozenset[str]) -> None:
+        """Say what it is about: who is to be looked for first where a rule asks for somebody."""
+        if self.program.rules and individuals != self._concern:
+            self._concern = individuals
+            self._fresh.clear()
 
     def _holds_so_far(self, rule: Achiever, condition: Condition, env: dict[str, str | None]) -> bool:
         """Whether a condition of a rule holds, those before it being put in; the individual that it determines is put in, too."""

@@ -269,9 +269,10 @@ class Segments:
         individuals that came up on the way are added to `met`.
         """
         asked: set[tuple[str, Key, str]] = set()
+        self.wants.concern(frozenset((*arguments_of(cell[1]), value)))
         wants: Iterable[Want] = [(*cell, (value,))]
         if cell[0] in self.program.rules:
-            wants = list(self.wants.defining(*cell, value == TRUE, level))
+            wants = self.wants.defining(*cell, value == TRUE, level)
         blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
         length = 0
         while (blocked or not length) and len(asked) < questions:
@@ -305,6 +306,7 @@ class Segments:
     def waits_for(self, level: int, cell: Cell, value: str) -> list[Cell]:
         """Return the symbols whose change could make a value attainable in one step."""
         found: dict[Cell, None] = {}
+        self.wants.concern(frozenset((*arguments_of(cell[1]), value)))
         if cell[0] in self.program.rules:
             return [want[:2] for want in self.wants.defining(*cell, value == TRUE, level)]
         for achiever in self.program.achievers.get((level, cell[0]), ()):

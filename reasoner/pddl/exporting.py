@@ -12,6 +12,7 @@ negated boolean                 predicate for its contrary, kept up to date
 "no such object"                predicate for "free", kept up to date, if it can't hold twice;
                                 else one contrary per object
 conditional effect              an action for either case
+rule of what is defined         ``:derived``
 anything else                   as it is, with ``or``, ``exists``, ``forall``, ``when``
 ==============================  ==================================================================
 """
@@ -37,6 +38,7 @@ from reasoner.symbols import (
     EqualityCondition,
     Problem,
     RelationCondition,
+    Rule,
     State,
     ValueCondition,
     ValueEffect,
@@ -159,7 +161,8 @@ class _Export:
         self.find_types()
         for _ in "ab":  # the first time finds which contraries have to be kept up to date
             actions = [action for behavior in self.behaviors for action in self.actions(behavior)]
-        texts: list[str] = []
+        rules = [rule for name in self.situations for rule in self.problem.domain.rules.get(name, ())]
+        texts = [self.axiom(rule) for rule in rules]
         table: dict[str, tuple[str, tuple[int, ...]]] = {}
         for action in actions:
             name = self.name("action", f"{action.behavior.name} {len(table)}", action.behavior.name)
@@ -187,7 +190,9 @@ class _Export:
     def find_types(self) -> None:
         """Choose the classes that become types: a family in which any two are nested or disjoint."""
         kinds = [t.kind for b in self.behaviors for t in (*b.parameters, *b.variables)]
-        kinds += [w.kind for b in self.behaviors for c in _all(b) for w in [c] if isinstance(w, Witness)]
+        rules = [rule.behavior for its in self.problem.domain.rules.values() for rule in its]
+        kinds += [t.kind for b in rules for t in (*b.parameters, *b.variables)]
+        kinds += [w.kind for b in (*self.behaviors, *rules) for c in _all(b) for w in [c] if isinstance(w, Witness)]
         chosen: dict[frozenset[str], str] = {}
         for kind in sorted(dict.fromkeys(kinds), key=lambda k: (-len(self.sets.get(k, ())), kinds.index(k))):
             members = self.sets.get(kind, frozenset())
@@ -249,6 +254,9 @@ class _Export:
             case ValueCondition(situation, arguments, value, negated):
                 if situation not in self.situations:
                     where.extend([] if negated else ["(or)"])
+                    return
+                if situation in self.problem.domain.rules:
+                    where.append(self.formula(one))
                     return
                 boolean = self.situations[situation].boolean
                 if boolean and value == FALSE:
@@ -390,6 +398,20 @@ class _Export:
             case Comparison(left, sign, right, negated):
                 text, no = f"({sign} {self.amount(left)} {self.amount(right)})", negated
         return f"(not {text})" if no else text
+
+    def axiom(self, rule: Rule) -> str:
+        """Return a rule as a derived predicate; what it determines besides is looked for."""
+        parts = [self.is_a(t.name, t.kind) for t in rule.parameters if t.kind not in self.type_of]
+        parts += [self.is_a(t.name, t.kind) for t in rule.variables if t.kind not in self.type_of]
+        parts += [self.formula(c) for c in rule.conditions]
+        text = _and(parts)
+        if rule.variables:
+            inside = {self.term(t.name): self.type_of.get(t.kind, "object") for t in rule.variables}
+            text = f"(exists ({self.typed(inside)}) {text})"
+        name = self.name("predicate", rule.situation)
+        terms = {self.term(t.name): self.type_of.get(t.kind, "object") for t in rule.parameters if t.kind != WORLD}
+        self.arity[name] = len(terms)
+        return f"  (:derived ({' '.join([name, self.typed(terms)]).strip()})\n    {text})"
 
     def fresh(self, action: _Action, wanted: str, kind: str = "object") -> str:
         name = f"?{wanted}"
@@ -628,6 +650,7 @@ class _Export:
             ":existential-preconditions": "(exists " in body,
             ":conditional-effects": "(when " in body,
             ":equality": "(= " in body,
+            ":derived-predicates": "(:derived " in body,
             ":action-costs": self.costs,
             ":numeric-fluents": bool(self.functions),
         }

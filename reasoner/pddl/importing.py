@@ -8,6 +8,7 @@ predicate that never changes    class (one argument), static relation (more)
 predicates of which at most     one functional situation type, e.g. ``AT`` for ``at`` and ``in``;
 one holds of an object          a value of its own where none does
 any other predicate             boolean situation type
+derived predicate               boolean situation type with rules
 action                          behaviour on level 1, all of whose variables are parameters
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, its number behind the arguments
@@ -33,6 +34,7 @@ from itertools import combinations, product
 from math import prod
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
+from reasoner.derivation import circles
 from reasoner.pddl.syntax import CHANGES, COMPARISONS, Action, Form, Pddl, PddlError, Typed, Word, either, is_number
 from reasoner.symbols import (
     FALSE,
@@ -48,6 +50,7 @@ from reasoner.symbols import (
     Parameter,
     Problem,
     RelationCondition,
+    Rule,
     SituationType,
     Symbol,
     ValueCondition,
@@ -156,18 +159,21 @@ class _Import:
         self.effects = {name: tuple(_effects(action.effect)) for name, action in self.pddl.actions.items()}
         self.numeric = {name: tuple(_numeric(action.effect)) for name, action in self.pddl.actions.items()}
         forms = [f for a in self.pddl.actions.values() for f in (a.precondition, a.effect)]
+        forms += [axiom.condition for axiom in self.pddl.axioms]
         read = {word for form in (*forms, self.pddl.goal) for word in _functions_read(form)}
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
         self.weights = self.costing(changed)
         self.amounts = changed & (read | (changed - self.weights.keys()))
         counted = [e.amount for effects in self.numeric.values() for e in effects if e.function.head in self.amounts]
         conditions = [a.precondition for a in self.pddl.actions.values()]
+        conditions += [axiom.condition for axiom in self.pddl.axioms]
         whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
         whens += [f for effects in self.effects.values() for e in effects for f in e.when]
         asked = [self.pddl.goal, *conditions, *whens, *(a for a in counted if isinstance(a, Form))]
         heads = {form.head for form in asked if form} | {word for form in asked for word in _functions_read(form)}
         self.measures = (heads & self.pddl.functions.keys()) - self.amounts
-        self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects}
+        self.derived = {axiom.predicate for axiom in self.pddl.axioms}
+        self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects} | self.derived
         self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
         self.facts = dict.fromkeys(self.pddl.initial)
 
@@ -234,10 +240,35 @@ class _Import:
             behaviors[reach.name] = reach
         elif not list(_conjuncts(self.pddl.goal)):
             initial |= goal
+        rules = self.rules()
         if any(s.arguments == (WORLD,) for s in situations.values()):
             classes[WORLD] = (THE_WORLD,)
         scene = f"{BASE}{_slug(pddl.domain)}/{_slug(self.scene)}"
-        return Problem(scene, Domain(situations, behaviors), classes, relations, initial, goal, parents)
+        domain = Domain(situations, behaviors, rules=rules)
+        return Problem(scene, domain, classes, relations, initial, goal, parents)
+
+    def rules(self) -> dict[str, tuple[Rule, ...]]:
+        """Return the rules of each derived predicate.
+
+        Raises
+        ------
+        PddlError
+            A predicate is derived from its own negation.
+        """
+        found: dict[str, tuple[Rule, ...]] = {}
+        for axiom in self.pddl.axioms:
+            name, variables = self.places[axiom.predicate].situation, _Variables(self)
+            parameters = [Parameter(self.term(p.name), self.kind(p.type)) for p in axiom.parameters]
+            conditions = tuple(c for form in _conjuncts(axiom.condition) for c in variables.condition(form))
+            head = tuple(parameters) or (Parameter("?the_world", WORLD),)
+            found[name] = (*found.get(name, ()), Rule(name, head, (), tuple(dict.fromkeys(conditions))))
+        for one, other in circles(found):
+            said = {ours: theirs for (_, theirs), ours in self.names.items()}
+            raise PddlError(
+                f"'{said[one]}' is derived from (not ({said[other]} …)), which is derived from it in turn; "
+                "no planner can tell which of the two holds"
+            )
+        return found
 
     def situations(
         self, classes: dict[str, tuple[str, ...]], parents: dict[str, tuple[str, ...]]
@@ -351,7 +382,7 @@ class _Import:
         candidates: list[tuple[Part, ...]] = [
             (Part(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
-            if predicate in self.changing
+            if predicate in self.changing - self.derived
             for key, counted in COUNTED.get(len(signature), ())
         ]
         proved: list[tuple[Part, ...]] = []
@@ -416,9 +447,11 @@ class _Import:
     def signatures(self) -> dict[str, list[str]]:
         """The types of each predicate's arguments: as declared, or wider where a variable of a wider type stands there."""
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
-        for action in self.pddl.actions.values():
-            types = {p.name: p.type for p in action.parameters}
-            for form in (action.precondition, action.effect):
+        parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
+        parts += [(axiom.parameters, (axiom.condition, None)) for axiom in self.pddl.axioms]
+        for parameters, forms in parts:
+            types = {p.name: p.type for p in parameters}
+            for form in forms:
                 for atom, own in self.atoms_in(form, types) if form else ():
                     kinds = found[atom[0]]
                     for position, term in enumerate(atom[1:]):
@@ -436,8 +469,9 @@ class _Import:
                 found.append(
                     (atom[0], [self.sets[own[t]] if t in own else self.domain_of(action, t) for t in atom[1:]])
                 )
-        if self.pddl.goal:
-            for atom, own in self.atoms_in(self.pddl.goal, {}):
+        others = [(axiom.condition, {p.name: p.type for p in axiom.parameters}) for axiom in self.pddl.axioms]
+        for form, types in [*others, *([(self.pddl.goal, dict[str, str]())] if self.pddl.goal else [])]:
+            for atom, own in self.atoms_in(form, types):
                 found.append((atom[0], [self.sets[own[t]] if t in own else frozenset({t}) for t in atom[1:]]))
         return found
 
@@ -695,7 +729,7 @@ class _Variables:
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
     ) -> Iterator[Condition]:
         """Yield the conditions whose conjunction a formula is."""
-        table, named = self.table, named or {}
+        named = named or {}
         head, rest = form.head, [item for item in form.items[1:] if isinstance(item, Form)]
         if head == "not":
             yield from self.condition(rest[0], named, not negated)
@@ -711,19 +745,37 @@ class _Variables:
             typed = _typed(form.items[1])  # type: ignore[arg-type]
             inner = dict(named) | self.renamed(typed)
             flip = head == "forall"
-            conditions = tuple(self.condition(rest[1], inner, negated=flip))
-            for one in reversed(typed[1:]):
-                conditions = (Witness(inner[table.term(one.name)], table.kind(one.type), conditions),)
-            first = typed[0] if typed else None
-            if first is None:
-                yield AnyOf((conditions,), negated is not flip)
+            parts = [rest[1]] if flip else list(_conjuncts(rest[1]))
+            pieces = [({w for ws in _words_in(p) for w in ws}, tuple(self.condition(p, inner, flip))) for p in parts]
+            found = self.nested(pieces, {t.name: t for t in typed}, inner)
+            if negated is flip:
+                yield from found
+            elif len(found) == 1:
+                yield replace(found[0], negated=not found[0].negated)
             else:
-                yield Witness(inner[table.term(first.name)], table.kind(first.type), conditions, negated is not flip)
+                yield AnyOf((found,), True)
         elif head in COMPARISONS and (rest or any(is_number(item) for item in form.items[1:])):
-            left, right = (table.number(item, named) for item in form.items[1:])
+            left, right = (self.table.number(item, named) for item in form.items[1:])
             yield Comparison(left, head, right, negated)
         else:
             yield from self.literal(_words(form), named, negated)
+
+    def nested(
+        self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
+    ) -> tuple[Condition, ...]:
+        """Return that some individuals satisfy all pieces, each of which has its words: each is looked for as far inside as can be.
+
+        So "there are a car and a place such that …" doesn't look at all pairs where the two have nothing to do with each other.
+        """
+        left = dict(typed)
+        while left:
+            met = {name: set().union(*(words for words, _ in pieces if name in words)) for name in left}
+            name = min(left, key=lambda name: len(met[name] & left.keys()))
+            one = left.pop(name)
+            inside = tuple(c for words, found in pieces if name in words for c in found)
+            witness = Witness(named[self.table.term(name)], self.table.kind(one.type), inside)
+            pieces = [piece for piece in pieces if name not in piece[0]] + [(met[name] - {name}, (witness,))]
+        return tuple(c for _, found in pieces for c in found)
 
     def literal(self, atom: Atom, named: Mapping[str, str], negated: bool) -> Iterator[Condition]:
         table = self.table

@@ -1,7 +1,7 @@
 """PDDL as text: nested lists of words, each with its place, and declarations and formulas read off them.
 
-The subset is that of classical planning: types, constants, predicates, actions with conditional and quantified parts,
-action costs. What lies outside of it is refused by name. Every error says file, line and column.
+The subset is that of classical planning: types, constants, predicates, actions with conditional and quantified parts, derived
+predicates, action costs. What lies outside of it is refused by name. Every error says file, line and column.
 
 Written for this project instead of taking unified-planning's reader, which answers an undefined type with a bare
 ``KeyError``, gives no place for half of the errors, and takes .2 to .5 s for problems that this one reads in 2 ms.
@@ -23,7 +23,6 @@ COMPARISONS = ("<", "<=", "=", ">=", ">")
 CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 SECTIONS = {
     ":durative-action": "durative actions",
-    ":derived": "derived predicates",
     ":constraints": "trajectory constraints",
     ":process": "processes",
     ":event": "events",
@@ -80,6 +79,15 @@ class Action:
     place: Word
 
 
+@dataclass(frozen=True)
+class Axiom:
+    """A derived predicate with variables, and a condition, whose words have been checked, under which it holds."""
+
+    predicate: str
+    parameters: tuple[Typed, ...]
+    condition: Form
+
+
 @dataclass
 class Pddl:
     """A domain with a problem, checked: every type, predicate, function, object and variable is declared, every arity right."""
@@ -91,6 +99,7 @@ class Pddl:
     functions: dict[str, tuple[Typed, ...]] = field(default_factory=dict)
     objects: dict[str, str] = field(default_factory=dict)  # and their type; constants first
     actions: dict[str, Action] = field(default_factory=dict)
+    axioms: list[Axiom] = field(default_factory=list)
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)
     goal: Form | None = None
@@ -152,7 +161,7 @@ def parse(domain: str, problem: str, domain_file: str = "domain", problem_file: 
     """
     found = Pddl()
     _Reader(domain_file, found).domain(_form(domain, domain_file))
-    _Reader(problem_file, found).problem(_form(problem, problem_file))
+    _Reader(problem_file, found, {axiom.predicate for axiom in found.axioms}).problem(_form(problem, problem_file))
     return found
 
 
@@ -197,6 +206,7 @@ def _form(text: str, file: str) -> Form:
 class _Reader:
     file: str
     pddl: Pddl
+    derived: set[str] = field(default_factory=set)  # the predicates that follow from others
 
     def fail(self, at: Word | Form, message: str) -> PddlError:
         return PddlError(f"{self.file}:{at.line}:{at.column}: {message}")
@@ -222,7 +232,7 @@ class _Reader:
             yield section
 
     def domain(self, form: Form) -> None:
-        actions = []
+        actions, axioms = [], []
         for section in self.define(form, "domain"):
             rest = section.items[1:]
             if section.head == ":types":
@@ -235,10 +245,17 @@ class _Reader:
                 self.functions(rest)
             elif section.head == ":action":
                 actions.append(section)
+            elif section.head == ":derived":
+                axioms.append(section)
             elif section.head != ":requirements":  # what is declared and not used does no harm
                 raise self.fail(section, f"unknown section {section.head} in a domain")
+        self.derived = {
+            axiom.items[1].head for axiom in axioms if len(axiom.items) > 1 and isinstance(axiom.items[1], Form)
+        }
         for action in actions:
             self.action(action)
+        for axiom in axioms:
+            self.axiom(axiom)
 
     def problem(self, form: Form) -> None:
         sections = {}
@@ -379,6 +396,31 @@ class _Reader:
         given = precondition if precondition and precondition.items else None
         self.pddl.actions[name.text] = Action(name.text, parameters, given, effect, name)
 
+    def axiom(self, form: Form) -> None:
+        """Take ``(:derived (name ?x …) condition)``; a variable without a type has the predicate's."""
+        if len(form.items) != 3 or not isinstance(head := form.items[1], Form) or not isinstance(form.items[2], Form):
+            raise self.fail(form, "wanted (:derived (PREDICATE ?x …) CONDITION)")
+        if head.head not in self.pddl.predicates:
+            known = ", ".join(sorted(self.pddl.predicates)) or "none"
+            raise self.fail(head, f"undefined predicate '{head.head}' (known: {known})")
+        declared, given = self.pddl.predicates[head.head], self.typed(head.items[1:])
+        if len(given) != len(declared):
+            raise self.fail(head, f"predicate '{head.head}' takes {len(declared)} arguments, got {len(given)}")
+        typed = (
+            (one, other.type if one.type == "object" else one.type) for one, other in zip(given, declared, strict=True)
+        )
+        parameters = tuple(Typed(one.name, kind, one.place) for one, kind in typed)
+        if form.items[2].items:
+            self.condition(form.items[2], self.scope(parameters, {}))
+        self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
+
+    def stated(self, form: Form, where: str) -> None:
+        """Raise an error if a predicate is one that follows from others."""
+        if form.head in self.derived:
+            raise self.fail(
+                form, f"'{form.head}' is derived, so it can't be {where}; change what its (:derived …) reads"
+            )
+
     def scope(self, typed: Sequence[Typed], outer: Mapping[str, str]) -> dict[str, str]:
         own: dict[str, str] = {}
         for one in typed:
@@ -438,6 +480,7 @@ class _Reader:
         elif head == "not":
             if len(rest) != 1 or not isinstance(rest[0], Form):
                 raise self.fail(form, "(not …) takes one predicate in an effect")
+            self.stated(rest[0], "an effect")
             self.atom(rest[0], variables)
         elif head == "when":
             if len(rest) != 2:
@@ -453,6 +496,7 @@ class _Reader:
             self.atom(rest[0], variables, self.pddl.functions, "function")
             self.number(rest[1], variables)
         else:
+            self.stated(form, "an effect")
             self.atom(form, variables)
 
     def number(self, item: Word | Form, variables: Mapping[str, str]) -> None:
@@ -538,6 +582,7 @@ class _Reader:
                 raise self.fail(item, "wanted (not (predicate …))")
             self.atom(item.items[1], {})  # what isn't stated is false anyway
         else:
+            self.stated(item, "stated")
             self.pddl.initial.append(self.atom(item, {}))
 
 

@@ -26,6 +26,7 @@ from reasoner.symbols import (
     Fact,
     Problem,
     RelationCondition,
+    Rule,
     SituationType,
     Symbol,
     ValueCondition,
@@ -91,6 +92,9 @@ class _Writer:
         for situation in domain.situations.values():
             yield from self.situation(situation)
         yield from self.relations()
+        for name, rules in domain.rules.items():
+            for number, rule in enumerate(rules, start=1):
+                yield from self.rule(f"{name}.rule{number}", rule)
         yield _banner("Behaviours")
         for index, behavior in enumerate(domain.behaviors.values(), start=1):
             yield from self.behavior(index, behavior)
@@ -248,6 +252,18 @@ class _Writer:
             ("c:precondition", conditions),
             ("c:postcondition", effects),
         )
+        for i, parameter in enumerate(one.parameters, start=1):
+            yield self.term(self.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
+        for variable in one.variables:
+            yield self.term(self.terms[variable.name][1:], "c:Variable", None, variable.kind)
+        yield from self.nodes
+
+    def rule(self, name: str, one: Rule) -> Iterator[str]:
+        self.where, self.nodes = name, []
+        self.terms = {t.name: f":{name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
+        conditions = [self.condition(c) for c in one.conditions]
+        head = self.value(Symbol(one.situation, tuple(p.name for p in one.parameters)), TRUE)
+        yield f":{name} a owl:NamedIndividual, c:Rule ; {head}{_some('c:condition', conditions)} ."
         for i, parameter in enumerate(one.parameters, start=1):
             yield self.term(self.terms[parameter.name][1:], "c:Parameter", i, parameter.kind)
         for variable in one.variables:

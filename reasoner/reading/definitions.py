@@ -32,11 +32,13 @@ from reasoner.symbols import (
     ClassCondition,
     Condition,
     EqualityCondition,
+    Parameter,
     RelationCondition,
+    Rule,
     ValueCondition,
     Witness,
 )
-from reasoner.vocabulary import OWL, RDF
+from reasoner.vocabulary import OWL, RDF, RDFS
 
 THING = OWL + "Thing"
 EXPRESSIONS = """{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(isBlank(?value)) } UNION
@@ -45,6 +47,17 @@ EXPRESSIONS = """{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass A
                    |owl:allValuesFrom|rdf:first|rdf:rest)* ?node .
       ?node ?property ?value . FILTER(isBlank(?node)) }"""
 """The part of a SPARQL query that yields every definition with what is nested inside, as (node, property, value)."""
+
+AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
+      FILTER(?property IN (owl:propertyChainAxiom, owl:inverseOf)
+        || (?property = rdf:type && ?value IN (owl:TransitiveProperty, owl:SymmetricProperty))) } UNION
+    { ?situation :valueProperty ?value . ?node ?property ?value . FILTER(?property IN (rdfs:subPropertyOf, owl:inverseOf))
+      FILTER(isIRI(?node)) } UNION
+    { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest* ?node . ?node ?property ?value .
+      FILTER(?property IN (rdf:first, rdf:rest)) } UNION
+    { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest*/rdf:first ?node . ?node ?property ?value .
+      FILTER(?property = owl:inverseOf && isBlank(?node)) }"""
+"""The part of a SPARQL query that yields what axioms say of value properties, as (node, property, value)."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +145,71 @@ class Definitions:
             )
         return found[0]
 
+    # -------------------------------------------------------------------------------------------------------- properties
+
+    def rules(self, prop: str, situation: str, kinds: Sequence[str]) -> list[Rule]:
+        """Return the rules that axioms about a value property say: it follows from others, or from chains of them.
+
+        A transitive one is followed from what it follows from otherwise, one link after the other.
+        """
+        said = self.nodes.get(prop, {})
+        ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
+        ways += [tuple(self._items(chain)) for chain in said.get(OWL + "propertyChainAxiom", ())]
+        types = said.get(RDF + "type", ())
+        if OWL + "TransitiveProperty" in types:
+            ways += [(*way, prop) for way in ways if prop not in way]
+        found = [self._way(way, situation, kinds) for way in ways]
+        inverses = [*said.get(OWL + "inverseOf", ()), *self._inverses(prop)]
+        inverses += [prop] if OWL + "SymmetricProperty" in types and found else []
+        for other in dict.fromkeys(inverses):
+            if other != prop or found:
+                found.append(self._rule(situation, kinds, (self._related(other, "?to", "?from"),), ()))
+        return found
+
+    def _below(self, prop: str) -> list[str]:
+        """Return the properties that are said to be sub-properties of one."""
+        nodes = self.nodes.items()
+        return sorted(iri for iri, node in nodes if iri != prop and prop in node.get(RDFS + "subPropertyOf", ()))
+
+    def _inverses(self, prop: str) -> list[str]:
+        return sorted(
+            iri for iri, node in self.nodes.items() if not _blank(iri) and prop in node.get(OWL + "inverseOf", ())
+        )
+
+    def _way(self, way: Sequence[str], situation: str, kinds: Sequence[str]) -> Rule:
+        """Return the rule that a chain of properties is."""
+        variables: list[Parameter] = []
+
+        def rest(place: int, one: str) -> tuple[Condition, ...]:
+            if place == len(way) - 1:
+                return (self._related(way[place], one, "?to"),)
+            middle, kind = f"?middle{place}", self._between(way[place], way[place + 1])
+            link = self._related(way[place], one, middle)
+            inner = rest(place + 1, middle)
+            if isinstance(link, ValueCondition) and link.value == middle:
+                variables.append(Parameter(middle, kind))
+                return (link, *inner)
+            return (Witness(middle, kind, (link, *inner)),)
+
+        return self._rule(situation, kinds, rest(0, "?from"), tuple(variables))
+
+    @staticmethod
+    def _rule(
+        situation: str, kinds: Sequence[str], conditions: tuple[Condition, ...], variables: tuple[Parameter, ...]
+    ) -> Rule:
+        return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
+
+    def _between(self, one: str, other: str) -> str:
+        """Return the class of what stands between two properties of a chain: the values of the first one."""
+        for prop in (one, other):
+            iri, inverse = self._named(prop)
+            if iri in self.situations and inverse is (prop == other):
+                return self.names.short(self.situations[iri][0])
+        raise KnowledgeError(
+            f"the chain of {local_name(self._named(one)[0])} and {local_name(self._named(other)[0])} leads over individuals of "
+            "which nothing says the class; write it as a :Rule with a :Witness"
+        )
+
     # -------------------------------------------------------------------------------------------------- class expressions
 
     def _expression(self, term: str, node: str) -> Iterator[Condition]:
@@ -201,15 +279,18 @@ class Definitions:
         return (inverse[0], True) if inverse and prop not in self.situations else (prop, False)
 
     def _list(self, node: str, name: str) -> list[str]:
+        return self._items(*self.nodes.get(node, {}).get(OWL + name, [RDF + "nil"]), name=name)
+
+    def _items(self, *rests_: str, name: str = "propertyChainAxiom") -> list[str]:
         found: list[str] = []
-        rests, seen = self.nodes.get(node, {}).get(OWL + name, [RDF + "nil"]), set[str]()
+        rests, seen = list(rests_), set[str]()
         while rests != [RDF + "nil"]:
             cell = self.nodes.get(rests[0], {})
             if len(rests) != 1 or rests[0] in seen or len(cell.get(RDF + "first", ())) != 1:
                 raise KnowledgeError(f"the list of an owl:{name} isn't whole; write it as ( … )")
             seen.add(rests[0])
             found += cell[RDF + "first"]
-            rests = cell.get(RDF + "rest", [])
+            rests = list(cell.get(RDF + "rest", []))
             if not rests:
                 raise KnowledgeError(f"the list of an owl:{name} has no end; write it as ( … )")
         return found

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -37,9 +37,10 @@ from reasoner.amounts import (
     inside,
     written,
 )
+from reasoner.derivation import circles, needed
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Term, text
 from reasoner.names import Names, local_name, nearest
-from reasoner.reading.definitions import EXPRESSIONS, Definitions
+from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -53,6 +54,7 @@ from reasoner.symbols import (
     Parameter,
     Problem,
     RelationCondition,
+    Rule,
     SituationType,
     Symbol,
     ValueCondition,
@@ -74,6 +76,7 @@ KINDS = (
     "Task",
     "Relation",
     "Calculation",
+    "Rule",
 )  # of the schema's nodes
 
 SCHEMA = f"""
@@ -95,6 +98,7 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
     BIND("tuples" AS ?part) BIND(rdf:type AS ?property) BIND(:SituatedObjectInstance AS ?value) }}
   UNION {{ ?node a owl:Ontology . BIND("ontology" AS ?part) BIND(rdf:type AS ?property) BIND(owl:Ontology AS ?value) }}
   UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
+  UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
 }}"""
 """What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own.
 
@@ -160,7 +164,8 @@ class Schema:
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
     property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
     facts are nodes of their own, and `facts` has those about nobody;
-    `expressions` are the definitions of classes, `ontologies` the IRIs of what was loaded.
+    `expressions` are the definitions of classes, `axioms` what is said of value properties; `ontologies` the IRIs of what was
+    loaded.
     """
 
     nodes: Mapping[str, Node]
@@ -172,6 +177,7 @@ class Schema:
     facts: Mapping[str, Node]
     tuples: bool
     expressions: Mapping[str, Node]
+    axioms: Mapping[str, Node]
     ontologies: Sequence[str]
 
     @cached_property
@@ -241,6 +247,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         facts=_nodes(parts["fact"]),
         tuples=bool(parts["tuples"]),
         expressions=_nodes(parts["expression"]),
+        axioms=_nodes(parts["axiom"]),
         ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
     )
 
@@ -307,7 +314,7 @@ def frame(
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
         }
     )
-    definitions = Definitions(schema.expressions, _value_properties(schema), names)
+    definitions = Definitions({**schema.expressions, **schema.axioms}, _value_properties(schema), names)
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
     classes, parents = _classes(instances, supers, names)
@@ -317,15 +324,19 @@ def frame(
     else:
         ordered = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         behaviors = {names.short(iri): parts.behavior(iri) for iri in ordered}
+    rules = _rules(parts, schema, {s.name: s for s in situations})
     domain = Domain(
-        situations={s.name: s for s in situations},
+        situations={s.name: s for s in _on_their_levels(situations, rules)},
         behaviors=behaviors,
         first_ids={
             parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
         },
+        rules=rules,
     )
     for behavior in domain.behaviors.values():
         _check_behavior(behavior, domain)
+    for rule in chain.from_iterable(rules.values()):
+        _check_behavior(rule.behavior, domain)
     return Frame(schema, parts, domain, classes, parents, properties)
 
 
@@ -800,6 +811,28 @@ class _Schema:
             amounts=tuple(map(self.amount_effect, of_amounts)),
         )
 
+    def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
+        """Return a rule of a situation type with arguments of some classes; an individual among its terms is compared."""
+        situation, arguments, value = self.situation_and_value(iri)
+        if value != TRUE:
+            raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
+        if len(arguments) != len(kinds):
+            raise KnowledgeError(f"<{iri}> speaks of {situation} with {len(arguments)} arguments; it has {len(kinds)}")
+        parameters: list[Parameter] = []
+        compared: list[Condition] = []
+        own = {self.term(t): t for t in self.terms_below(iri)}
+        for i, (term, kind) in enumerate(zip(arguments, kinds, strict=True)):
+            if term in own and term not in [p.name for p in parameters]:
+                parameters.append(self.parameter(own[term]))
+            else:
+                parameters.append(Parameter(f"?argument{i}", kind))
+                compared.append(EqualityCondition(f"?argument{i}", term))
+        names = {p.name for p in parameters}
+        membership = (c for t in sorted(own.values()) for c in self.membership(t))
+        variables = tuple(self.parameter(t) for name, t in sorted(own.items()) if name not in names)
+        conditions = (*compared, *self.conditions(iri, "condition"), *membership)
+        return Rule(situation, tuple(parameters), variables, conditions)
+
     def terms_below(self, iri: str) -> set[str]:
         """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
         found: set[str] = set()
@@ -816,6 +849,65 @@ class _Schema:
                         seen.add(value)
                         waiting.append(value)
         return found - bound
+
+
+def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:
+    """Return the rules of each situation type that is defined: by rules, by a class, or by axioms about its value property.
+
+    Raises
+    ------
+    KnowledgeError
+        A behaviour changes one that has rules, one isn't true or false, or is defined by its own negation.
+    """
+    changed = {
+        parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
+    }
+    written: dict[str, list[str]] = defaultdict(list)
+    for iri in schema.of_kind("Rule"):
+        written[parts.one(iri, "situationType")].append(iri)
+    found: dict[str, tuple[Rule, ...]] = {}
+    for iri in schema.of_kind("SituationType"):
+        name = parts.names.short(iri)
+        kinds, said = situations[name].arguments, parts.values(iri, "holdsOf")
+        rules = [parts.rule(rule, kinds) for rule in written[iri]]
+        for kind in said:
+            head = (Parameter("?it", kinds[0]),)
+            rules.append(Rule(name, head, (), parts.definitions.conditions("?it", kind)))
+        if iri not in changed and iri in schema.pairs:
+            for prop in parts.values(iri, "valueProperty"):
+                rules += parts.definitions.rules(prop, name, kinds)
+        if not rules:
+            continue
+        if iri in changed:
+            who = min(e for e in schema.of_kind("ValueEffect") if parts.values(e, "situationType") == [iri])
+            raise KnowledgeError(
+                f"<{who}> changes {name}, which is defined by <{min([*written[iri], *said])}>; change what that reads"
+            )
+        if not situations[name].boolean:
+            raise KnowledgeError(
+                f"<{iri}> is defined, but has values; what is defined is true or false: make its value property not functional"
+            )
+        found[name] = tuple(rules)
+    for name, other in circles(found):
+        raise KnowledgeError(
+            f"{name} is defined by {other} not being true, which is defined by {name} in turn: which of them holds can't be told; "
+            "take one of these conditions out of its rule"
+        )
+    return found
+
+
+def _on_their_levels(
+    situations: Iterable[SituationType], rules: Mapping[str, Sequence[Rule]]
+) -> Iterator[SituationType]:
+    """Yield situation types; what is defined exists from the level on that has all that it is defined by."""
+    known = {s.name: s for s in situations}
+    before = None
+    while before != known:
+        before = dict(known)
+        for name, its in rules.items():
+            read = {s for rule in its for s, _ in needed(rule.conditions)} | {name}
+            known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))
+    yield from known.values()
 
 
 def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
@@ -942,6 +1034,8 @@ def _facts(
             relations[names.short(predicate)].add(pair)
             continue
         situation, boolean = properties[predicate]
+        if situation in domain.rules:
+            continue  # it follows from what is stated of others
         if boolean:
             stated[Symbol(situation, pair)].add(TRUE)
         else:

@@ -128,7 +128,8 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """Return how to reach, from what the goal names, everything that a behaviour on it can involve.
 
-    A behaviour counts if it changes a situation type that counts; then so do those in its conditions and its other effects.
+    A behaviour counts if it changes a situation type that counts, a rule if it defines one; then so do those in its conditions
+    and its other effects.
     `looked_up` are the situation types that are followed backward, each with the constants from which it is: a behaviour
     that gives somebody such a value counts from that value on, too.
 
@@ -142,10 +143,12 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     found = Routes(forward=set(known.properties) - known.schema.numbers)
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: dict[str, set[str]] = {}
-    spanned = set[tuple[str, int, bool]]()
+    spanned = set[tuple[int, int, bool]]()
+    rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
+    doing = [*known.domain.behaviors.values(), *rules]
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
-        for behavior in known.domain.behaviors.values():
+        for behavior in doing:
             if not behavior.changes & counting:
                 continue
             counting |= behavior.changes
@@ -164,9 +167,9 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
                 own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, *values}
                 own &= kinds.keys()
                 for from_value, start in starts.items():
-                    if (behavior.name, number, from_value) in spanned:
+                    if (id(behavior), number, from_value) in spanned:
                         continue
-                    spanned.add((behavior.name, number, from_value))
+                    spanned.add((id(behavior), number, from_value))
                     # What must not hold, or need not, leads to nothing that the behaviour itself is done with.
                     _span(scopes[0], start, own, known, found, looked_up)
                     for scope in scopes[1:]:
@@ -262,6 +265,8 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
             yield _Step(terms[1], terms[0], RELATION, backward=frozenset({iri}))
         yield from _steps_by_nodes(terms, len(terms) > 2, schema)
     elif isinstance(condition, ValueCondition) and not condition.negated and condition.value != FALSE:
+        if condition.situation in known.domain.rules:
+            return  # nothing is stated of it; its rules are followed
         situation = known.domain.situations[condition.situation]
         terms = condition.arguments if condition.value == TRUE else (*condition.arguments, condition.value)
         properties = frozenset(p for p, (name, _) in known.properties.items() if name == condition.situation)
