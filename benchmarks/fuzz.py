@@ -43,7 +43,7 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
-    from confab.scene import Result
+    from confab.planning import Result
 
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
 CASES, ROUND, BATCH = 100_000, 1_000, 100

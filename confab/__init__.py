@@ -31,7 +31,8 @@ if _TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
-    from confab.scene import Result, Scene, load, scenes
+    from confab.planning import Result
+    from confab.scene import Scene, load, scenes
     from confab.table import Table
     from reasoner.graph.knowledge import KnowledgeError
 
@@ -59,7 +60,7 @@ _HOMES = {
     "KnowledgeError": "reasoner.graph.knowledge",
     "Memory": "confab.memory",
     "Report": "confab.physics",
-    "Result": "confab.scene",
+    "Result": "confab.planning",
     "Scene": "confab.scene",
     "Table": "confab.table",
     "generate": "confab.authoring",

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from confab.known import Known
 from confab.labels import Labels, labels_of
-from confab.scene import DEFAULT_MODE, Result, Scene
+from confab.planning import Result
 from planner.plan import Limits
-from planner.solve import Request, solve
+from planner.solve import DEFAULT_MODE, Request, solve
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import FALSE, TRUE, Problem, Symbol
 
@@ -36,18 +37,18 @@ class Sheet:
 
     Examples
     --------
-    >>> from confab.scene import load
-    >>> sheet = Sheet.of(load("beverage-serving"))
+    >>> import confab
+    >>> sheet = Sheet.of(confab.load("beverage-serving"))
     >>> sheet.answer({"facts": {"cup1 LOCATION": "location7"}})["headline"].split(",")[0]
     'solved: 3 / 8 / 26 steps per level'
     """
 
-    scene: Scene
+    scene: Known
     problem: Problem
     labels: Labels
 
     @classmethod
-    def of(cls, scene: Scene) -> Sheet:
+    def of(cls, scene: Known) -> Sheet:
         """Return the sheet of a scene.
 
         Raises
@@ -158,7 +159,7 @@ class Sheet:
         }
 
 
-def board(scene: Scene) -> Any:
+def board(scene: Known) -> Any:
     """Return the board of a scene, which a notebook shows; its `result` is what was planned last.
 
     Raises

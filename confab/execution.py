@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from confab.accepting import AnyPlan, Facts, number, plan_of, several
 from confab.interchange import step_json
 from planner.acting.episode import Change, End, Episode, Intervention, World
 from planner.acting.executive import Moment, Patience, act
@@ -16,17 +17,19 @@ from planner.acting.failure_memory import Caution
 from planner.acting.repair import Planner
 from planner.acting.symbolic_world import SymbolicWorld
 from planner.plan import Plan, Step, renumbered
+from planner.solve import DEFAULT_MODE
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.links import Links
 from reasoner.names import nearest
-from reasoner.reading.problem import parse_fact
+from reasoner.reading.problem import parse_fact, with_goals
 from reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
     import networkx
     from rich.tree import Tree
 
-    from confab.scene import Scene
+    from confab.known import Known
+    from confab.memory import Memory
     from sim.live import LiveWorld
 
 WORLDS = ("symbolic", "pybullet")
@@ -223,7 +226,7 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> dict[str, An
 class Execution:
     """What came of carrying a task out: an episode, and the scene in which it happened."""
 
-    scene: Scene
+    scene: Known
     episode: Episode
 
     @property
@@ -299,9 +302,50 @@ class Execution:
         return write_report(path, report_html(self.scene, execution=self))
 
     def _repr_html_(self) -> str:
-        from confab.report.notebook import of_execution
+        from confab.labels import labels_of
+        from confab.report.course import of_episode
+        from confab.report.markup import styled, tag
+        from confab.report.pieces import timeline, tree
 
-        return of_execution(self)
+        problem = self.scene.problem
+        labels = labels_of(self.scene.knowledge, self.scene.names, problem)
+        course = of_episode(problem, self.episode)
+        shown = tree(course.plan, labels, self.notes(), None, course)
+        return styled(tag("p", self.summary()), timeline(course, labels), shown)
+
+
+def carry_out(
+    scene: Known,
+    plan: AnyPlan | None = None,
+    interventions: Facts = (),
+    world: str | World = "symbolic",
+    goals: Facts = (),
+    memory: Memory | Links | str | Path | None = None,
+    mode: str = DEFAULT_MODE,
+    seed: int = 0,
+    tell: Callable[[Moment], None] | None = None,
+    watch: bool = False,
+    **options: Any,
+) -> Execution:
+    """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
+    from confab.live import spectator
+
+    scene.settle()
+    problem = getattr(plan, "problem", None) or with_goals(scene.reading, several(goals))
+    begun = None if plan is None else plan_of(plan, problem)
+    if isinstance(memory, str | Path):
+        from confab.memory import Memory
+
+        memory = Memory.load(memory, scene)
+    planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
+    if planner is None and memory is not None and not isinstance(memory, Links):
+        from planner.experience.portfolio import planner_with
+
+        planner = planner_with(memory.advisor, mode)
+    number("seed", seed, "an integer")
+    texts = several(interventions)
+    with spectator(watch, tell) as heard:
+        return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 
 
 def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
@@ -324,7 +368,7 @@ def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
 
 
 def execute(
-    scene: Scene,
+    scene: Known,
     problem: Problem,
     plan: Plan | None = None,
     interventions: Iterable[str | Intervention] = (),

@@ -14,6 +14,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from confab.lifted import sentence
+from confab.report.markup import styled, tag
 from planner.experience.choice_points import Field, Ground, single_level
 from planner.experience.scoring import TOGETHER, Judge
 from planner.hierarchical.operators import Program
@@ -71,9 +72,16 @@ class Explanation:
         return str(self)
 
     def _repr_html_(self) -> str:
-        from confab.report.pieces import explanation
-
-        return explanation(self)
+        if not self.other:
+            return styled(tag("p", str(self)))
+        rows = [
+            tag("tr", tag("td", f"{why.weight:+.2f}", class_="number"), tag("td", why.says or f"{why.fact}: {why.chosen}"),
+                tag("td", why.says_other or why.other))
+            for why in self.reasons[:12]
+        ]  # fmt: skip
+        head = tag("tr", [tag("th", name) for name in ("weight", self.chosen, f"not: {self.other}")])
+        note = tag("p", self.note, class_="note") if self.note else None
+        return styled(tag("p", f"lead {self.lead:+.2f}"), tag("div", tag("table", head, rows), class_="scroll"), note)
 
     def __str__(self) -> str:
         """Return the explanation in a few lines."""

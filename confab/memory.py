@@ -30,7 +30,7 @@ from reasoner.names import Names
 if TYPE_CHECKING:
     from rich.console import Group
 
-    from confab.scene import Scene
+    from confab.known import Known
     from planner.acting.episode import Episode
     from planner.experience.portfolio import Memory as Advisor
     from reasoner.symbols import Problem
@@ -65,13 +65,13 @@ class Memory:
     trusted: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, scene: Scene) -> Memory:
+    def of(cls, scene: Known) -> Memory:
         """Return an empty memory for a scene."""
         return cls(Links(), scene.names, scene.iri)
 
     @classmethod
     def load(
-        cls, source: str | Path, scene: Scene | None = None, trust: bool = False, lines: Lines | None = None
+        cls, source: str | Path, scene: Known | None = None, trust: bool = False, lines: Lines | None = None
     ) -> Memory:
         """Read a memory file, or the memories at a SPARQL endpoint.
 
@@ -107,7 +107,7 @@ class Memory:
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
 
-    def learn(self, scene: Scene, plan: AnyPlan, failed: tuple[int, ...] | None = None) -> None:
+    def learn(self, scene: Known, plan: AnyPlan, failed: tuple[int, ...] | None = None) -> None:
         """Learn from a plan that was carried out from the scene's initial situation.
 
         Parameters
@@ -123,13 +123,13 @@ class Memory:
         KnowledgeError
             The plan can't be done in that situation; nothing is learned then.
         """
-        from confab.execution import Execution
-        from confab.scene import Result
+        from planner.acting.episode import Episode
 
-        if isinstance(plan, Execution):
-            self.live(scene.problem, plan.episode)
+        if isinstance(episode := getattr(plan, "episode", None), Episode):
+            self.live(scene.problem, episode)
             return
-        problem = replace(scene.problem, goal=plan.problem.goal) if isinstance(plan, Result) else scene.problem
+        planned = getattr(plan, "problem", scene.problem)  # in which a result's plan was made
+        problem = replace(scene.problem, goal=planned.goal)
         plan = plan_of(plan, problem)
         try:
             lived = decisions_of(problem, plan, failed)
@@ -139,7 +139,7 @@ class Memory:
             raise KnowledgeError(str(error)) from error
         self.experience.learn(lived)
 
-    def teach(self, scene: Scene, plan: AnyPlan) -> None:
+    def teach(self, scene: Known, plan: AnyPlan) -> None:
         """Learn how a scene is best solved, on its first two levels: see `planner.experience.demonstrations`.
 
         Parameters
@@ -168,7 +168,7 @@ class Memory:
         self.links = links
         self.experience.learn(lived)
 
-    def _linked(self, scene: Scene, plan: Plan) -> Links:
+    def _linked(self, scene: Known, plan: Plan) -> Links:
         """Return the paper's links with a plan learned, or as they are where that would be too many."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
@@ -307,9 +307,11 @@ class Memory:
         return Group(self.said(), self.counts(20).__rich__())
 
     def _repr_html_(self) -> str:
-        from confab.report.notebook import of_memory
+        from confab.report.markup import styled, tag
+        from confab.report.pieces import table
 
-        return of_memory(self)
+        shown = [table(list(t.columns), list(t)) for t in (self.counts(20), self.table(20)) if len(t)]
+        return styled(tag("p", self.said()), *shown)
 
 
 def counted(number: int, noun: str) -> str:

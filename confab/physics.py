@@ -26,7 +26,7 @@ from sim.world import World
 if TYPE_CHECKING:
     from rich.tree import Tree
 
-    from confab.scene import Scene
+    from confab.known import Known
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Report:
     rollouts: tuple[Rollout, ...]
     video: Path | None = None
     trusted: tuple[str, ...] = ()
-    scene: Scene | None = field(default=None, repr=False, compare=False)
+    scene: Known | None = field(default=None, repr=False, compare=False)
 
     @property
     def verified(self) -> bool:
@@ -142,13 +142,27 @@ class Report:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        from confab.report.notebook import of_report
+        from base64 import b64encode
 
-        return of_report(self)
+        from confab.report.course import of_rollout
+        from confab.report.markup import styled, tag
+        from confab.report.pieces import timeline, tree
+
+        film = None
+        if self.video is not None and self.video.is_file():
+            data = b64encode(self.video.read_bytes()).decode()
+            film = tag("video", src=f"data:video/mp4;base64,{data}", controls=True, width="640")
+        if self.scene is None:
+            return styled(tag("p", self.summary()), film, tree(self.plan, None, self.notes()))
+        problem = self.scene.problem
+        labels = labels_of(self.scene.knowledge, self.scene.names, problem)
+        course = of_rollout(problem, self.plan, self.shown)
+        shown = tree(self.plan, labels, self.notes(), None, course)
+        return styled(tag("p", self.summary()), film, timeline(course, labels), shown)
 
 
 def verify(
-    scene: Scene,
+    scene: Known,
     plan: Plan,
     rollouts: int = 1,
     seed: int = 0,
@@ -223,14 +237,14 @@ def verify(
     return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene)
 
 
-def on_trust(scene: Scene, expected: Sequence[State]) -> tuple[str, ...]:
+def on_trust(scene: Known, expected: Sequence[State]) -> tuple[str, ...]:
     """Return the situation types that change on the way through some expected states and that nothing perceives."""
     initial = scene.problem.initial
     changed = {s.situation for state in expected for s, value in state.items() if initial.get(s) != value}
     return tuple(sorted(changed - scene.embodiment.perceivers.keys()))
 
 
-def require_skills(scene: Scene, behaviors: Iterable[str]) -> None:
+def require_skills(scene: Known, behaviors: Iterable[str]) -> None:
     """Raise `KnowledgeError` if physics has no skill for one of some behaviours, or the scene no robot."""
     skills = scene.embodiment.skills
     for behavior in behaviors:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from confab.scene import Scene
+    from confab.known import Known
     from sim.urdf import Array
     from sim.world import World
 
@@ -42,7 +42,7 @@ SITUATIONS = (
 )
 
 
-def draw(scene: Scene, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
+def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
     """Draw a picture into a file and return which: by default the table with its places and who reaches them.
 
     Parameters
@@ -87,7 +87,7 @@ def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
     return path
 
 
-def card(scene: Scene, name: str) -> Figure:
+def card(scene: Known, name: str) -> Figure:
     """Return a behaviour between what has to hold before it and what it changes, in the words of the labels."""
     from matplotlib.figure import Figure
 
@@ -120,7 +120,7 @@ def card(scene: Scene, name: str) -> Figure:
     return figure
 
 
-def class_tree(scene: Scene) -> Figure:
+def class_tree(scene: Known) -> Figure:
     """Return the classes of objects from the left to the right, each with the situation types that it brings."""
     from matplotlib.figure import Figure
 
@@ -181,7 +181,7 @@ def fill_lines(words: str, width: int = 32) -> str:
     return "\n".join(fill(line, width) for line in words.splitlines())
 
 
-def _parts(scene: Scene, iri: str, which: str) -> list[str]:
+def _parts(scene: Known, iri: str, which: str) -> list[str]:
     rows = scene.knowledge.select(PARTS.format(property=which), behavior=iri)
     return [text(row[2]) or local_name(text(row[1])) for row in rows]
 
@@ -214,7 +214,7 @@ def _top(world: World, name: str) -> Array:
     return top
 
 
-def _table(scene: Scene, path: Path) -> Path:
+def _table(scene: Known, path: Path) -> Path:
     """Take a picture of the world as it begins, with objects, places, and who reaches those that not every hand does."""
     from PIL import Image, ImageDraw, ImageFont
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pyoxigraph as ox
 
 import ontology
-from confab.scene import Scene
+from confab.known import Known, S
 from reasoner.graph.knowledge import BASE, KnowledgeError
 from reasoner.vocabulary import EMBODIMENT, EPISODES
 
@@ -20,12 +20,12 @@ SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :sym
 """A file with an episode, or a memory, is about a scene that has its own reach."""
 
 
-def has_robot(scene: Scene) -> bool:
+def has_robot(scene: Known) -> bool:
     """Return whether a scene has a robot with a body, which physics could move."""
     return bool(scene.knowledge.select(ROBOTS))
 
 
-def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:
+def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
     """Return the scene with reach facts if it has a robot and they are missing, or older than one of the user's own files.
 
     A scene whose bodies aren't complete yet can be planned in all the same; `tell` then hears what is missing.
@@ -54,7 +54,7 @@ def with_current_reach(scene: Scene, tell: Callable[[str], None]) -> Scene:
         return scene
 
 
-def with_reach(scene: Scene) -> Scene:
+def with_reach(scene: S) -> S:
     """Return the scene with reach facts that fit its geometry.
 
     They are computed if the scene has none, or those of another geometry, and then written into ``SCENE.reach.ttl`` beside the
@@ -89,4 +89,4 @@ def with_reach(scene: Scene) -> Scene:
             log.info("wrote %s", path)
         except OSError as error:
             log.warning("%s: %s; what was computed isn't kept", path, error.strerror)
-    return Scene(graph, scene.seconds)
+    return type(scene)(graph, scene.seconds)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from confab.memory import Memory, undisturbed
 from confab.physics import Report
+from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, with_reach
-from confab.scene import Result, Scene, load
+from confab.scene import Scene, load
 from confab.show import show
 from planner.plan import Status
 from reasoner.files import write_whole
@@ -85,7 +86,7 @@ def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: b
 
 def reported(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> Path:
     """Write the report of a run, and return where it lies."""
-    from confab.report import report_html
+    from confab.report.page import report_html
 
     path = out / "report.html"
     write_whole(path, report_html(scene, result, report, learned=learned))

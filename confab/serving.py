@@ -32,8 +32,8 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import LimitError
 
 if TYPE_CHECKING:
+    from confab.known import Known
     from confab.live import View
-    from confab.scene import Scene
     from planner.acting.executive import Moment
 
 log = logging.getLogger(__name__)
@@ -106,7 +106,7 @@ class RefusedError(Exception):
 class Service:
     """What is served: a scene, what is known of it now, and the processes that answer queries about it."""
 
-    scene: Scene
+    scene: Known
     limits: QueryLimits
     view: View
     change: int = 0
@@ -357,7 +357,7 @@ def view_html(service: Service) -> str:
 
 
 @contextmanager
-def serving(scene: Scene, port: int = PORT, limits: QueryLimits | None = None) -> Iterator[Server]:
+def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -> Iterator[Server]:
     """Serve a scene until the end of the block; port 0 is any free one.
 
     Raises

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from confab.labels import Labels
+from confab.report.markup import Markup, styled, tag
 from planner.causal_links import Change, Kind, Need, Purpose
 from planner.contrast import Ask, Contrast, NoChoiceError, cost_of, instead_of, with_choice
 from planner.plan import Outcome, Plan, Status, Step
@@ -65,10 +66,21 @@ class Because:
         """Return it for rich."""
         return str(self)
 
-    def _repr_html_(self) -> str:
-        from confab.report.pieces import because
+    def reasons(self) -> list[Markup]:
+        """Return it as HTML, in short."""
+        more, gives = len(self.needs) - 2, "; ".join(self.gives)
+        said = [tag("span", need) for need in self.needs[:2]] + ([tag("span", f"and {more} more")] if more > 0 else [])
+        return [
+            tag("p", "gives ", tag("span", gives), class_="gives") if gives else Markup(""),
+            tag("p", "needed: ", said, class_="why"),
+        ]
 
-        return because(self)
+    def _repr_html_(self) -> str:
+        return styled(
+            tag("p", tag("b", self.what), " ", tag("small", f"{self.number} · {self.step}")),
+            tag("p", "gives ", "; ".join(self.gives), class_="gives"),
+            tag("ul", [tag("li", need) for need in self.needs], class_="why"),
+        )
 
 
 @dataclass(frozen=True)
@@ -111,9 +123,11 @@ class WhyNot:
         return str(self)
 
     def _repr_html_(self) -> str:
-        from confab.report.pieces import why_not
-
-        return why_not(self)
+        return styled(
+            tag("p", self.answer),
+            tag("ul", [tag("li", line) for line in self.lacks], class_="bad") if self.lacks else None,
+            tag("ol", [tag("li", line) for line in self.steps]) if self.steps else None,
+        )
 
 
 @dataclass(frozen=True)
@@ -155,9 +169,18 @@ class Account:
         return tree
 
     def _repr_html_(self) -> str:
-        from confab.report.pieces import account
+        below: dict[tuple[int, ...], list[Because]] = {}
+        for step in self.steps:
+            below.setdefault(step.path[:-1], []).append(step)
 
-        return account(self)
+        def item(step: Because) -> Markup:
+            inner = [item(other) for other in below.get(step.path, ())]
+            head = [tag("span", step.what, class_="what"), " ", tag("small", step.number)]
+            inside = [tag("summary", head), step.reasons(), tag("ul", inner) if inner else None]
+            return tag("li", tag("details", inside, open=len(step.path) == 1))
+
+        steps = [item(step) for step in below.get((), ())]
+        return styled(tag("p", self.headline), tag("ul", steps, class_="plan"))
 
 
 # ------------------------------------------------------------------------------------------------------------------ why

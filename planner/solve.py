@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from planner.experience.portfolio import Memory
     from reasoner.memory.links import Links
 
+DEFAULT_MODE = "guarded"
+
 
 class RejectedPlanError(Exception):
     """The checker rejects a plan that search returned: a fault of this program. The message names the step and the mode."""
@@ -54,7 +56,7 @@ class Request:
     """
 
     problem: Problem
-    mode: str = "guarded"
+    mode: str = DEFAULT_MODE
     limits: Limits = field(default_factory=Limits)
     memory: Memory | None = None
     links: Links | None = None

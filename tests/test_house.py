@@ -18,19 +18,6 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
     "experience": {"hierarchical", "paper"},
     "acting": {"hierarchical"},
 }
-OPEN_CYCLES = [  # what still imports each other: a scene and what can be done with it, and how both are shown
-    {
-        "confab.board",
-        "confab.execution",
-        "confab.live",
-        "confab.memory",
-        "confab.physics",
-        "confab.picturing",
-        "confab.reaching",
-    }
-    | {"confab.scene", "confab.serving"}
-    | {"confab.explaining", "confab.why", "confab.report.notebook", "confab.report.page", "confab.report.pieces"},
-]
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 
 
@@ -130,8 +117,8 @@ def cycles(graph: Mapping[str, set[str]]) -> list[set[str]]:
     return [group for i, group in enumerate(found) if group and group not in found[:i]]
 
 
-def test_no_modules_import_each_other_but_those_that_are_known_to() -> None:
-    assert cycles(imports(ROOT, [*ROOMS, "worlds", "benchmarks"])) == OPEN_CYCLES
+def test_no_modules_import_each_other() -> None:
+    assert cycles(imports(ROOT, [*ROOMS, "worlds", "benchmarks"])) == []
 
 
 @pytest.mark.parametrize(

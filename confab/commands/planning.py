@@ -36,7 +36,7 @@ from reasoner.graph.knowledge import KnowledgeError
 if TYPE_CHECKING:
     from confab.explaining import Explanation
     from confab.memory import Memory
-    from confab.scene import Result
+    from confab.planning import Result
 
 
 @click.command(epilog=examples("plan"))

@@ -3,7 +3,3 @@
 `course` says what was when; `pieces` turns that, plans and explanations into HTML; `page` puts the pieces together. What the
 browser needs lies beside them: `page.html`, `style.css`, `script.js`.
 """
-
-from confab.report.page import report_html
-
-__all__ = ["report_html"]

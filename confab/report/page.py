@@ -6,7 +6,7 @@ import re
 from base64 import b64encode
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import ontology
 from confab.lifted import sentence
@@ -23,12 +23,35 @@ from reasoner.symbols import Fact, Problem
 from sim.verdict import CODES
 
 if TYPE_CHECKING:
-    from confab.execution import Execution
+    from confab.known import Known
     from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
-    from confab.scene import Result, Scene
+    from planner.acting.episode import Episode
     from reasoner.embodiment.values import Embodiment
+
+
+class Planned(Protocol):
+    """What came of planning, as the page needs it: `confab.planning.Result`."""
+
+    problem: Problem
+    outcome: Outcome
+
+
+class Executed(Protocol):
+    """What came of carrying a task out, as the page needs it: `confab.execution.Execution`."""
+
+    @property
+    def episode(self) -> Episode:
+        """What happened."""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal was reached."""
+
+    def notes(self) -> dict[tuple[int, ...], str]:
+        """Return what to say of each step."""
+
 
 LARGEST_FILM = 40_000_000
 """Bytes of a film that is put into the page; a larger one is linked."""
@@ -39,10 +62,10 @@ MOST_STEPS = 4000
 
 
 def report_html(
-    scene: Scene,
-    result: Result | None = None,
+    scene: Known,
+    result: Planned | None = None,
     report: Report | None = None,
-    execution: Execution | None = None,
+    execution: Executed | None = None,
     learned: Memory | None = None,
     again: str = "",
 ) -> str:
@@ -87,7 +110,7 @@ def report_html(
 
 
 def _course(
-    problem: Problem, result: Result | None, report: Report | None, execution: Execution | None
+    problem: Problem, result: Planned | None, report: Report | None, execution: Executed | None
 ) -> Course | None:
     if execution is not None:
         return of_episode(problem, execution.episode)
@@ -98,7 +121,7 @@ def _course(
     return None
 
 
-def embodiment_of(scene: Scene) -> Embodiment | None:
+def embodiment_of(scene: Known) -> Embodiment | None:
     """Return the scene's bodies; None where it has none, or none that are whole."""
     from reasoner.embodiment.facts import EmbodimentError
 
@@ -112,7 +135,7 @@ def embodiment_of(scene: Scene) -> Embodiment | None:
 
 
 def _tiles(
-    problem: Problem, course: Course | None, outcome: Outcome | None, report: Report | None, execution: Execution | None
+    problem: Problem, course: Course | None, outcome: Outcome | None, report: Report | None, execution: Executed | None
 ) -> list[Tile]:
     found: list[Tile] = []
     if execution is not None:
@@ -162,7 +185,7 @@ def _tiles(
 
 
 def _alarm(
-    course: Course | None, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Execution | None
+    course: Course | None, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
 ) -> Markup | None:
     """Return what went wrong, with its numbers; None if nothing did."""
     if execution is not None and execution.reached:
@@ -211,7 +234,7 @@ def _alarm(
     return None
 
 
-def _reasons_of(execution: Execution | None) -> Markup | None:
+def _reasons_of(execution: Executed | None) -> Markup | None:
     reasons = execution.episode.reasons if execution is not None else ()
     return tag("ul", [tag("li", reason.text) for reason in reasons]) if reasons else None
 
@@ -248,7 +271,7 @@ def _film(report: Report | None) -> Markup | None:
     )
 
 
-def _plan(course: Course, labels: Labels, report: Report | None, execution: Execution | None) -> Markup:
+def _plan(course: Course, labels: Labels, report: Report | None, execution: Executed | None) -> Markup:
     steps = sum(1 for _ in course.plan.walk())
     notes = execution.notes() if execution is not None else report.notes() if report is not None else {}
     calm = execution is None or not (execution.episode.interventions or execution.episode.failures)
@@ -289,7 +312,7 @@ def _learned(memory: Memory | None, labels: Labels) -> Markup | None:
     )
 
 
-def _again(scene: Scene, report: Report | None, execution: Execution | None) -> str:
+def _again(scene: Known, report: Report | None, execution: Executed | None) -> str:
     path = scene.knowledge.path
     name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
     if execution is not None:

@@ -11,9 +11,7 @@ from planner.plan import Plan, Step
 from reasoner.symbols import FALSE, TRUE
 
 if TYPE_CHECKING:
-    from confab.explaining import Explanation
     from confab.labels import Labels
-    from confab.why import Account, Because, WhyNot
     from planner.causal_links import Purpose
 
 Notes = Mapping[tuple[int, ...], str]
@@ -81,7 +79,7 @@ def tree(
             head += [" ", tag("span", MEANT[ok][0], class_=MEANT[ok][1])]
         if note.strip("✓ "):
             head += [" ", tag("span", note, class_="bad" if "✗" in note else "note")]
-        body = [*_reasons(why.get(step.path)), *_numbers(step, bar, labels)]
+        body = [*(why[step.path].reasons() if step.path in why else ()), *_numbers(step, bar, labels)]
         below = [item(inner) for inner in step.steps]
         open_ = len(step.path) == 1 or (failed is not None and failed[: len(step.path)] == step.path)
         inside = [tag("summary", head), *body, tag("ul", below) if below else None]
@@ -90,18 +88,6 @@ def tree(
         )
 
     return tag("ul", [item(step) for step in plan.steps], class_="plan")
-
-
-def _reasons(why: Because | None) -> list[Markup]:
-    if why is None:
-        return []
-    more = len(why.needs) - 2
-    said = [tag("span", need) for need in why.needs[:2]] + ([tag("span", f"and {more} more")] if more > 0 else [])
-    gives = "; ".join(why.gives)
-    return [
-        tag("p", "gives ", tag("span", gives), class_="gives") if gives else Markup(""),
-        tag("p", "needed: ", said, class_="why"),
-    ]
 
 
 def _numbers(step: Step, bar: Bar | None, labels: Labels | None) -> list[Markup]:
@@ -229,53 +215,6 @@ def _axis(end: float, unit: str) -> Markup:
 
 
 # ------------------------------------------------------------------------------------------------------------ reasons
-
-
-def because(why: Because) -> str:
-    """Return why a step is there."""
-    return styled(
-        tag("p", tag("b", why.what), " ", tag("small", f"{why.number} · {why.step}")),
-        tag("p", "gives ", "; ".join(why.gives), class_="gives"),
-        tag("ul", [tag("li", need) for need in why.needs], class_="why"),
-    )
-
-
-def why_not(told: WhyNot) -> str:
-    """Return why something else isn't done."""
-    return styled(
-        tag("p", told.answer),
-        tag("ul", [tag("li", line) for line in told.lacks], class_="bad") if told.lacks else None,
-        tag("ol", [tag("li", line) for line in told.steps]) if told.steps else None,
-    )
-
-
-def account(told: Account) -> str:
-    """Return why each step of a plan is there."""
-    below: dict[tuple[int, ...], list[Because]] = {}
-    for step in told.steps:
-        below.setdefault(step.path[:-1], []).append(step)
-
-    def item(step: Because) -> Markup:
-        inner = [item(other) for other in below.get(step.path, ())]
-        head = [tag("span", step.what, class_="what"), " ", tag("small", step.number)]
-        inside = [tag("summary", head), _reasons(step), tag("ul", inner) if inner else None]
-        return tag("li", tag("details", inside, open=len(step.path) == 1))
-
-    return styled(tag("p", told.headline), tag("ul", [item(step) for step in below.get((), ())], class_="plan"))
-
-
-def explanation(told: Explanation) -> str:
-    """Return what memory says for a choice and against it."""
-    if not told.other:
-        return styled(tag("p", str(told)))
-    rows = [
-        tag("tr", tag("td", f"{why.weight:+.2f}", class_="number"), tag("td", why.says or f"{why.fact}: {why.chosen}"),
-            tag("td", why.says_other or why.other))
-        for why in told.reasons[:12]
-    ]  # fmt: skip
-    head = tag("tr", [tag("th", name) for name in ("weight", told.chosen, f"not: {told.other}")])
-    note = tag("p", told.note, class_="note") if told.note else None
-    return styled(tag("p", f"lead {told.lead:+.2f}"), tag("div", tag("table", head, rows), class_="scroll"), note)
 
 
 def verdict(told: Any) -> str:

@@ -70,7 +70,7 @@ def test_a_false_no_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     def no(_: Request) -> Outcome:
         return Outcome(Status.UNSOLVABLE, reason=Reason("seeded"))
 
-    monkeypatch.setattr("confab.scene.solve", no)
+    monkeypatch.setattr("confab.planning.solve", no)
     monkeypatch.setattr("benchmarks.broken_inputs.DOMAINS", ("ferry",))
     monkeypatch.setattr(fuzz, "DOMAINS", ("ferry",))
     monkeypatch.setitem(

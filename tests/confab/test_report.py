@@ -16,10 +16,10 @@ from click.testing import CliRunner
 import confab
 from confab.cli import app
 from confab.memory import Memory
-from confab.report import report_html
 from confab.report.course import of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of
 from confab.report.notebook import SHOWN
+from confab.report.page import report_html
 from confab.report.pieces import anchor
 from confab.table import Table
 from planner.plan import Plan
@@ -66,8 +66,13 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def serving() -> confab.Result:
-    return confab.load("beverage-serving").plan()
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def serving(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +87,10 @@ def failed(serving: confab.Result) -> confab.Report:
 
 
 @pytest.fixture(scope="module")
-def pages(serving: confab.Result, failed: confab.Report, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    scene, memory = serving.scene, Memory.of(serving.scene)
+def pages(
+    scene: confab.Scene, serving: confab.Result, failed: confab.Report, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, str]:
+    memory = Memory.of(scene)
     memory.learn(scene, serving.plan)
     made = {
         "plan": report_html(scene, serving),
@@ -178,8 +185,7 @@ def test_what_is_quoted_is_escaped(serving: confab.Result, failed: confab.Report
     assert "<script>alert" not in report_html(serving.scene, serving, report)
 
 
-def test_notebooks_show_the_same_pieces(serving: confab.Result, failed: confab.Report) -> None:
-    scene = serving.scene
+def test_notebooks_show_the_same_pieces(scene: confab.Scene, serving: confab.Result, failed: confab.Report) -> None:
     shown = [
         scene, serving, failed, scene.execute(), Memory.of(scene), serving.why(0), serving.why_not("B1_MOVE cup2 location1"),
         serving.explain(),
@@ -196,9 +202,11 @@ def test_notebooks_show_the_same_pieces(serving: confab.Result, failed: confab.R
     assert isinstance(Memory.of(scene).counts(), Table)
 
 
-def test_a_result_and_an_execution_write_their_page(serving: confab.Result, tmp_path: Path) -> None:
+def test_a_result_and_an_execution_write_their_page(
+    scene: confab.Scene, serving: confab.Result, tmp_path: Path
+) -> None:
     assert serving.report(tmp_path / "plan.html").read_text().startswith("<!doctype html>")
-    assert serving.scene.execute().report(tmp_path / "run.html").read_text().rstrip().endswith("</html>")
+    assert scene.execute().report(tmp_path / "run.html").read_text().rstrip().endswith("</html>")
 
 
 WATCH = """<script>

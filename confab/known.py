@@ -1,0 +1,363 @@
+"""What is known of a scene, at the front desk: read, asked in SPARQL, edited and changed."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, overload
+
+import pyoxigraph as ox
+
+from confab.accepting import sparql_of
+from confab.table import Table
+from reasoner.graph.inference import infer
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.names import Names, nearest
+from reasoner.reading.problem import Reading, parse_fact, read
+from reasoner.symbols import Fact, Problem
+
+if TYPE_CHECKING:
+    import rdflib
+
+    from reasoner.embodiment.values import Embodiment
+    from reasoner.graph.apart import QueryLimits
+    from reasoner.graph.mirror import Mirror
+
+log = logging.getLogger(__name__)
+S = TypeVar("S", bound="Known")
+
+
+@dataclass
+class Known:
+    """What is known of a scene: read, asked in SPARQL, edited and changed; `confab.scene.Scene` adds what is done in it.
+
+    Attributes
+    ----------
+    knowledge : KnowledgeGraph
+        The store behind it.
+    seconds : mapping of stage to seconds
+        What loading took.
+    """
+
+    knowledge: KnowledgeGraph
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    _edited: bool = field(default=False, init=False, repr=False, compare=False)
+
+    _told: bool = field(default=False, init=False, repr=False, compare=False)
+
+    @cached_property
+    def reading(self) -> Reading:
+        """The whole scene as the planner takes it, and the table that leads from its names back to IRIs.
+
+        `plan` does without it: it reads what the task can need.
+        """
+        self.settle()
+        self.knowledge.require_whole()
+        return read(self.knowledge)
+
+    @property
+    def iri(self) -> str:
+        """The IRI of the scene's ontology."""
+        return self.knowledge.scene
+
+    @property
+    def problem(self) -> Problem:
+        """What is there, what can be done, what holds and what is wanted."""
+        return self.reading.problem
+
+    @cached_property
+    def names(self) -> Names:
+        """Short names and the IRIs behind them; where the scene can't be read, of all that its files speak of."""
+        try:
+            return self.reading.names
+        except KnowledgeError:
+            quads = self.knowledge.store
+            return Names(term.value for q in quads for term in q.triple if isinstance(term, ox.NamedNode))
+
+    @property
+    def objects(self) -> dict[str, str]:
+        """The objects by name, each with its most specific class.
+
+        Examples
+        --------
+        >>> import confab
+        >>> list(confab.load("beverage-serving").objects.items())[:3]
+        [('bottle1', 'Bottle'), ('bottle2', 'Bottle'), ('cup1', 'Cup')]
+        """
+        self.settle()
+        problem = self.problem
+        spoken_of = {symbol.arguments[0]: "" for symbol in problem.initial if symbol.arguments}
+        names = dict.fromkeys((*problem.classes.get("Object", ()), *sorted(spoken_of)))
+        kinds = {name: [kind for kind, members in problem.classes.items() if name in members] for name in names}
+        above = {name: {sup for kind in of for sup in problem.parents.get(kind, ())} for name, of in kinds.items()}
+        own = {name: " ".join(k for k in of if k not in above[name] and "|" not in k) for name, of in kinds.items()}
+        return dict(sorted(own.items(), key=lambda pair: pair[1]))
+
+    @property
+    def facts(self) -> list[str]:
+        """What holds in the beginning, each as `with_fact` takes it.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").facts[:2]
+        ['bottle1 BEVERAGE beverage1', 'bottle1 LOCATION location4']
+        """
+        self.settle()
+        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.initial.items())
+
+    @property
+    def goals(self) -> list[str]:
+        """What is wanted, each as `with_goal` and `plan` take it.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").goals[:2]
+        ['bottle1 LOCATION location4', 'bottle2 LOCATION location3']
+        """
+        self.settle()
+        return sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items())
+
+    def with_fact(self: S, *facts: str) -> S:
+        """Return a scene in which some facts hold, each in place of what was stated of its symbol; this one stays as it is.
+
+        Raises
+        ------
+        KnowledgeError
+            A word names nothing of its kind, or the store is a remote one.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").with_fact("cup1 LOCATION location7").plan().plan.length
+        {1: 3, 2: 8, 3: 26}
+        """
+        from reasoner.reading.restating import with_facts
+
+        return self._restated(with_facts, facts)
+
+    def with_goal(self: S, *goals: str) -> S:
+        """Return a scene in which some facts are wanted, each in place of the goal of its symbol; this one stays as it is.
+
+        Raises
+        ------
+        KnowledgeError
+            As `with_fact`.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").with_goal("cup2 LOCATION location8").plan().plan.length
+        {1: 5, 2: 12, 3: 38}
+        """
+        from reasoner.reading.restating import with_goals
+
+        return self._restated(with_goals, goals)
+
+    def _restated(
+        self: S, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: Iterable[str]
+    ) -> S:
+        self.settle()
+        copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, fact)) for fact in facts])
+        infer(copy)
+        return type(self)(copy, dict(self.seconds))
+
+    @cached_property
+    def graph(self) -> rdflib.Graph:
+        """The scene's triples as an rdflib graph; what is added to it or removed from it counts in `query` and `plan` at once."""
+        from reasoner.graph.rdflib_graph import rdflib_graph
+
+        self.settle()
+        return rdflib_graph(self.knowledge, self._forget)
+
+    @cached_property
+    def embodiment(self) -> Embodiment:
+        """What the ontology says about bodies: robot, furniture, shapes, skills and perceivers.
+
+        Raises
+        ------
+        KnowledgeError
+            The scene is symbolic only.
+        EmbodimentError
+            Something that physics needs isn't said; the message names it.
+        """
+        from reasoner.embodiment.reading import read_embodiment
+
+        self.knowledge.require_whole()
+        if self.knowledge.select("SELECT ?why WHERE { ?ontology :symbolicOnly ?why }"):
+            raise KnowledgeError(
+                f"{self.iri} is symbolic only: it states reach without geometry, so physics can't verify it"
+            )
+        return read_embodiment(self.knowledge.store, self.names.short, self.knowledge.folders)
+
+    @cached_property
+    def _mirror(self) -> Mirror:
+        from reasoner.graph.mirror import Mirror
+
+        return Mirror(self.knowledge)
+
+    @property
+    def owl(self) -> Any:
+        """The scene as an owlready2 world; what is added through it is seen by `query` and `plan`."""
+        return self._mirror.world
+
+    def _forget(self) -> None:
+        """Forget what was read before an edit."""
+        for name in ("reading", "names", "embodiment"):
+            self.__dict__.pop(name, None)
+        self._edited = True
+
+    def settle(self) -> None:
+        """Take over what was edited through `owl`, and conclude anew what follows from what was edited anywhere."""
+        if "_mirror" in self.__dict__ and self._mirror.pull():
+            self.__dict__.pop("graph", None)
+            self._forget()
+        if self._edited:
+            self._edited = False
+            infer(self.knowledge)
+
+    def query(self, sparql: str, limits: QueryLimits | None = None) -> Table:
+        """Return what a SPARQL 1.1 query answers, as a table: the rows of SELECT, the truth of ASK, the triples of CONSTRUCT.
+
+        The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
+
+        Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
+        no such name. It is answered in a process of its own: see `reasoner.graph.apart`.
+
+        Raises
+        ------
+        KnowledgeError
+            The query isn't SPARQL; the message has line and column. Or it asks another endpoint without leave.
+        LimitError
+            It takes more time, rows or memory than the limits allow.
+
+        Examples
+        --------
+        >>> import confab
+        >>> scene = confab.load("beverage-serving")
+        >>> scene.query("SELECT ?where WHERE { :cup1 k:location ?where }")[0]
+        ('location2',)
+        >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
+        False
+        """
+        from reasoner.graph.apart import ask, unheard_of
+
+        sparql = sparql_of(sparql)
+        kind, columns, found = ask(self._asked(sparql), sparql, limits)
+        if kind == "truth":
+            return Table(("answer",), ((str(found).lower(),),), truth=found)
+        if not found and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
+            log.warning("confab: the scene doesn't speak of %s; is the prefix the right one?", ", ".join(unheard))
+        columns = ["subject", "predicate", "object"] if kind == "triples" else columns
+        rows = tuple(tuple(self._cell(term) for term in row) for row in found)
+        return Table(tuple(columns), rows, tuple(map(tuple, found)))
+
+    def with_episodes(self: S, *files: str | Path) -> S:
+        """Return the scene with saved episodes in it, so that `query` can ask about all of them.
+
+        Raises
+        ------
+        KnowledgeError
+            A file holds no episode, or two hold one of the same name.
+        """
+        from reasoner.memory.episodes import read_episodes
+
+        read_episodes(self.knowledge, map(Path, files))
+        return self
+
+    def _asked(self, sparql: str) -> KnowledgeGraph:
+        """Return the graph as a query shall see it; what is missing in it is told once."""
+        from reasoner.reading.affordance import SITUATION, write_situation
+
+        self.settle()
+        if SITUATION in sparql:
+            write_situation(self.knowledge, self.reading)
+        for fault in () if self._told else self.knowledge.faults:
+            log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
+        self._told = True
+        return self.knowledge
+
+    @overload
+    def construct(self, sparql: str, path: None = None, limits: QueryLimits | None = None) -> rdflib.Graph: ...
+
+    @overload
+    def construct(self, sparql: str, path: str | Path, limits: QueryLimits | None = None) -> int: ...
+
+    def construct(
+        self, sparql: str, path: str | Path | None = None, limits: QueryLimits | None = None
+    ) -> rdflib.Graph | int:
+        """Return the triples that a CONSTRUCT query gives; or write them into a file that imports this scene, and return how many.
+
+        Raises
+        ------
+        KnowledgeError, LimitError
+            As `query`; the query gives no triples but rows.
+        """
+        sparql = sparql_of(sparql)
+        if path is not None:
+            from reasoner.graph.construct import write_construct
+
+            return write_construct(self._asked(sparql), sparql, Path(path), limits)
+        import rdflib
+
+        return rdflib.Graph().parse(data=self.query(sparql, limits).turtle(self.knowledge.spoken), format="turtle")
+
+    def applicable_query(self, behavior: str) -> str:
+        """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
+        from reasoner.graph.apart import standing_alone
+        from reasoner.reading.affordance import applicable_query
+        from reasoner.reading.quantification import behavior_named
+
+        query = applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
+        return standing_alone(self.knowledge, query)
+
+    def quantifying_query(self, behavior: str) -> str:
+        """Return the SPARQL query that quantifies a behaviour: a row for each way to put individuals in for its parameters."""
+        from reasoner.graph.apart import standing_alone
+        from reasoner.reading.quantification import behavior_named, query_for
+
+        return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))
+
+    def affordances(self, of: str | None = None) -> Table:
+        """Return what objects afford in the initial situation: object, behaviour, arguments, situation, effect.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no object of that name; ``all`` and None stand for every object.
+        """
+        from reasoner.reading.affordance import affordances
+
+        known = {name for members in self.problem.classes.values() for name in members}
+        if of not in (None, "all", *known):
+            raise KnowledgeError(f"unknown object '{of}'{nearest(str(of), known)}")
+        found = affordances(self.knowledge, self.reading)
+        return Table(
+            ("object", "behavior", "arguments", "situation", "effect"),
+            tuple(
+                (a.object, a.behavior, " ".join(a.arguments), _sentence(a.situation), _sentence(a.effect))
+                for a in found
+                if of in (None, "all", a.object)
+            ),
+        )
+
+    def _cell(self, term: Any) -> str | None:
+        if term is None:
+            return None
+        value = str(getattr(term, "value", term))
+        return self.names.short(value) if type(term).__name__ == "NamedNode" else value
+
+    def __repr__(self) -> str:
+        """Return what the scene is, in one line."""
+        problem = self.problem
+        return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
+
+
+def _sentence(facts: Iterable[Fact]) -> str:
+    return "; ".join(map(str, facts))

@@ -1,0 +1,393 @@
+"""Planning at the front desk: from a scene and options to a result, which says what came of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from confab.accepting import Facts, number, several
+from confab.interchange import outcome_json
+from confab.known import Known
+from planner.plan import Limits, Outcome, Plan, Status, paused_collection, renumbered
+from planner.solve import DEFAULT_MODE, MODES, Request, solve
+from planner.validation import validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import Deadline
+from reasoner.memory.links import Links
+from reasoner.names import nearest
+from reasoner.reading.problem import Reading, read, with_goals
+from reasoner.reading.relevance import recognise
+from reasoner.symbols import FALSE, TRUE, Problem
+
+if TYPE_CHECKING:
+    import networkx
+    from rich.tree import Tree
+
+    from confab.execution import Execution
+    from confab.labels import Labels
+    from confab.memory import Memory
+    from confab.physics import Report
+    from confab.why import Account, Because, WhyNot
+    from planner.causal_links import Purpose
+
+NO_ENGINE = "none"
+"""In place of an engine's name: no engine at all."""
+OPTIMAL_SECONDS = 10.0
+"""Where the search for the best plan stops if no time limit is given."""
+
+
+def plan(
+    scene: Known,
+    goals: Facts = (),
+    memory: Memory | Links | str | Path | None = None,
+    mode: str = DEFAULT_MODE,
+    time_limit: float | Deadline | None = None,
+    optimal: bool = False,
+    observed: str | Path | None = None,
+    engine: str | None = None,
+    level: int | None = None,
+    leave_levels: bool = True,
+) -> Result:
+    """Plan in this scene.
+
+    Parameters
+    ----------
+    goals : str or iterable of str
+        Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
+    memory : Memory, its file or endpoint, or Links alone in paper mode; optional
+        What was learned before; none if left out.
+    mode : str
+        ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
+        ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
+        it; behaviours are then numbered among the individuals that were recognised. ``optimal``: as `optimal` says.
+    time_limit : float or Deadline, optional
+        Seconds after which the call gives up, or when; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
+    optimal : bool
+        Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
+    observed : str or Path, optional
+        File of observed facts, which replace the scene's.
+    engine : str, optional
+        A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
+        where ours gives up at a limit other than that of time; with ``none`` none is.
+    level : int, optional
+        The level that the engine plans; the lowest if left out.
+    leave_levels : bool
+        Whether steps of a lower level may stand where a level has no plan that can be refined; the outcome says where, and
+        what they break that only the level above asks.
+
+    Raises
+    ------
+    KnowledgeError
+        A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
+    LimitError
+        The time was over before the search began; if it is over later, the outcome says so.
+    """
+    if level is not None and engine in (None, NO_ENGINE):
+        raise KnowledgeError("a level is chosen for an engine; name one, e.g. --engine fast-downward")
+    if engine not in (None, NO_ENGINE) and (mode == "paper" or optimal):
+        raise KnowledgeError("an engine plans by itself; leave out --optimal and the paper's mode")
+    if engine not in (None, NO_ENGINE) and not leave_levels:
+        raise KnowledgeError("an engine plans one level alone, so it may leave the others; leave out --levels strict")
+    if optimal and mode not in (DEFAULT_MODE, "optimal"):
+        raise KnowledgeError(f"--optimal means --mode optimal, and not --mode {mode}; leave one out")
+    optimal = optimal or mode == "optimal"
+    if optimal and (memory is not None or not leave_levels):
+        what = (
+            "uses no memory" if memory is not None else "compares plans of the lowest level, so it may leave the others"
+        )
+        raise KnowledgeError(f"the optimal search {what}; leave one option out")
+    if not isinstance(time_limit, Deadline):
+        number("time_limit", time_limit, "seconds as a number, e.g. 5")
+    scene.settle()
+    if mode not in MODES:
+        raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
+    if optimal and time_limit is None:
+        time_limit = OPTIMAL_SECONDS
+    scene.knowledge.require_whole()
+    deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
+    with scene.knowledge.until(deadline), paused_collection():
+        if isinstance(memory, str | Path):
+            from confab.memory import Memory
+
+            memory = Memory.load(memory, scene)
+        how = "optimal" if optimal else mode
+        return _plan(scene, several(goals), memory, how, deadline, observed, engine, level, leave_levels)
+
+
+def _plan(
+    scene: Known,
+    goals: list[str],
+    memory: Memory | Links | None,
+    mode: str,
+    deadline: Deadline,
+    observed: str | Path | None,
+    engine: str | None,
+    level: int | None,
+    leave_levels: bool,
+) -> Result:
+    begin, asked = perf_counter(), scene.knowledge.round_trips
+    links = memory if isinstance(memory, Links) or memory is None else memory.links
+    advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
+    grounds = None
+    if mode == "paper":
+        from reasoner.reading.quantification import quantify
+
+        seen = _seen(scene.reading, observed)
+        grounds = {level: quantify(scene.knowledge, seen, level) for level in seen.problem.domain.levels}
+    else:
+        seen = _seen(scene.reading, observed) if observed else recognise(scene.knowledge, goals)
+    scene.knowledge.confirm()
+    problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
+    quantified = perf_counter() - begin
+    _check_goal(scene, problem)
+
+    def search(problem: Problem) -> Outcome:
+        deadline.check("reading the problem")
+        if engine not in (None, NO_ENGINE):
+            from confab.engines import plan_by_engine
+
+            return plan_by_engine(problem, engine, level, deadline.left)
+        limits = Limits(seconds=deadline.left)
+        outcome = solve(Request(problem, mode, limits, advisor, links, grounds, leave_levels))
+        if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE or deadline.left == 0 or not leave_levels:
+            return outcome
+        return _by_any_engine(problem, deadline) or outcome
+
+    outcome = search(problem)
+    if outcome.status is Status.UNSOLVABLE and mode != "paper" and not observed:
+        # A "no" is worth a look at the whole world, whatever task recognition left out of it.
+        if "reading" not in scene.__dict__:
+            scene.reading = read(scene.knowledge, seen.schema)
+            scene.knowledge.confirm()
+        whole = replace(scene.problem, goal=problem.goal)
+        if whole != problem:
+            problem, outcome = whole, search(whole)
+    queries = scene.knowledge.round_trips - asked
+    return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries)
+
+
+def _by_any_engine(problem: Problem, deadline: Deadline) -> Outcome | None:
+    """Return the plan of whichever engine is installed, or None: none is, or none takes such a problem, or none solves it."""
+    from confab.engines import plan_by_engine
+
+    with suppress(KnowledgeError):
+        outcome = plan_by_engine(problem, None, None, deadline.left)
+        return outcome if outcome.status is Status.SOLVED else None
+    return None
+
+
+def _check_goal(scene: Known, problem: Problem) -> None:
+    """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type."""
+    if not problem.goal:
+        raise KnowledgeError(f"{scene.iri} has no task with goals; plan in a scene that has one, or give a goal")
+    allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}
+    for symbol, value in problem.goal.items():
+        if value not in allowed[symbol.situation]:
+            values = allowed[symbol.situation] - {TRUE, FALSE}
+            raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
+
+
+def _seen(reading: Reading, observed: str | Path | None) -> Reading:
+    from reasoner.reading.observed import load_observed
+
+    return reading if observed is None else load_observed(Path(observed), reading)
+
+
+@dataclass
+class Result:
+    """What came of planning: the outcome, and the scene in which it holds.
+
+    `problem` has the individuals that the task can need; `queries` is how many the store was asked.
+    """
+
+    scene: Known
+    problem: Problem
+    outcome: Outcome
+    seconds: dict[str, float]
+    queries: int = 0
+
+    @property
+    def plan(self) -> Plan:
+        """The plan; raises `KnowledgeError` with the reason if there is none."""
+        if self.outcome.plan is None:
+            reason = self.outcome.reason.text if self.outcome.reason else ""
+            raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
+        return self.outcome.plan
+
+    def in_order(self, *ids: int) -> Plan:
+        """Return the plan with its steps of the first level in another order, as somebody may have shown it.
+
+        Raises
+        ------
+        KnowledgeError
+            These aren't the IDs of the steps of the first level, each once; or the plan can't be done in that order.
+
+        Examples
+        --------
+        >>> import confab
+        >>> [step.id for step in confab.load("beverage-serving").plan().in_order(22, 34, 28, 39).steps]
+        [22, 34, 28, 39]
+        """
+        waiting = list(self.plan.steps)
+        there = [step.id for step in waiting]
+        if sorted(there) != sorted(ids):
+            raise KnowledgeError(
+                f"wanted {', '.join(map(str, there))} in another order; got {', '.join(map(str, ids)) or 'nothing'}"
+            )
+        steps = [waiting.pop(next(i for i, step in enumerate(waiting) if step.id == wanted)) for wanted in ids]
+        plan = Plan(renumbered(steps))
+        if faults := validate(self.problem, plan):
+            raise KnowledgeError(f"the plan can't be done in that order: {faults[0].text}")
+        return plan
+
+    def verify(self, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+        """Carry out the plan in PyBullet: see `confab.physics.verify`."""
+        from confab.physics import verify
+
+        self.scene.settle()
+        return verify(self.scene, self.plan, rollouts, seed, **{"goal": self.problem.goal, **options})
+
+    def execute(self, interventions: Facts = (), **options: Any) -> Execution:
+        """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
+        from confab.execution import carry_out
+
+        return carry_out(self.scene, self, interventions, **options)
+
+    @cached_property
+    def labels(self) -> Labels:
+        """What people call the behaviours, situation types and individuals of the problem."""
+        from confab.labels import labels_of
+
+        return labels_of(self.scene.knowledge, self.scene.names, self.problem)
+
+    @cached_property
+    def purposes(self) -> dict[tuple[int, ...], Purpose]:
+        """The causal links of each step, by its path (`planner.causal_links`)."""
+        from planner.causal_links import purposes
+
+        return purposes(self.problem, self.plan)
+
+    def why(self, step: int | str | tuple[int, ...]) -> Because:
+        """Return why a step is in the plan: what it gives, and what needs that.
+
+        Parameters
+        ----------
+        step : int, str or path
+            Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").plan().why("pick cup 1")
+        L2#0  pick cup 1 with left hand
+          gives   left hand holds cup 1 (before: nothing)
+          gives   cup 1 is in a hand (before: location 2)
+          because “place cup 1 in left hand to location 7” (L2#1) asks that left hand holds cup 1
+        """
+        from confab.why import because, find_step
+
+        found = find_step(self.plan, step, self.labels)
+        return because(self.plan, found, self.purposes[found.path], self.labels)
+
+    def why_not(self, asked: str, instead: int | str | None = None, seconds: float | None = None) -> WhyNot:
+        """Return why something else isn't done: what it lacks, or what plan follows from it and what that costs more.
+
+        Parameters
+        ----------
+        asked : str
+            ``cup2 LOCATION location8``, also with ``by left_hand``; or ``B2_PICK right_hand cup1``, ``B2_PICK hand=right_hand``.
+        instead : int or str, optional
+            In the place of which step; if left out, of the most similar one where it can be done.
+        seconds : float, optional
+            Limit of each planning call.
+        """
+        from confab.why import find_step, why_not
+
+        number("seconds", seconds, "seconds as a number, e.g. 5")
+        labels = self.labels
+
+        def ask(problem: Problem) -> Outcome:
+            return solve(Request(problem, DEFAULT_MODE, Limits(seconds=seconds)))
+
+        def replan(goals: Sequence[str]) -> tuple[Problem, Outcome, Labels]:
+            other = plan(self.scene, goals, time_limit=seconds)
+            return other.problem, other.outcome, other.labels
+
+        place = None if instead is None else find_step(self.plan, instead, labels)
+        return why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+
+    def explain(self) -> Account:
+        """Return why each step of the plan is there; or, where there is no plan, why."""
+        from confab.show import summary
+        from confab.why import Account, account
+
+        headline = summary(self.outcome)
+        return account(self.plan, self.purposes, self.labels, headline) if self.solved else Account(headline)
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a plan."""
+        return self.outcome.status is Status.SOLVED
+
+    def json(self) -> dict[str, Any]:
+        """Return the result as JSON data (docs/command-line.md)."""
+        return {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
+
+    def graph(self) -> networkx.DiGraph[tuple[int, ...]]:
+        """Return the plan as a directed graph: a node per step (by path), edges to sub-steps and to what follows."""
+        import networkx
+
+        graph: networkx.DiGraph[tuple[int, ...]] = networkx.DiGraph()
+        for step in self.plan.walk():
+            graph.add_node(step.path, label=str(step), level=step.level, id=step.id)
+            graph.add_edges_from(((step.path, below.path) for below in step.steps), kind="refines")
+            graph.add_edges_from(((a.path, b.path) for a, b in pairwise(step.steps)), kind="then")
+        graph.add_edges_from(((a.path, b.path) for a, b in pairwise(self.plan.steps)), kind="then")
+        return graph
+
+    def save(self, path: str | Path) -> Path:
+        """Write the result as JSON and return where."""
+        from reasoner.files import write_whole
+
+        write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
+        return Path(path)
+
+    def __rich__(self) -> Tree | str:
+        """Return a tree for rich."""
+        from confab.show import plan_tree, summary
+
+        return plan_tree(self.plan, summary(self.outcome)) if self.solved else summary(self.outcome)
+
+    def __repr__(self) -> str:
+        """Return the summary and the steps of the most abstract level."""
+        from confab.show import summary
+
+        steps = self.outcome.plan.steps if self.outcome.plan else ()
+        return "\n".join([summary(self.outcome), *(f"  {step}" for step in steps)])
+
+    def report(self, path: str | Path) -> Path:
+        """Write the plan, with its reasons, as one HTML page, and return where."""
+        from confab.report.page import report_html, write_report
+
+        return write_report(path, report_html(self.scene, self))
+
+    def _repr_html_(self) -> str:
+        from confab.report.course import of_plan
+        from confab.report.markup import styled, tag
+        from confab.report.page import MOST_STEPS
+        from confab.report.pieces import timeline, tree
+        from confab.show import summary
+
+        headline = tag("p", summary(self.outcome))
+        if self.outcome.plan is None:
+            return styled(headline)
+        needed = self.purposes if sum(1 for _ in self.plan.walk()) <= MOST_STEPS else None
+        course = of_plan(self.problem, self.plan)
+        return styled(headline, timeline(course, self.labels), tree(self.plan, self.labels, None, needed))
