@@ -299,12 +299,13 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
 def _learned(memory: Memory | None, labels: Labels) -> Markup | None:
     if memory is None:
         return None
-    columns = ("behaviour", "where this held", "chosen", "passed over", "relevance")
-    rows = [
-        (labels.name(str(behavior)), sentence(str(fact), str(value), labels, {}), chosen, passed, relevance)
+    found = [
+        (-float(relevance or 0), sentence(str(fact), str(value), labels, {}), str(behavior), f"{chosen} : {passed}")
         for behavior, fact, value, chosen, passed, _, _, relevance in memory.counts(LEARNED * LEARNED)
     ]
-    rows = sorted(rows, key=lambda row: (-float(row[-1] or 0), len(row[1])))[:LEARNED]  # of equals the plainest
+    found.sort(key=lambda row: (row[0], len(row[1])))  # the most relevant; of equals the plainest
+    columns = ("behaviour", "where this held", "chosen : passed over")
+    rows = [(labels.name(behavior), said, counts) for _, said, behavior, counts in found[:LEARNED]]
     return joined(
         tag("h2", "What was learned"),
         tag("p", memory.said()),
