@@ -32,6 +32,7 @@ COMMANDS = {  # as the help lists them, the main one first
     "validate": ("authoring", "validate"),
     "explain": ("planning", "explain"),
     "generate": ("authoring", "generate"),
+    "convert": ("authoring", "convert"),
     "import": ("authoring", "import_"),
     "export": ("authoring", "export"),
 }

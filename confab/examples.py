@@ -28,6 +28,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab query beverage-serving 'ASK { :cup1 a k:Cup }'",
         "confab query beverage-serving 'SELECT * WHERE { :cup1 ?p ?o }' -o cup1.csv",
         "confab query beverage-serving --show B2_PICK",
+        "confab query beverage-serving --show B2_PICK --update",
         "confab query beverage-serving --affords cup1",
     ),
     "serve": (
@@ -64,6 +65,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab generate full --objects 8 --hands 3 --seed 7 -o full.ttl",
     ),
     "import": ("confab import domain.pddl problem.pddl -o scene.ttl",),
+    "convert": (
+        "confab convert mine.ttl --behaviors sparql",
+        "confab convert mine.ttl --behaviors individuals -o mine.ttl",
+    ),
     "export": ("confab export towers-small -o towers",),
 }
 

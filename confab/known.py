@@ -317,6 +317,23 @@ class Known:
         query = applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
         return standing_alone(self.knowledge, query)
 
+    def update_of(self, behavior: str) -> str:
+        """Return a behaviour as a SPARQL update, as it can be written in an ontology (docs/authoring.md).
+
+        Raises
+        ------
+        KnowledgeError
+            There is no such behaviour, or it says something that an update can't say.
+        """
+        from reasoner.reading.quantification import behavior_named
+        from reasoner.updates.converting import update_of
+
+        name = behavior_named(self.reading, behavior).name
+        try:
+            return update_of(self.knowledge, self.reading.schema, self.names.iri(name))
+        except ValueError as error:
+            raise KnowledgeError(f"{name} can't be shown as an update: {error}") from error
+
     def quantifying_query(self, behavior: str) -> str:
         """Return the SPARQL query that quantifies a behaviour: a row for each way to put individuals in for its parameters."""
         from reasoner.graph.apart import standing_alone

@@ -71,6 +71,7 @@ FORMS = {
 )
 @click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies it.")
 @click.option("--applicable", is_flag=True, help="With --show: the query with its preconditions, where it can be done.")
+@click.option("--update", is_flag=True, help="With --show: the behaviour itself, as a SPARQL update.")
 @click.option("--affords", metavar="OBJECT", help="List what an object affords here; 'all' for every object.")
 @click.option("--format", "form", help="table, csv, json; or a standard one: tsv, sparql-json, sparql-xml.")
 @click.option("--iris", is_flag=True, help="Whole IRIs in place of short names.")
@@ -94,6 +95,7 @@ def query(
     episodes: tuple[Path, ...],
     show: str | None,
     applicable: bool,
+    update: bool,
     affords: str | None,
     form: str | None,
     iris: bool,
@@ -114,7 +116,14 @@ def query(
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
     if applicable and show is None:
         raise KnowledgeError("--applicable says which query --show prints; give --show BEHAVIOR, too")
+    if update and (applicable or show is None):
+        raise KnowledgeError(
+            "--update shows the behaviour that --show names; give --show BEHAVIOR, and not --applicable"
+        )
     loaded = load_scene(scene, iri).with_episodes(*episodes)
+    if show is not None and update:
+        print(loaded.update_of(show), end="")
+        return
     if show is not None:
         print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
         return

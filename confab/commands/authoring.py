@@ -145,6 +145,38 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
+@click.command(epilog=examples("convert"))
+@click.argument("file", type=PATH, metavar="FILE.ttl")
+@click.option(
+    "--behaviors",
+    "form",
+    type=click.Choice(["sparql", "individuals"]),
+    required=True,
+    help="Write each behaviour as one SPARQL update, or its conditions and effects as individuals.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    type=PATH,
+    metavar="FILE.ttl",
+    help="File to write; what it is goes to the terminal if not given.",
+)
+def convert(file: Path, form: str, out: Path | None) -> None:
+    """Write the behaviours of a file in another form."""
+    from confab.authoring import turtle_path
+    from reasoner.updates.converting import convert as converted
+
+    found = converted(file, "sparql" if form == "sparql" else "individuals")
+    if out is None:
+        show_result(found.text.rstrip())
+    else:
+        turtle_path(out).write_text(found.text, encoding="utf-8")
+        print(f"{out}: {len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")
+    for note in found.notes:
+        remark(note)
+
+
 @click.command("import", epilog=examples("import"))
 @click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
 @click.argument("problem", type=PATH, metavar="PROBLEM.pddl")

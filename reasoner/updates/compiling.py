@@ -48,7 +48,10 @@ Ask = Callable[[str], Sequence[Sequence[Any]]]
 """Returns the rows of a query."""
 
 UPDATES = """SELECT ?behavior ?property ?value WHERE {
-  VALUES ?property { :update :extends } ?behavior ?property ?value } ORDER BY ?behavior ?property ?value"""
+  VALUES ?property { :update :extends } ?behavior ?property ?value
+  FILTER NOT EXISTS { ?behavior :postcondition ?effect . FILTER(STR(?effect) = CONCAT(STR(?behavior), ".effect001")) }
+} ORDER BY ?behavior ?property ?value"""
+"""Of behaviours that aren't written out already, as they are in a store that took them from files."""
 VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
   { ?term a/rdfs:subClassOf* :SituationType . BIND("situation" AS ?kind) OPTIONAL { ?term :valueProperty ?other } }
   UNION { ?other a owl:FunctionalProperty . ?term :valueProperty ?other . BIND("functional" AS ?kind) }

@@ -14,7 +14,7 @@ from typing import Literal
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, text
+from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
 from reasoner.names import local_name
 from reasoner.reading.problem import Schema, as_written, read_schema
 from reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
@@ -106,14 +106,34 @@ def convert(path: Path, form: Form) -> Converted:
     KnowledgeError
         It is no Turtle file, it or what it imports can't be read, or an update in it has a fault.
     """
+    path = path.resolve()
     if path.suffix != ".ttl":
         raise KnowledgeError(f"{path}: only Turtle files are converted; save it as Turtle (Protégé: File, Save as …)")
-    graph = load(path)
+    graph = load(scene_file(path))
     file = _file(path)
     schema = read_schema(graph)
     typed = {iri for iri, said in file.said.items() if any(t[1].value == TYPE for s in said for t in s.triples)}
     own = [iri for iri in schema.of_kind("Behavior") if iri in typed]
     return _to_updates(file, graph, schema, own) if form == "sparql" else _to_individuals(file, graph, own)
+
+
+def update_of(graph: KnowledgeGraph, schema: Schema, iri: str) -> str:
+    """Return a behaviour as a SPARQL update, with the PREFIX lines that it needs.
+
+    Raises
+    ------
+    ValueError
+        It says something that an update can't say.
+    """
+    (behavior,) = as_written(schema, [iri]).values()
+    file = _File([], dict(sorted(graph.spoken.items(), key=lambda pair: pair[0] != "confab")))
+    written = update(behavior, situations_of(schema), file.spell)
+    used = {
+        prefix: namespace
+        for prefix, namespace in file.prefixes.items()
+        if re.search(rf"(?<![\w:]){prefix}:\w", written)
+    }
+    return "".join(f"PREFIX {prefix}: <{namespace}>\n" for prefix, namespace in sorted(used.items())) + written
 
 
 def _file(path: Path) -> _File:

@@ -4,9 +4,12 @@ import os
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import confab
+import ontology
 from confab.authoring import difference, migrate, new_domain, unknown_terms
+from confab.cli import app
 from confab.reaching import with_current_reach
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.links_file import memory_lines
@@ -108,3 +111,14 @@ def test_a_rename_that_means_nothing_is_refused(tmp_path: Path, rename: str, sai
     with pytest.raises(KnowledgeError, match=said):
         migrate(memory, [rename])
     assert memory.read_text() == MEMORY
+
+
+def test_the_commands_convert_a_file_and_show_a_behavior(tmp_path: Path) -> None:
+    short = tmp_path / "towers.ttl"
+    domain = str(ontology.ROOT / "domains" / "towers.ttl")
+    done = CliRunner().invoke(app, ["convert", domain, "--behaviors", "sparql", "-o", str(short)])
+    assert done.output == f"{short}: 6 behaviours written as updates\n"
+    assert "c:update" in short.read_text()
+    done = CliRunner().invoke(app, ["query", "towers-small", "--show", "L1_CARRY", "--update"])
+    assert done.exit_code == 0, done.output
+    assert "INSERT {" in done.output

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 import ontology
 from planner.solve import Request, solve
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from reasoner.graph.knowledge import SCENE, Answer, KnowledgeError, KnowledgeGraph, load, read_into
 from reasoner.names import local_name
 from reasoner.pddl.turtle import turtle
 from reasoner.reading.problem import as_written, read, read_schema
@@ -220,6 +221,36 @@ def test_what_two_levels_share_is_said_once(tmp_path: Path) -> None:
     (tmp_path / "small.ttl").write_text(text.replace("c:update", "c:extends :LOW ; c:update") + more)
     with pytest.raises(KnowledgeError, match="extends itself"):
         load(tmp_path / "small.ttl")
+
+
+def test_what_is_written_out_already_is_left_so(tmp_path: Path) -> None:
+    said = only(tmp_path, f"{HEAD}}}")
+    lines = load(tmp_path / "small.ttl").ntriples().splitlines(keepends=True)
+    own = b"".join(line for line in lines if line.startswith(b"<https://example.org/small"))
+    (tmp_path / "small.ttl").write_bytes(own)
+    (found,) = behaviors(load(tmp_path / "small.ttl")).values()
+    assert plainly(found) == plainly(said)
+
+
+def test_a_store_elsewhere_has_the_text_alone(tmp_path: Path) -> None:
+    said = only(tmp_path, f"{HEAD}}}")
+    path = tmp_path / "small.ttl"
+    graph = KnowledgeGraph("https://example.org/small")
+    for file in (ontology.ROOT / "core.ttl", path):
+        read_into(graph, file, "asserted")
+    remote = KnowledgeGraph(graph.scene, remote=Elsewhere(graph))
+    (found,) = behaviors(remote).values()
+    assert plainly(found) == plainly(said)
+
+
+@dataclass
+class Elsewhere:
+    """A store that answers as an endpoint does."""
+
+    graph: KnowledgeGraph
+
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+        return self.graph.query(query, SCENE, **bindings)
 
 
 def test_validation_and_loading_say_a_fault_with_the_line_of_the_file(tmp_path: Path) -> None:
