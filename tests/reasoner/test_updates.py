@@ -249,7 +249,7 @@ class Elsewhere:
 
     graph: KnowledgeGraph
 
-    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str]) -> Answer:
+    def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
         return self.graph.query(query, SCENE, **bindings)
 
 
