@@ -11,6 +11,8 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
+from importlib.util import find_spec
+from pkgutil import iter_modules
 from time import perf_counter
 
 from confab.pddl_commands import read_pddl_plan
@@ -68,6 +70,11 @@ def plan_by_engine(
         if not faults:
             return outcome(Status.SOLVED, plan)
     return outcome(Status.GAVE_UP, reason=f"its plan is none here: {faults[0].text}")
+
+
+def some_installed() -> bool:
+    """Whether unified-planning and an engine seem to be there, by names: importing them takes longer than most plans."""
+    return find_spec("unified_planning") is not None and any(m.name.startswith("up_") for m in iter_modules())
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:

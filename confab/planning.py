@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
+OURS = 0.6
+"""Of a time limit, the share of our own search where an engine is installed that is asked next."""
 OPTIMAL_SECONDS = 10.0
 """Where the search for the best plan stops if no time limit is given."""
 
@@ -75,7 +77,7 @@ def plan(
         File of observed facts, which replace the scene's.
     engine : str, optional
         A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
-        where ours gives up at a limit other than that of time; with ``none`` none is.
+        where ours gives up, for which two fifths of a time limit are kept; with ``none`` none is.
     level : int, optional
         The level that the engine plans; the lowest if left out.
     leave_levels : bool
@@ -154,9 +156,13 @@ def _plan(
             from confab.engines import plan_by_engine
 
             return plan_by_engine(problem, engine, level, deadline.left)
-        limits = Limits(seconds=deadline.left)
-        outcome = solve(Request(problem, mode, limits, advisor, links, grounds, leave_levels))
-        if outcome.status is not Status.GAVE_UP or engine == NO_ENGINE or deadline.left == 0 or not leave_levels:
+        others, seconds = leave_levels and engine != NO_ENGINE, deadline.left
+        if others and seconds is not None:
+            from confab.engines import some_installed
+
+            seconds *= OURS if some_installed() else 1.0
+        outcome = solve(Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels))
+        if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
         return _by_any_engine(problem, deadline) or outcome
 

@@ -41,6 +41,7 @@ from reasoner.symbols import (
     Condition,
     Problem,
     RelationCondition,
+    SituationType,
     ValueCondition,
     Witness,
     allowed,
@@ -114,12 +115,17 @@ class Program:
         return Bound(*self._bind(table.now, table.who, focus, few))
 
     def _picked(
-        self, candidates: tuple[str, ...], focus: Mapping[str, None], who: Mapping[str, Mapping[Key, None]], few: int
+        self,
+        candidates: tuple[str, ...],
+        focus: Mapping[str, None],
+        who: Mapping[str, Mapping[Key, None]],
+        few: int,
+        now: Mapping[str, Mapping[Key, str]],
     ) -> Sequence[str]:
         found = [term for term in focus if term in candidates] if focus else []
         if found or len(candidates) <= few:
             return found or candidates
-        return representatives(self.alike.groups(candidates), who, {})
+        return self.alike.unlike(candidates, representatives(self.alike.groups(candidates), who, {}), now)
 
     def size(self, level: int) -> int:
         """Return how many behaviours a level has at most, quantified over all individuals."""
@@ -128,6 +134,12 @@ class Program:
             prod(len(classes.get(parameter.kind, ())) for parameter in behavior.parameters)
             for behavior in self.domain.at_level(level)
         )
+
+    def changing(self, level: int) -> list[SituationType]:
+        """Return the situation types, other than those that are true or false, that a level changes."""
+        situations = self.domain.situations
+        names = dict.fromkeys(e.situation for behavior in self.domain.at_level(level) for e in behavior.effects)
+        return [situations[name] for name in names if not situations[name].boolean]
 
     @cached_property
     def rows_of(self) -> Mapping[str, Mapping[str, list[tuple[str, ...]]]]:
@@ -280,9 +292,9 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an iterable expression for those candidates that are in focus, else one of each sort that is free."""
+        """Return an iterable expression for those candidates that are in focus, else free ones of each sort and state."""
         taken = next((identifier("who", e.situation) for e in behavior.effects if e.value == term), "{}")
-        return f"pick({candidates}, focus, {taken}, few)"
+        return f"pick({candidates}, focus, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
         """Whether nothing that this level does can change the truth of a condition."""

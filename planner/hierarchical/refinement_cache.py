@@ -21,7 +21,7 @@ from reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4, expansions=60)
 """For a refinement that a few relevant steps make; a longer one is searched in a small world."""
-NEAR, WIDER, WIDE = Width(40, least=100), Width(100, 2, 500_000), Width(300, 8, 1_500_000)
+NEAR, WIDER, WIDE = Width(10, 0, 50_000), Width(20, 1), Width(160, 4, 1_000_000)
 WHOLE = Width(None, 1, 1_500_000)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
@@ -84,7 +84,9 @@ class Refiner:
         changed = frozenset[str]().union(*(b.changes for b in segments.program.domain.behaviors.values()))
         situations = segments.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
-        self.failed: dict[tuple[Ground, frozenset[Cell]], list[list[tuple[Cell, str]]]] = {}
+        self.besides: dict[Cell, str] = {}
+        """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
+        self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Do a behaviour, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
@@ -159,6 +161,8 @@ class Refiner:
         self, level: int, name: str, arguments: tuple[str, ...], bindings: tuple[str, ...], changes: Sequence[Change]
     ) -> tuple[RefinedStep, ...] | None:
         targets, keep = self.targets(changes), self.segments.refining(level)
+        if level == self.levels[0]:
+            targets |= self.besides
         below = self.levels[self.levels.index(level) + 1]
         individuals = arguments + bindings
         known = self.templates.setdefault(name, [])
@@ -171,29 +175,27 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         now = self.table.now
-        for facts in self.failed.get(((name, arguments), self.segments.tidy), ()):
+        question = name, arguments, self.segments.tidy, tuple(self.besides)
+        for facts in self.failed.get(question, ()):
             if all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
         self.misses += 1
+        widths = self.worlds(below)
         found = self.achieve(below, targets, keep, individuals, SHORT)
-        for width in self.widths(below):
-            found = found or self.achieve(below, targets, keep, individuals, width)
+        found = found or self.achieve(below, targets, keep, individuals, widths)
         if found is None:
-            whole = width.questions is None
-            around = problem_of(self.segments, below, None if whole else focus(self.segments, below, targets, width))
+            around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
-            self.failed.setdefault(((name, arguments), self.segments.tidy), []).append(facts)
+            self.failed.setdefault(question, []).append(facts)
             return None
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
         known.sort(key=lambda template: len(template.steps))
         del known[TEMPLATES:]
         return tuple(found)
 
-    def widths(self, level: int) -> tuple[Width, ...]:
-        """Return the worlds to look at one after the other."""
-        return (
-            (NEAR, WIDER, WIDE, WHOLE) if self.segments.program.size(level) <= MOST_OPERATORS else (NEAR, WIDER, WIDE)
-        )
+    def worlds(self, level: int) -> tuple[Width, ...]:
+        """Return the worlds to look at one after the other, the last of them large."""
+        return (NEAR, WIDER, WHOLE if self.segments.program.size(level) <= MOST_OPERATORS else WIDE)
 
     def achieve(
         self,
@@ -201,7 +203,7 @@ class Refiner:
         targets: Mapping[Cell, str],
         keep: Keep,
         individuals: Sequence[str],
-        effort: Effort | Width,
+        effort: Effort | Sequence[Width],
     ) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any.
 
@@ -209,7 +211,13 @@ class Refiner:
         """
         if isinstance(effort, Effort):
             return self._by_relevance(level, targets, keep, individuals, effort)
-        return self._in_a_world(level, dict(targets), keep, effort)
+        insides = [focus(self.segments, level, targets, width) for width in effort]
+        for width, inside, following in zip(effort, insides, [*insides[1:], set()], strict=True):
+            if inside != following:  # else the next search sees the same world, and longer
+                found = self._in_a_world(level, dict(targets), keep, width)
+                if found is not None:
+                    return found
+        return None
 
     def _by_relevance(
         self, level: int, targets: Mapping[Cell, str], keep: Keep, individuals: Sequence[str], effort: Effort

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.refinement_cache import NEAR, WIDE, WIDER, RefinedStep, Refiner, Template
+from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
 from planner.hierarchical.subplans import Effort, LimitError, Segments
 from planner.hierarchical.subproblem import Width
 from planner.hierarchical.unsolvability import impossible
@@ -37,11 +37,11 @@ FEW_OPERATORS, FEW_STATES = 300, 6_000
 """The smallest problems, of which every state is looked at before the greater efforts."""
 MOST_TOGETHER = 20_000
 """The largest level, in quantified behaviours, on which all goals are searched at once."""
-ALL, SOME = Width(None, 1, 10_000_000), Width(None, 1, 100_000)
+ALL, SOME = (Width(None, 1, 10_000_000),), (Width(None, 1, 100_000),)
 """All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
-ANEW = Width(None, 1, 1_500_000)
+ANEW = (Width(None, 1, 1_500_000),)
 """All goals at once from the beginning, on the most abstract level: the goals reached so far may be in the way for good."""
-Attempt: TypeAlias = "Effort | Width"
+Attempt: TypeAlias = "Effort | Sequence[Width]"
 Done = TypeVar("Done")
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
@@ -112,6 +112,9 @@ class Call:
             for symbol, value in problem.initial.items()
             if self.segments.rest.get(symbol.situation) == value
         }
+        first = self.program.levels[0]
+        self.unseen = {cell: value for cell, value in self.goal.items() if not self.segments.visible(first, cell)}
+        """Goals that the most abstract level knows nothing of: its steps don't keep them, and the last one brings them about."""
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
@@ -124,8 +127,8 @@ class Call:
         self.too_large: Reason | None = None
         self.ladder: list[tuple[int, Attempt]] = []
         for level in self.program.levels:
-            attempts: list[Attempt] = [LONGER, NEAR, WIDER, WIDE, ALL]
-            self.ladder += [(level, attempt) for attempt in attempts]
+            *small, large = self.refiner.worlds(level)
+            self.ladder += [(level, attempt) for attempt in (LONGER, (*small,), (large,), ALL)]
 
     def serialise(self) -> bool:
         """Achieve the goals one after the other; whether all are."""
@@ -203,11 +206,11 @@ class Call:
             reason = impossible(self.problem, self.program)
             if reason:
                 raise UnsolvableError(reason)
+        if self.unseen.keys() >= asleep.keys() and self.finish():
+            return True
         for level, attempt in self.ladder:
             if attempt is not LONGER and len(self.goal) - len(self.kept) >= COSTLY:
                 self.segments.watch(None)
-            if attempt is not LONGER:
-                self.prove()
             if attempt is ALL:
                 if self.together(level):
                     return True
@@ -218,18 +221,36 @@ class Call:
                 if self.achieve(level, cell, attempt):
                     return True
                 self.failed.setdefault(cell, set()).add((level, attempt))
-                if attempt is NEAR and not self.gone_back:
-                    self.gone_back = True
-                    if self.retreat() or self.anew(self.program.levels[:1], ANEW):
-                        self.restarts += 1
-                        return True
+                if not isinstance(attempt, Effort):
+                    self.prove()
+                    if not self.gone_back:
+                        self.gone_back = True
+                        if self.retreat() or self.anew(self.program.levels[:1], ANEW):
+                            self.restarts += 1
+                            return True
         if self.moved:  # something was done since some of these attempts failed
             self.failed.clear()
             self.moved = False
             return self.harder(asleep, before)
         return False
 
-    def anew(self, levels: Sequence[int], width: Width = ALL) -> bool:
+    def finish(self) -> bool:
+        """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""
+        steps = self.steps
+        if not steps or steps[-1].level != self.program.levels[0]:
+            return False
+        self.redo(steps[:-1])
+        self.refiner.besides = self.unseen
+        last = self.refiner.do(*steps[-1][:3])
+        self.refiner.besides = {}
+        if last is None:
+            self.redo(steps)
+            return False
+        self.steps = [*steps[:-1], last]
+        self.kept.update(self.unseen)
+        return True
+
+    def anew(self, levels: Sequence[int], width: Attempt = ALL) -> bool:
         """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was."""
         if not self.steps:
             return False  # nothing has led anywhere
@@ -375,7 +396,7 @@ class Call:
         """Achieve one goal and keep the others, by steps of a level that are refined and done; whether that succeeded."""
         return self.reach(level, {cell: self.goal[cell]}, attempt)
 
-    def together(self, level: int, width: Width = ALL) -> bool:
+    def together(self, level: int, width: Attempt = ALL) -> bool:
         """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
         if self.program.size(level) > MOST_TOGETHER or self.tried.get(level) == len(self.steps):
             return False
@@ -384,7 +405,8 @@ class Call:
 
     def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
         """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
-        keep = self.segments.keeping(self.kept)
+        first = level == self.program.levels[0]
+        keep = self.segments.keeping({c: v for c, v in self.kept.items() if not first or c not in self.unseen})
         mark = len(self.table.trail)
         steps = self.refiner.achieve(level, targets, keep, (), attempt)
         if steps is not None and self.wary and not self.hopeful():
@@ -394,7 +416,7 @@ class Call:
         self.steps.extend(steps)
         self.moved = True
         self.kept.update(targets)
-        if level != self.program.levels[0]:
+        if not first:
             goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())
             self.given_up.append(
                 f"level {self.program.levels[0]} was given up for {goals}: no steps of it were found that can be refined; "

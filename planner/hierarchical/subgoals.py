@@ -6,9 +6,10 @@ thousand free places count as one; the values that goals name are proposed besid
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from heapq import nsmallest
 from typing import Any, TypeAlias
 
 from planner.hierarchical.operators import FEW, Achiever, Program
@@ -296,13 +297,36 @@ class Wants:
         self._forget()
         found = self._free.get((situation, kind, self.breadth))
         if found is None:
-            groups, wanted = self.program.alike.groups(members), self.wanted.get(situation, {})
-            found = representatives(groups, self.table.who[situation], wanted, self.breadth, self._cursors)
+            groups, wanted, who = (
+                self.program.alike.groups(members),
+                self.wanted.get(situation, {}),
+                self.table.who[situation],
+            )
+
+            found = representatives(
+                groups, who, wanted, self.breadth, self._cursors, lambda value: self.burden(situation, value)
+            )
             self._free[situation, kind, self.breadth] = found
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
             return (goal, *found)
         return tuple(found)
+
+    def burden(self, situation: str, value: str) -> int:
+        """Return how little a value is to be had: least what nobody has, most what somebody has as a goal says."""
+        keys = self.table.who[situation].get(value, ())
+        return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
+
+    def spare(self, beside: Collection[str], level: int, number: int) -> Iterator[str]:
+        """Yield values beside those of each sort that these belong to, least burdened first."""
+        for situation in self.program.changing(level):
+            members = self.program.problem.classes.get(situation.range, ())
+            if len(members) <= FEW:
+                continue
+            for group in self.program.alike.groups(members):
+                if not set(group).isdisjoint(beside):
+                    others = (value for value in group if value not in beside)
+                    yield from nsmallest(number, others, key=lambda value: self.burden(situation.name, value))
 
     def _others(self, situation: str, key: Key, avoid: str | None, level: int) -> tuple[str, ...]:
         if self._boolean(situation):
@@ -312,9 +336,9 @@ class Wants:
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
     def one_of_each(self, kind: str) -> list[str]:
-        """Return the individuals of a class, or one of each symmetry class if they are many."""
+        """Return the individuals of a class, or one of each symmetry class and state if they are many."""
         members = self.program.problem.classes.get(kind, ())
-        return list(members) if len(members) <= FEW else [group[0] for group in self.program.alike.groups(members)]
+        return list(members) if len(members) <= FEW else self.program.alike.unlike(members, (), self.table.now)
 
     def _boolean(self, situation: str) -> bool:
         return self.program.domain.situations[situation].boolean

@@ -14,6 +14,7 @@ what is too long for that, is left to a search over a small world (`planner.hier
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -73,6 +74,8 @@ class Segments:
     watch : Watch, optional
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
+    most_work : float
+        The same for the work of small worlds, in states times operators.
     """
 
     program: Program
@@ -80,11 +83,12 @@ class Segments:
     goal: Mapping[Cell, str]
     deadline: float | None = None
     most: int = 200_000
+    most_work: float = math.inf
     watch: Watch = nobody
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.expanded = 0
+        self.expanded = self.worked = 0
         self.tidy: frozenset[Cell] = frozenset()
         """What refinements leave as it was, though it might be anything in the end."""
         self.focus: dict[str, None] = {}
@@ -217,12 +221,15 @@ class Segments:
             raise LimitError(f"{self.most} expansions")
         self.check_time()
 
-    def spend(self, level: int, counts: Counts) -> None:
-        """Count what a search elsewhere did."""
+    def spend(self, level: int, counts: Counts, work: int) -> None:
+        """Count what a search elsewhere did, and its work in states times operators."""
         self.counts[level].add(counts)
         self.expanded += counts.expanded
+        self.worked += work
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
+        if self.worked > self.most_work:
+            raise LimitError(f"{self.most_work:.0f} states times operators")
         self.check_time()
 
     def visible(self, level: int, cell: Cell) -> bool:

@@ -12,15 +12,17 @@ and searches is imported where a world is looked at: numpy alone takes longer to
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
 from planner.hierarchical.subplans import Ground, Keep, Segments
 from planner.language import walk
-from planner.plan import Limits, OutOfTimeError, Reason, Status, TooLargeError
+from planner.plan import Counts, Limits, OutOfTimeError, Reason, Status, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets
 from reasoner.symbols import (
@@ -39,24 +41,24 @@ if TYPE_CHECKING:
 FEW = 4
 """Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
 
-SMALLEST = 50
-"""A task counts as having at least so many operators, since a state costs something whatever can be done there; and a world of
-which not even so many states could be looked at isn't grounded."""
+STATES, STEPS = 400, 12
+"""So many states are looked at for the fewest steps, where these aren't more; else any steps will do."""
+LEAST, MAKING = 300, 100
+"""A task counts as having at least so many operators, since a state costs something whatever can be done there; and making it
+as much as looking at so many states. A world of which not a fifth as many could be looked at isn't grounded."""
 
 
 @dataclass(frozen=True)
 class Width:
     """How much of the world is looked at, and how long.
 
-    `questions` is the most values that chains towards one target may lead through, `breadth` how many of those that no static fact
-    tells apart are there at least; None takes the whole world. `work` bounds one search, in states times operators, but
-    for `least` states that are looked at anyway.
+    `questions` is the most values that chains towards one target may lead through, None takes the whole world; `spares` how many
+    values there are beside these of each sort that they belong to. `work` bounds one search, in states times operators.
     """
 
     questions: int | None
-    breadth: int = 1
+    spares: int = 1
     work: int = 200_000
-    least: int = 0
 
 
 class World:
@@ -66,23 +68,16 @@ class World:
         self.segments, self.level, self.width = segments, level, width
         self.plan: tuple[int, ...] = ()
         self.task: Task | None = None
-        while True:
-            try:
-                task = self._grounded(targets, keep, width)
-            except (TooLargeError, OutOfTimeError):
-                segments.check_time()
-                if width.breadth == 1:
-                    return
-                width = replace(width, breadth=width.breadth // 2)
-                continue
+        with suppress(TooLargeError, OutOfTimeError):
+            task = self._grounded(targets, keep, width)
             self.task = None if isinstance(task, Reason) else task
-            return
+        segments.check_time()
 
     def _grounded(self, targets: Mapping[Cell, str], keep: Keep, width: Width) -> Task | Reason:
         from planner.grounded.grounding import ground
 
         segments, level = self.segments, self.level
-        inside = None if width.questions is None else focus(segments, level, targets, width)
+        inside = focus(segments, level, targets, width)
         small = problem_of(segments, level, inside, with_frozen(segments, level, inside) if inside else frozenset())
         goal = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in targets.items()}
         for symbol, value in small.initial.items():
@@ -93,17 +88,25 @@ class World:
         for cell in segments.defined:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
-        return ground(small, level, goal=goal, most=width.work // SMALLEST, deadline=segments.deadline)
+        return ground(small, level, goal=goal, most=5 * width.work // MAKING, deadline=segments.deadline)
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
         from planner.grounded.best_first import search
+        from planner.grounded.shortest import shortest, ways
 
         if self.task is None:
             return None
-        most = max(self.width.work // max(len(self.task), SMALLEST), self.width.least)
-        found = search(self.task, Limits(most), self.segments.deadline)
-        self.segments.spend(self.level, found.counts)
+        size, deadline, counts = max(len(self.task), LEAST), self.segments.deadline, Counts()
+        bound = ways(self.task)
+        states = 0 if STEPS < bound(self.task.initial) < math.inf else STATES
+        best = shortest(self.task, bound, most=states, deadline=deadline, counts=counts)
+        self.segments.spend(self.level, counts, (MAKING + counts.expanded) * size)
+        if best.plan is not None or best.bound == math.inf:
+            self.plan = best.plan or ()
+            return None if best.plan is None else [self.task.describe(operator)[:2] for operator in best.plan]
+        found = search(self.task, Limits(self.width.work // size), deadline)
+        self.segments.spend(self.level, found.counts, found.counts.expanded * size)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
             return None
@@ -119,23 +122,22 @@ class World:
         self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 
 
-def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str]:
-    """Return the individuals that acting towards the targets may concern."""
+def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str] | None:
+    """Return the individuals that acting towards the targets may concern; None are all."""
+    if width.questions is None:
+        return None
     program, table = segments.program, segments.table
     met: dict[str, None] = dict.fromkeys(program.named)
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
-    segments.wants.breadth = width.breadth
+    segments.wants.breadth = 1
     for cell, value in targets.items():
-        for _ in segments.chains(level, cell, value, width.questions or 0, met):
+        for _ in segments.chains(level, cell, value, width.questions, met):
             pass
     for members in program.problem.classes.values():
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
-    if width.breadth > 1:
-        alike = program.alike
-        for sort in dict.fromkeys(alike.sort.get(individual, -1) for individual in met):
-            met.update(dict.fromkeys(alike.members.get(sort, ())[: width.breadth]))
+    met.update(dict.fromkeys(segments.wants.spare(met, level, width.spares)))
     for individual in tuple(met):  # what these have, and who has what these are, as far as these are few
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from heapq import nsmallest
 from itertools import chain
 
 from planner.transitions import Key
 from reasoner.symbols import Problem
+
+ENDS = 8
+"""So many individuals at each end of a large group are looked at for whether they are in another state."""
 
 
 class Alike:
@@ -43,6 +47,7 @@ class Alike:
         for individual, number in self.sort.items():
             self.members.setdefault(number, []).append(individual)
         self._groups: dict[tuple[str, ...], list[list[str]]] = {}
+        self._named = frozenset(named)
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:
         """Return `members` grouped by likeness, in their order."""
@@ -54,6 +59,26 @@ class Alike:
             found = self._groups[members] = list(by_sort.values())
         return found
 
+    def unlike(self, members: tuple[str, ...], known: Sequence[str], now: Mapping[str, Mapping[Key, str]]) -> list[str]:
+        """Return members that differ by what holds of them now from those of their group that are known, one of each.
+
+        Of a large group the first and the last few are looked at: what is used up is used up from one end.
+        """
+        found = list(known)
+        for group in self.groups(members):
+            seen = {self._state(one, now) for one in found if self.sort.get(one) == self.sort.get(group[0])}
+            for one in group if len(group) <= 2 * ENDS else (*group[:ENDS], *group[-ENDS:]):
+                state = self._state(one, now)
+                if state not in seen:
+                    seen.add(state)
+                    found.append(one)
+        return found
+
+    def _state(self, one: str, now: Mapping[str, Mapping[Key, str]]) -> tuple[str | None, ...]:
+        """Return the values of an individual, as far as behaviours mention them."""
+        values = (cells.get(one) for cells in now.values())
+        return tuple([value if value in self._named else None for value in values])
+
 
 def representatives(
     groups: Sequence[Sequence[str]],
@@ -61,11 +86,13 @@ def representatives(
     wanted: Mapping[str, object],
     breadth: int = 1,
     cursors: dict[int, int] | None = None,
+    burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
     """Return one value per group: the first that nobody has and no goal wants.
 
-    Where there is none, a few that nobody has; where there are none of these either, the first `breadth`. With `cursors` (by
-    the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone through anew.
+    Where there is none, a few that nobody has; where there are none of these either, the `breadth` of least `burden`. With
+    `cursors` (by the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone
+    through anew.
 
     >>> representatives([["a", "b", "c"], ["d"]], {"a": {"x": None}}, {"b": True})
     ['c', 'd']
@@ -81,5 +108,6 @@ def representatives(
                     cursors[id(group)] = position
                 break
         else:
-            found.extend([value for value in group if not who.get(value)][:4] or group[:breadth])
+            free = [value for value in group if not who.get(value)][:4]
+            found.extend(free or nsmallest(breadth, group, key=burden))
     return found

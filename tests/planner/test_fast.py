@@ -85,7 +85,7 @@ def test_whoever_of_many_a_condition_looks_for_is_in_the_small_world(name: str) 
     outcome = plan(family(name, 20, hands=8))
     assert outcome.plan is not None
     assert outcome.fallbacks == 0
-    assert outcome.search[1].generated < 5_000  # 9,000 to 110,000 in the whole world
+    assert outcome.search[1].evaluated < 500  # in the whole world thousands
 
 
 def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
