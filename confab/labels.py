@@ -39,7 +39,10 @@ class Labels:
     def fact(self, fact: Fact) -> str:
         """Return a fact as a sentence."""
         situation, (about, *rest) = fact.symbol.situation, fact.symbol.arguments or ("",)
-        boolean = situation in self.domain.situations and self.domain.situations[situation].boolean
+        kind = self.domain.situations.get(situation)
+        boolean = kind is not None and kind.boolean
+        if kind is not None and kind.quantity is not None and kind.quantity.unit and fact.value:
+            fact = Fact(fact.symbol, f"{fact.value} {kind.quantity.unit}")
         if situation not in self.verbs and situation in self.words and about and not boolean:
             of = " ".join(map(self.name, (about, *rest)))
             return f"{self.words[situation]} of {of} is {self.name(fact.value)}"

@@ -14,9 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 
 from planner.plan import Plan, Step
 from planner.validation import Arguments, Cell, Facts, Rules
+from reasoner.amounts import meets, written
 from reasoner.symbols import Condition, Fact, Problem, Symbol, substituted
 
 Path = tuple[int, ...]
@@ -221,8 +223,24 @@ class _Course:
         changes = tuple(Change(Fact(Symbol(*cell), value), self.written[cell].before) for cell, value in now.items())
         if after is None:
             return changes, tuple(broken), frozenset()
-        differs = frozenset(cell for cell, value in before.items() if after.get(cell) != value and cell not in now)
+        differs = frozenset(
+            cell
+            for cell, value in before.items()
+            if after.get(cell) != value and (cell not in now or self.counted(cell))
+        )
         return (changes, (), differs) if differs else None
+
+    def goes_on(self, cell: Cell, before: str) -> _Written | None:
+        """Return who gave an amount of which something was used up: it would have been so much less without that one, too."""
+        if cell not in self.written or not self.counted(cell):
+            return None
+        less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
+        giver = self.written[cell]
+        return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
+
+    def counted(self, cell: Cell) -> bool:
+        """Whether a cell has an amount: a step that changes one goes on from what it was."""
+        return self.problem.domain.situations[cell[0]].quantity is not None
 
     def done(self, number: int, step: Step) -> None:
         """Carry a step out, with all below it, and note what it gave."""
@@ -234,7 +252,7 @@ class _Course:
             if cell in self.written:
                 for value in (self.written[cell].before, before):
                     self.having.get((cell[0], value), {}).pop(cell, None)
-            self.written[cell] = _Written(number, before)
+            self.written[cell] = self.goes_on(cell, before) or _Written(number, before)
             for value in (before, str(self.facts.value(*cell))):
                 self.having.setdefault((cell[0], value), {})[cell] = None
 
@@ -251,7 +269,7 @@ class _Course:
                 continue
             symbol, value = Symbol(*cell), str(self.facts.value(*cell))
             kind = self.problem.domain.situations[symbol.situation]
-            if wanted.get(cell) == value:
+            if cell in wanted and meets(value, wanted[cell]):
                 why = Kind.ABOVE if level else Kind.GOAL
             elif level and value == begun and self.problem.sees(level, symbol, begun):
                 why = Kind.ABOVE

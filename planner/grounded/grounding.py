@@ -27,6 +27,7 @@ from planner.grounded.derived import Bit, Derived, in_parts
 from planner.grounded.joins import Ints, Table
 from planner.grounded.reachability import Flags, Formulas, Literals, Reached
 from planner.grounded.schemas import Schema
+from planner.grounded.shortage import shortage
 from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
@@ -88,7 +89,8 @@ def ground(
     for symbol, value in sorted(wanted.items()):
         if not reached.possible(symbol, value):
             return unreachable(reached, Fact(symbol, value))
-    return _Assembly(reached).task(wanted)
+    task = _Assembly(reached).task(wanted)
+    return task if isinstance(task, Reason) else shortage(task) or task
 
 
 class _Assembly:

@@ -1,0 +1,114 @@
+"""Amounts: plans lead to what a step needs of them, and "unsolvable" says by how much they fall short."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from planner.grounded.best_first import plan_level
+from planner.plan import Status
+from planner.solve import Request, solve
+from reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
+from reasoner.symbols import AmountEffect, Behavior, Comparison, Parameter, Problem, SituationType, Symbol, ValueEffect
+from worlds.writing import becomes, has, world
+
+JUG, CUP = Parameter("?j", "Jug"), Parameter("?c", "Cup")
+TEA = Amount("TEA", ("?j",))
+
+
+def pouring(there: str, cups: int, portion: Fraction, refill: str | None = "1") -> Problem:
+    """A jug and some cups; below, the jug has to be taken into the hand to pour from it or fill it, and put down again."""
+    quantity = Quantity("servings", least=Fraction(0), most=Fraction(4))
+    situations = [
+        SituationType("TEA", ("Jug",), "TEA", quantity=quantity),
+        SituationType("DRINK", ("Cup",), "DRINK"),
+        SituationType("HELD", ("Jug",), "HELD", level=2, rest="no"),
+    ]
+    less = AmountEffect("TEA", ("?j",), "decrease", portion)
+    enough, empty, held = Comparison(TEA, ">=", portion), has("DRINK", "?c", "empty"), has("HELD", "?j", "yes")
+    full: tuple[ValueEffect, ...] = (becomes("DRINK", "?c", "tea"),)
+    behaviors = [
+        Behavior("SERVE", 1, (JUG, CUP), (), (empty, enough), full, amounts=(less,)),
+        Behavior("TAKE", 2, (JUG,), (), (has("HELD", "?j", "no"),), (becomes("HELD", "?j", "yes"),)),
+        Behavior("PUT", 2, (JUG,), (), (held,), (becomes("HELD", "?j", "no"),)),
+        Behavior("POUR", 2, (JUG, CUP), (), (held, empty, enough), full, amounts=(less,)),
+    ]
+    if refill is not None:
+        more = AmountEffect("TEA", ("?j",), "increase", Fraction(refill))
+        behaviors += [
+            Behavior("REFILL", 1, (JUG,), amounts=(more,)),
+            Behavior("FILL", 2, (JUG,), preconditions=(held,), amounts=(more,)),
+        ]
+    names = tuple(f"cup{i}" for i in range(cups))
+    return world(
+        situations,
+        behaviors,
+        {"Jug": ("jug",), "Cup": names, "DRINK": ("empty", "tea"), "HELD": ("no", "yes")},
+        {"TEA jug": there, "HELD jug": "no", **{f"DRINK {name}": "empty" for name in names}},
+        {f"DRINK {name}": "tea" for name in names},
+    )
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper", "optimal"])
+def test_what_a_step_needs_of_an_amount_is_brought_about(mode: str) -> None:
+    outcome = solve(Request(pouring("1.5", 3, Fraction(1)), mode))
+    assert outcome.status is Status.SOLVED
+    assert outcome.plan is not None
+    primitives = [step.behavior for step in outcome.plan.primitives]
+    assert primitives.count("POUR") == 3
+    assert primitives.count("FILL") == 2
+
+
+def test_thirds_are_thirds_and_tenths_are_tenths() -> None:
+    for portion in (Fraction(1, 3), Fraction(1, 10)):
+        problem = pouring(written(portion * 3), 3, portion, refill=None)
+        assert solve(Request(problem)).status is Status.SOLVED  # the last portion is there to the last drop
+        assert plan_level(problem, 2).status is Status.SOLVED
+
+
+@pytest.mark.parametrize(
+    ("there", "cups", "portion", "wanted", "said"),
+    [
+        ("1.5", 2, "1", {}, "TEA of jug: 1.5 servings are there, 2 are wanted, and nothing gives more"),
+        ("2", 2, "0.5", {"jug": ">=1.5"}, "TEA of jug: 2 servings are there, 2.5 are wanted, and nothing gives more"),
+        ("2", 0, "1", {"jug": ">=3"}, "<jug, TEA>: at most 2 servings can be there, 3 wanted"),
+        ("2", 0, "1", {"jug": ">2"}, "<jug, TEA>: at most 2 servings can be there, more than 2 wanted"),
+        ("2", 0, "1", {"jug": "<1"}, "<jug, TEA>: at least 2 servings can be there, less than 1 wanted"),
+    ],
+)
+def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted: dict[str, str], said: str) -> None:
+    problem = pouring(there, cups, Fraction(portion), refill=None)
+    problem = replace(problem, goal={**problem.goal, **{Symbol("TEA", (j,)): v for j, v in wanted.items()}})
+    outcome = solve(Request(problem))
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None
+    assert outcome.reason.text == said
+
+
+def test_a_goal_has_bounds_and_other_goals_dont_break_it() -> None:
+    problem = pouring("1", 2, Fraction(1))
+    problem = replace(problem, goal={**problem.goal, Symbol("TEA", ("jug",)): bounds_written(">=2,<3")})
+    outcome = solve(Request(problem))
+    assert outcome.plan is not None
+    assert sorted(step.behavior for step in outcome.plan.at_level(1)) == [*["REFILL"] * 3, *["SERVE"] * 2]
+
+
+def test_an_operator_is_counted_as_often_as_it_takes() -> None:
+    problem = pouring("0", 0, Fraction(1), refill="0.01")
+    problem = replace(problem, goal={Symbol("TEA", ("jug",)): ">=3"})
+    outcome = plan_level(problem, 2)
+    assert outcome.plan is not None
+    assert len(outcome.plan.primitives) == 302  # taken, filled three hundred times, put down
+    assert outcome.search[2].expanded < 1000
+
+
+def test_a_product_of_amounts_that_change_is_searched_only_where_states_are_looked_at() -> None:
+    problem = pouring("1", 1, Fraction(1))
+    behavior = problem.domain.behaviors["SERVE"]
+    squared = replace(
+        behavior, preconditions=(*behavior.preconditions, Comparison(Calculation("*", TEA, TEA), ">=", Fraction(4)))
+    )
+    domain = replace(problem.domain, behaviors={**problem.domain.behaviors, "SERVE": squared})
+    outcome = solve(Request(replace(problem, domain=domain), "paper"))
+    assert outcome.plan is not None
+    assert meets(str(outcome.plan.length[1]), "2")
