@@ -35,18 +35,21 @@ def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
 
 def main() -> None:
     """Print a table: cloning, installing, and the main job, with all that it films and writes."""
+    print("| step | s | CPU s |\n|---|---|---|")
+    total = work = 0.0
     with TemporaryDirectory() as name:
         folder = Path(name)
-        rows = {"`git clone`": timed(["git", "clone", "-q", str(ROOT), "confab"], folder)}
         house = folder / "confab"
-        rows["`make .venv/installed`: Python packages, from the index"] = timed(["make", ".venv/installed"], house)
-        rows["`make demo`: validate, plan, verify, film, learn, report"] = timed(["make", "demo"], house)
-        if "✓" not in rows["`make demo`: validate, plan, verify, film, learn, report"][2]:
-            sys.exit("the demo's plan wasn't verified")
-    print("| step | s | CPU s |\n|---|---|---|")
-    for what, (seconds, cpu, _) in rows.items():
-        print(f"| {what} | {seconds:.0f} | {cpu:.0f} |")
-    total, work = sum(row[0] for row in rows.values()), sum(row[1] for row in rows.values())
+        for what, command, where in (
+            ("`git clone`", ["git", "clone", "-q", str(ROOT), "confab"], folder),
+            ("`make .venv/installed`: Python packages, from the index", ["make", ".venv/installed"], house),
+            ("`make demo`: validate, plan, verify, film, learn, report", ["make", "demo"], house),
+        ):
+            seconds, cpu, printed = timed(command, where)
+            total, work = total + seconds, work + cpu
+            print(f"| {what} | {seconds:.0f} | {cpu:.0f} |", flush=True)
+    if "✓" not in printed:
+        sys.exit("the demo's plan wasn't verified")
     print(f"| from nothing to the first verified plan | {total:.0f} | {work:.0f} |")
 
 
