@@ -119,12 +119,15 @@ def box(fixture: Fixture) -> Solid:
 
 
 def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
-    """Return the arm's moving spheres, with finger joints at `openings` (metres)."""
+    """Return the arm's moving spheres, with finger joints at `openings` (metres).
+
+    What the first joint carries turns on the spot, touching what carries the arm: it is left out.
+    """
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():
         chain = model.chains[link]
         moved = [arm.joints.index(joint.name) for joint in chain if joint.name in arm.joints]
-        if moved:
+        if moved and moved[-1]:
             slide = sum((joint.axis * openings[joint.name] for joint in chain if joint.name in openings), np.zeros(3))
             centers.append(spheres.centers + slide)
             radii.append(spheres.radii)

@@ -1,8 +1,11 @@
 """Arms in closed form: where a posture puts the hand, and which posture puts the hand where it should be.
 
-An arm here is spherical-rotary-spherical, as a human's is: three axes through the shoulder, one through the elbow, three
-through the wrist. A hand pose then leaves one freedom, the *swivel* of the elbow around the line from shoulder to wrist
-(0: the elbow hangs down; positive turns it about that line). Everything is computed for many postures at once.
+An arm here has three axes through the shoulder, one at the elbow and three at the wrist. A hand pose then leaves one freedom,
+the *swivel*. There are two kinds. Where all three axes of the wrist meet, as a human's do (KUKA's iiwa), the swivel is that of
+the elbow around the line from shoulder to wrist (0: the elbow hangs down; positive turns it about that line). Where the last
+axis passes the point in which the two before it meet (Franka's Panda), it is the angle of the last joint from the middle of its
+limits, less the hand's roll, which that joint makes: with it given, the other six have a closed form as well. Everything is
+computed for many postures at once.
 
 ``q`` postures (n, 7) in radians · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W shoulder,
 elbow, wrist.
@@ -13,17 +16,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sim.urdf import Array, Model
+from sim.urdf import Array, Model, rotation
+
+Flags: TypeAlias = NDArray[np.bool_]
 
 DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A spherical-rotary-spherical arm with its hand, at the zero posture in world coordinates."""
+    """An arm with its hand, at the zero posture in world coordinates. `wrist` is where the two axes before the last one meet."""
 
     joints: tuple[str, ...]
     origins: Array
@@ -48,13 +55,23 @@ class Arm:
         return float(np.linalg.norm(self.wrist - self.elbow))
 
     @cached_property
+    def spherical(self) -> bool:
+        """Whether the last axis, too, goes through the wrist."""
+        return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
+
+    @cached_property
+    def middle(self) -> Array:
+        """The middle (7,) of each joint's limits in radians."""
+        return np.asarray((self.lower + self.upper) / 2)
+
+    @cached_property
     def crosses(self) -> Array:
         """Cross-product matrices (7, 3, 3) of the axes."""
         return np.stack([cross_matrix(axis) for axis in self.axes])
 
 
-def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
-    """Return the arm of `joints` that ends in link `tip`.
+def read_arm(model: Model, joints: Sequence[str], tip: str, turned: Sequence[float] = (0.0, 0.0, 0.0)) -> Arm:
+    """Return the arm of `joints` that ends in link `tip`, in which the hand's frame is `turned` by roll, pitch and yaw.
 
     Raises
     ------
@@ -70,7 +87,7 @@ def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
     chain = [model.joints[name] for name in joints]
     if len(chain) != 7:
         raise ValueError(
-            f"arm of '{tip}' has {len(chain)} joints; the closed form needs 7 (3 shoulder, 1 elbow, 3 wrist)"
+            f"arm of '{tip}' has {len(chain)} joints; the closed form needs 7 (3 at the shoulder, 1 at the elbow, 3 at the wrist)"
         )
     origins = np.array([joint.origin for joint in chain])
     axes = np.array([joint.axis for joint in chain])
@@ -78,10 +95,11 @@ def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
         if abs(axes[i] @ axes[j]) > 1e-6:
             raise ValueError(f"joints {joints[i]} and {joints[j]} aren't at right angles")
     shoulder = _meeting(origins[:3], axes[:3], "shoulder", joints[:3])
-    wrist = _meeting(origins[4:], axes[4:], "wrist", joints[4:])
+    wrist = _meeting(origins[4:6], axes[4:6], "wrist", joints[4:6])
     elbow = origins[3] + axes[3] * (axes[3] @ (shoulder - origins[3]))
     if abs(axes[3] @ (wrist - elbow)) > 1e-6:
         raise ValueError(f"shoulder, elbow and wrist don't lie in one plane across {joints[3]}")
+    frame, point = model.frames[tip]
     return Arm(
         tuple(joints),
         origins,
@@ -89,7 +107,8 @@ def read_arm(model: Model, joints: Sequence[str], tip: str) -> Arm:
         np.array([joint.lower for joint in chain]),
         np.array([joint.upper for joint in chain]),
         np.array([joint.velocity for joint in chain]),
-        *model.frames[tip],
+        frame @ rotation(*turned),
+        point,
         shoulder,
         elbow,
         wrist,
@@ -170,8 +189,14 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) ->
         Meaningless where not valid.
     valid : array (n,) of bool
         The point is in reach and every joint within its limits. Of the two postures of a sphere only the one that has the
-        middle joint within ±90° is considered, so neighbouring poses give neighbouring postures.
+        middle joint within ±90° (or between 0° and 180°) is considered, so neighbouring poses give neighbouring postures.
     """
+    q, valid = (_by_elbow if arm.spherical else _by_last_joint)(arm, r, p, swivel)
+    return q, valid & np.all((q >= arm.lower + margin) & (q <= arm.upper - margin), axis=-1)
+
+
+def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags]:
+    """Return postures with the elbow at a swivel about the line from shoulder to wrist, and which are in reach."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
     a, b = arm.upper_length, arm.lower_length
@@ -196,7 +221,82 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) ->
     elbow = side * np.arccos(np.clip(np.einsum("ni,ni->n", u, f), -1, 1)) - bent
     hand = np.swapaxes(upper @ turn(hinge, elbow), -1, -2) @ last
     q = np.concatenate([three_angles(upper, arm.axes[:3]), elbow[:, None], three_angles(hand, arm.axes[4:])], -1)
-    return q, valid & np.all((q >= arm.lower + margin) & (q <= arm.upper - margin), axis=-1)
+    return q, valid
+
+
+def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags]:
+    """Return postures with the last joint at `swivel` and the hand's roll from the middle of its limits, and which are in reach.
+
+    The last angle gives where the wrist is (w) and where the sixth axis points (e). The wrist's distance from the shoulder
+    gives the elbow's angle, the angle between w and e the fifth's, and the two directions together the shoulder's turn.
+    """
+    shoulder, fourth, fifth, sixth = arm.shoulder, arm.axes[3], arm.axes[4], arm.axes[5]
+    hand = r @ arm.tip_rotation.T
+    seventh = arm.middle[6] + swivel + _rolled(arm, r)
+    before = hand @ turn(arm.axes[6], -seventh)
+    w = p + hand @ (arm.origins[6] - arm.tip) + before @ (arm.wrist - arm.origins[6]) - shoulder
+    e = before @ sixth
+    upper, lower = arm.origins[3] - shoulder, arm.wrist - arm.origins[3]
+    elbow, reached = _angles_of(
+        fourth, upper[None], lower, (np.einsum("ni,ni->n", w, w) - upper @ upper - lower @ lower) / 2
+    )
+    elbow = elbow[:, 1 if _wrapped(arm.middle[3] - _phase(fourth, upper, lower)) > 0 else 0]
+    bent = turn(fourth, elbow)
+    v = np.swapaxes(bent, -1, -2) @ upper + lower  # from shoulder to wrist as the forearm sees it
+    both, met = _angles_of(fifth, v, sixth, np.einsum("ni,ni->n", w, e))
+    found = []
+    for angle in both.T:
+        forearm = bent @ turn(fifth, angle)
+        shoulder_turn = _frame(w, e) @ np.swapaxes(_frame(np.einsum("nij,nj->ni", bent, v), forearm @ sixth), -1, -2)
+        across = np.cross(sixth, fifth)
+        rest = np.swapaxes(shoulder_turn @ forearm, -1, -2) @ before @ across
+        last = np.arctan2(rest @ np.cross(sixth, across), rest @ across)
+        three = three_angles(shoulder_turn, arm.axes[:3])
+        others = np.stack([elbow, angle, last, seventh], -1)
+        found += [np.concatenate([way, others], -1) for way in (three, _flipped(three, arm.axes[:3]))]
+    offsets = _wrapped(np.stack(found) - arm.middle)
+    strain = np.abs(offsets / (arm.upper - arm.lower)).max(-1)  # the farther from all limits, the better
+    return arm.middle + offsets[np.argmin(strain, axis=0), np.arange(len(p))], reached & met
+
+
+def _flipped(three: Array, axes: Array) -> Array:
+    """Return the other angles (n, 3) that turn alike."""
+    x, y, z = three.T
+    return np.stack([x + np.pi, (0.0 if abs(axes[0] @ axes[2]) > 0.5 else np.pi) - y, z + np.pi], -1)
+
+
+def _rolled(arm: Arm, r: Array) -> Array:
+    """Return by how much (n,) the last joint alone would have rolled a level hand."""
+    along = np.sign(arm.axes[6] @ arm.tip_rotation[:, 0])
+    return np.asarray(along * np.arctan2(r[:, 2, 1], r[:, 2, 2]))
+
+
+def _phase(axis: Array, a: Array, b: Array) -> float:
+    """Return the angle about an axis at which the turned `b` is nearest to `a`."""
+    return float(np.arctan2(a @ np.cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
+
+
+def _angles_of(axis: Array, a: Array, b: Array, product: Array) -> tuple[Array, Flags]:
+    """Return both angles (n, 2) about an axis at which the turned `b` (3,) has a product with `a` (n, 3), and where there are."""
+    cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ np.cross(axis, b)
+    reach = np.maximum(np.hypot(cosine, sine), 1e-9)
+    share = (product - (a @ axis) * (b @ axis)) / reach
+    half = np.arccos(np.clip(share, -1, 1))
+    middle = np.arctan2(sine, cosine)
+    return _wrapped(np.stack([middle - half, middle + half], -1)), np.abs(share) < 0.9999
+
+
+def _frame(a: Array, b: Array) -> Array:
+    """Return right-handed frames (n, 3, 3) whose first axis is along `a` and whose second lies in the plane of `a` and `b`."""
+    first = a / np.maximum(np.linalg.norm(a, axis=-1), 1e-9)[:, None]
+    across = b - np.einsum("ni,ni->n", first, b)[:, None] * first
+    second = across / np.maximum(np.linalg.norm(across, axis=-1), 1e-9)[:, None]
+    return np.stack([first, second, cross(first, second)], -1)
+
+
+def _wrapped(angle: Array) -> Array:
+    """Return angles within ±180°."""
+    return np.asarray((np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi)
 
 
 def three_angles(r: Array, axes: Array) -> Array:
@@ -220,7 +320,9 @@ def three_angles(r: Array, axes: Array) -> Array:
 
 
 def swivel_of(arm: Arm, q: Array) -> Array:
-    """Return the elbow swivel (n,) of postures: the inverse of what `inverse` was given."""
+    """Return the swivel (n,) of postures: the inverse of what `inverse` was given."""
+    if not arm.spherical:
+        return _wrapped(q[:, 6] - arm.middle[6] - _rolled(arm, hand_frames(arm, q)[0]))
     r, t = link_transforms(arm, q)
     elbow = np.einsum("nij,j->ni", r[:, 2], arm.elbow) + t[:, 2] - arm.shoulder
     wrist = np.einsum("nij,j->ni", r[:, 3], arm.wrist) + t[:, 3] - arm.shoulder

@@ -76,7 +76,7 @@ def fingerprint(embodiment: Embodiment) -> str:
 
 def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, solids: Sequence[Solid]) -> Reacher:
     """Return an open hand among the furniture and the robot's own trunk."""
-    arms = [read_arm(model, other.arm, other.tip) for other in robot.hands]
+    arms = [read_arm(model, other.arm, other.tip, other.turned) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
     around = Surroundings((*map(box, embodiment.fixtures), *solids))
     around = around.plus(robot.name, fixed_spheres(model, arms))

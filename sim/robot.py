@@ -193,7 +193,7 @@ def _manipulator(
     links: Mapping[int, str],
     efforts: Mapping[str, float],
 ) -> Manipulator:
-    arm = read_arm(model, hand.arm, hand.tip)
+    arm = read_arm(model, hand.arm, hand.tip, hand.turned)
     tip = next(number for number, link in links.items() if link == hand.tip)
     return Manipulator(
         client,

@@ -15,6 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from reasoner.embodiment.facts import pybullet_data
+from sim.meshes import bounds, covered_mesh
+
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
 """So many links may hang on one another, and so many spheres cover one shape: more is a mistake."""
@@ -109,7 +112,7 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
 def read_model(text: str, path: str, position: tuple[float, float, float], yaw: float, covered: bool = True) -> Model:
     """Read a robot or mechanism from the text of a URDF file, `path` being where it is from; raises as `read_urdf` does.
 
-    Only what is `covered` by spheres can be moved by a motion planner, and only primitives can be.
+    Only what is `covered` by spheres can be moved by a motion planner.
     """
     try:
         root = ET.fromstring(text)
@@ -139,8 +142,9 @@ def read_model(text: str, path: str, position: tuple[float, float, float], yaw: 
     try:
         for link in links:
             place(link)
-        spheres = {name: _cover(link, *frames[name]) for name, link in links.items()} if covered else {}
-        primitives = {name: tuple(_primitives(link, *frames[name], Path(path).parent)) for name, link in links.items()}
+        folder = Path(path).parent
+        spheres = {name: _cover(link, *frames[name], folder) for name, link in links.items()} if covered else {}
+        primitives = {name: tuple(_primitives(link, *frames[name], folder)) for name, link in links.items()}
     except ValueError as problem:
         raise ValueError(f"the robot's URDF {path} can't be used: {problem}") from problem
     return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents, primitives)
@@ -177,6 +181,8 @@ def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Ar
     axis, limit = element.find("axis"), element.find("limit")
     direction = _numbers(None if axis is None else axis.get("xyz"), "1 0 0")
     endless, length = element.get("type") == "continuous", float(np.linalg.norm(direction))
+    if not length and element.get("type") not in MOVABLE:  # a fixed joint's axis means nothing
+        direction, length = np.array([1.0, 0.0, 0.0]), 1.0
     if not length:
         raise ValueError(f"joint '{element.get('name')}' has an axis without direction")
     return Joint(
@@ -192,21 +198,25 @@ def _joint(element: ET.Element, parent: str, child: str, turn: Array, origin: Ar
     )
 
 
-def _cover(link: ET.Element, turn: Array, origin: Array) -> Spheres:
-    """Cover the link's collision primitives with spheres; meshes aren't covered and raise."""
+def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Spheres:
+    """Cover the link's collision shapes with spheres."""
     centers, radii = [np.zeros((0, 3))], [np.zeros(0)]
     for collision in link.iter("collision"):
         local, shift = _origin(collision)
         geometry = collision.find("geometry")
         if geometry is None or not len(geometry):
             continue
-        points, radius = _primitive(geometry[0])
+        if geometry[0].tag == "mesh":
+            points, wide = covered_mesh(*_mesh(geometry[0], folder))
+        else:
+            points, radius = _primitive(geometry[0])
+            wide = np.full(len(points), radius)
         if len(points) > MOST_SPHERES:
             raise ValueError(
                 f"link '{link.get('name')}' takes more than {MOST_SPHERES} spheres to cover; give thicker shapes"
             )
         centers.append(origin + (points @ local.T + shift) @ turn.T)
-        radii.append(np.full(len(points), radius))
+        radii.append(wide)
     return Spheres(np.concatenate(centers), np.concatenate(radii))
 
 
@@ -221,7 +231,7 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
         if shape.tag == "box":
             half, kind = _numbers(shape.get("size")) / 2, "box"
         elif shape.tag == "mesh":
-            low, high = _bounds(folder / shape.get("filename", ""), _numbers(shape.get("scale"), "1 1 1"))
+            low, high = bounds(*_mesh(shape, folder))
             half, kind, shift = (high - low) / 2, "box", shift + local @ (low + high) / 2
         else:
             radius = float(shape.get("radius", 0.0))
@@ -230,13 +240,14 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
         yield Primitive(collision.get("name", ""), kind, half, origin + turn @ shift, turn @ local)
 
 
-def _bounds(file: Path, scale: Array) -> tuple[Array, Array]:
-    """Return the corners of the box around a mesh; only OBJ files can be read."""
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
-    corners = [_numbers(line[2:]) * scale for line in lines if line.startswith("v ")]
-    if not corners:
-        raise ValueError(f"the mesh '{file}' isn't there, or is no OBJ file with vertices")
-    return np.min(corners, axis=0), np.max(corners, axis=0)
+def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, float]]:
+    """Return where a mesh's file is, beside the URDF, above it or among PyBullet's data, and its scale."""
+    name = shape.get("filename", "").removeprefix("package://")
+    x, y, z = _numbers(shape.get("scale"), "1 1 1")
+    places = [place for place in (folder, folder.parent, pybullet_data()) if place and (place / name).is_file()]
+    if not name or not places:
+        raise ValueError(f"the mesh '{name}' is neither beside the URDF nor among PyBullet's data")
+    return places[0] / name, (float(x), float(y), float(z))
 
 
 def _primitive(shape: ET.Element) -> tuple[Array, float]:
@@ -252,9 +263,7 @@ def _primitive(shape: ET.Element) -> tuple[Array, float]:
         radius = float(np.sort(size)[1])
         axes = [_spread(max(half - radius * 0.8, 0.0), radius) for half in size]
         return np.array([[x, y, z] for x in axes[0] for y in axes[1] for z in axes[2]]), radius
-    raise ValueError(
-        f"collision shape '{shape.tag}' is none of box, cylinder, capsule and sphere: cover the mesh with these"
-    )
+    raise ValueError(f"collision shape '{shape.tag}' is none of box, cylinder, capsule, sphere and mesh")
 
 
 def _spread(half: float, radius: float) -> Array:

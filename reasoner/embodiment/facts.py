@@ -10,6 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import pyoxigraph as ox
@@ -108,7 +109,8 @@ class Facts:
     def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
         """Return where the file is that an attribute names."""
         file = self.text(node, name)
-        for folder in folders:
+        installed = [place.parent for place in [pybullet_data()] if place]
+        for folder in (*folders, *installed):
             if (folder / file).is_file():
                 return str(folder / file)
         raise EmbodimentError(
@@ -183,3 +185,9 @@ def camel(name: str) -> str:
     """Return ``uprightAngle`` of ``upright_angle``."""
     head, *tail = name.split("_")
     return head + "".join(word.capitalize() for word in tail)
+
+
+def pybullet_data() -> Path | None:
+    """Return the folder of robots and meshes that comes with PyBullet, if that is installed."""
+    found = find_spec("pybullet_data")
+    return Path(found.origin).parent if found and found.origin else None

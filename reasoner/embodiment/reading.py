@@ -179,6 +179,7 @@ def _hand(facts: Facts, node: str, names: Callable[[str], str]) -> Hand:
         home,
         facts.number(node, "opening"),
         facts.number(node, "grip"),
+        (facts.number(node, "roll", 0.0), facts.number(node, "pitch", 0.0), facts.number(node, "yaw", 0.0)),
     )
 
 

@@ -19,9 +19,10 @@ Color: TypeAlias = tuple[float, float, float, float]
 class Hand:
     """A hand of a robot: the arm that carries it and the fingers that close it.
 
-    `tip` is the URDF link whose frame is the hand's: x points where the fingers point, y from finger to finger, z up when the
-    hand is upright. `arm` and `fingers` are joint names; a finger joint grows as the hand opens. `home` is the arm's rest
-    posture, one angle per arm joint. `opening` is the finger joints' open position and `grip` the force of each finger.
+    `tip` is the URDF link whose frame, `turned` by roll, pitch and yaw, is the hand's: x points where the fingers point, y from
+    finger to finger, z up when the hand is upright. `arm` and `fingers` are joint names; a finger joint grows as the hand
+    opens. `home` is the arm's rest posture, one angle per arm joint. `opening` is the finger joints' open position and `grip`
+    the force of each finger.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Hand:
     home: tuple[float, ...]
     opening: float = 0.05
     grip: float = 25.0
+    turned: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import ontology
+from confab import load
 from sim.kinematics import Arm, hand_frames, inverse, read_arm, swivel_of, three_angles, turn
 from sim.urdf import Array, read_urdf
 
@@ -30,6 +31,36 @@ def test_inverse_finds_the_posture_that_forward_came_from(side: str) -> None:
     found, valid = inverse(arm, *hand_frames(arm, q), swivel_of(arm, q))
     assert valid.all()
     np.testing.assert_allclose(found, q, atol=1e-9)
+
+
+def panda() -> Arm:
+    (robot,) = load("panda-serving").embodiment.robots
+    (hand,) = robot.hands
+    return read_arm(read_urdf(robot.urdf, robot.position, robot.yaw), hand.arm, hand.tip, hand.turned)
+
+
+def test_an_arm_whose_last_axis_passes_the_wrist_has_a_closed_form_too() -> None:
+    arm = panda()
+    q = np.random.default_rng(0).uniform(arm.lower + 0.05, arm.upper - 0.05, (2000, 7))
+    r, p = hand_frames(arm, q)
+    swivel = swivel_of(arm, q)
+    found, valid = inverse(arm, r, p, swivel)
+    assert valid.mean() > 0.95
+    again, there = hand_frames(arm, found[valid])
+    np.testing.assert_allclose(again, r[valid], atol=1e-8)
+    np.testing.assert_allclose(there, p[valid], atol=1e-8)
+    np.testing.assert_allclose(np.cos(swivel_of(arm, found[valid]) - swivel[valid]), 1.0, atol=1e-8)
+
+
+def test_the_last_joint_alone_rolls_such_a_hand_while_the_swivel_stays() -> None:
+    arm = panda()
+    roll = np.linspace(0.0, 1.2, 20)
+    where = np.broadcast_to([0.3, 0.0, 0.95], (20, 3))
+    q, valid = inverse(arm, turn(X, roll), where, np.full(20, 1.4))
+    assert valid.all()
+    moves = np.ptp(q, axis=0)
+    assert moves[6] == pytest.approx(1.2)
+    assert moves[:6].max() < 1e-6
 
 
 def test_the_elbow_swivel_leaves_the_hand_where_it_is() -> None:
@@ -64,7 +95,8 @@ def test_an_arm_whose_axes_do_not_meet_is_refused(tmp_path: Path) -> None:
     read_arm(read_urdf(str(bent)), [f"left_{joint}" for joint in JOINTS], "left_tool")  # the elbow still bends it so
     bent.write_text(
         text.replace(
-            '<child link="left_palm"/>\n    <origin xyz="0 0 0"', '<child link="left_palm"/>\n    <origin xyz="0 .03 0"'
+            '<child link="left_wrist_pitch_link"/>\n    <origin xyz="0 0 0"',
+            '<child link="left_wrist_pitch_link"/>\n    <origin xyz=".03 0 0"',
         )
     )
     with pytest.raises(ValueError, match="no wrist"):

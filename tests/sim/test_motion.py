@@ -17,7 +17,7 @@ GOAL = np.array([0.50, 0.05, 0.90, -0.3, 0.0, 0.6])
 def reacher(embodiment: Embodiment, *solids: Solid) -> Reacher:
     robot, hand = embodiment.hand("left_hand")
     model = read_urdf(robot.urdf)
-    arm = read_arm(model, hand.arm, hand.tip)
+    arm = read_arm(model, hand.arm, hand.tip, hand.turned)
     mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))
     return Reacher(mover, Surroundings((*map(box, embodiment.fixtures), *solids)), MARGIN)
 

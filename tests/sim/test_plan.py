@@ -40,6 +40,14 @@ def test_another_robot_at_another_table_serves_without_a_change_of_python() -> N
     assert rollout.poured == (1.0,)
 
 
+def test_the_panda_of_pybullet_s_own_data_serves() -> None:
+    """A URDF with meshes, a wrist with an offset and a gripper that opens by 8 cm: in Turtle alone."""
+    one = case("panda-serving")
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
+    assert rollout.failure is None
+    assert rollout.poured == (1.0,)
+
+
 def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     one = case("two-cups")
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)

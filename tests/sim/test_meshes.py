@@ -1,0 +1,48 @@
+"""Meshes are covered by spheres that stand out little, and what is no mesh is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reasoner.embodiment.facts import pybullet_data
+from sim.meshes import MOST, bounds, cover, surface, triangles
+
+FOLDER = pybullet_data()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "franka_panda/meshes/collision/hand.obj",
+        "franka_panda/meshes/collision/link5.obj",
+        "kuka_iiwa/meshes/link_4.stl",
+    ],
+)
+def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name: str) -> None:
+    assert FOLDER is not None
+    corners = triangles(FOLDER / name)
+    centers, radii = cover(corners)
+    points = surface(corners)
+    gaps = np.linalg.norm(points[:, None] - centers, axis=-1) - radii
+    assert gaps.min(1).max() < 0.01  # between the points that were looked at
+    low, high = bounds(FOLDER / name, (1.0, 1.0, 1.0))
+    assert ((centers - radii[:, None]).min(0) > low - MOST - 1e-9).all()
+    assert ((centers + radii[:, None]).max(0) < high + MOST + 1e-9).all()
+    assert len(radii) < 80
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.obj", "v 0 0 0\n", "has no triangles"),
+        ("a.obj", "v 0 0 x\nf 1 1 1\n", "can't be read"),
+        ("a.obj", "v 0 0 0\nf 1 2 3\n", "can't be read"),
+        ("a.stl", "solid\n", "has no triangles"),
+        ("a.dae", "<x/>", "no OBJ or STL file; convert it"),
+    ],
+)
+def test_what_is_no_mesh_is_said(tmp_path: Path, name: str, text: str, said: str) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=said):
+        triangles(tmp_path / name)
