@@ -15,7 +15,7 @@ from functools import cached_property
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 from urllib.parse import unquote
 
 import pyoxigraph as ox
@@ -24,8 +24,10 @@ import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
 from reasoner.names import nearest
-from reasoner.updates.compiling import Fault, Place, compiled
 from reasoner.vocabulary import CORE, PREFIXES
+
+if TYPE_CHECKING:
+    from reasoner.updates.compiling import Fault, Place
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
@@ -238,6 +240,8 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []
+    from reasoner.updates.compiling import compiled
+
     found = compiled(lambda query: graph.select(query, SCENE), _spelled(graph), graph.prefixes)
     asserted = ox.NamedNode(BASE + "asserted")
     graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, asserted) for t in found.triples)

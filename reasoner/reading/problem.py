@@ -61,7 +61,6 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.updates.compiling import compiled
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, TYPE
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
@@ -230,6 +229,8 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         parts[text(part)].append(_core_triple(row))
     written = [triple for triple in parts["node"] if graph.remote and triple[1] in (CORE + "update", CORE + "extends")]
     if written:  # a store elsewhere has the text alone
+        from reasoner.updates.compiling import compiled
+
         found = compiled(lambda query: graph.select(query, SCENE), {}, graph.prefixes)
         if found.faults:
             raise KnowledgeError(str(found.faults[0]))

@@ -335,6 +335,10 @@ class _Search:
 
     def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
         self.graph, self.schema = graph, schema
+        self.subclasses: dict[str, list[str]] = {}
+        for kind, supers in schema.supers.items():
+            for above in supers:
+                self.subclasses.setdefault(above, []).append(kind)
         self.triples: dict[Triple, None] = {}
         self.seen: set[str] = set()
         values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
@@ -416,9 +420,11 @@ class _Search:
 
     def _below(self, classes: Iterable[str]) -> set[str]:
         """Return some classes with their subclasses."""
-        found, before = set(classes), -1
-        while before != (before := len(found)):
-            found |= {sub for sub, above in self.schema.supers.items() if found & set(above)}
+        found, waiting = set[str](), [*classes]
+        while waiting:
+            if (kind := waiting.pop()) not in found:
+                found.add(kind)
+                waiting += self.subclasses.get(kind, ())
         return found
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
