@@ -33,8 +33,10 @@ __all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
+DETOURS = 1.25
+"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 REORDERING = 1_000_000
-"""The work that another order of goals may cost, in states of small worlds times operators."""
+"""The work that another order of goals may cost, in states of small worlds times operators; or as much as the first plan took."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -137,20 +139,20 @@ def shorten(call: Call, improve: int, leave_levels: bool) -> None:
 def reordered(call: Call) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
-    Which goal comes first decides what has to be put aside. Nothing is tried where there are no more steps than goals; what is
+    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
     tried uses the most abstract level alone.
     """
     unmet = sum(
         not meets(call.problem.initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items()
     )
-    if len(call.steps) <= unmet:
+    if len(call.steps) < DETOURS * unmet:
         return call.steps
     best = call.steps
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
-        other.segments.most_work = REORDERING
+        other.segments.most_work = max(call.segments.worked, REORDERING)
         other.doubted = other.proved = other.gone_back = True  # there is a plan
         other.ladder = other.ladder[:2]
         with suppress(LimitError):

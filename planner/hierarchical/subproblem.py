@@ -101,7 +101,7 @@ class World:
         bound = ways(self.task)
         states = 0 if STEPS < bound(self.task.initial) < math.inf else STATES
         best = shortest(self.task, bound, most=states, deadline=deadline, counts=counts)
-        self.segments.spend(self.level, counts, (MAKING + counts.expanded) * size)
+        self.segments.spend(self.level, counts, MAKING * size + LEAST * counts.expanded)
         if best.plan is not None or best.bound == math.inf:
             self.plan = best.plan or ()
             return None if best.plan is None else [self.task.describe(operator)[:2] for operator in best.plan]
