@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-LOCKS = {"requirements.lock": "make", "requirements-bench.lock": "make bench, make test with CI=true"}
+LOCKS = {"requirements.lock": "make", "requirements-bench.lock": "make bench, make docs, make test with CI=true"}
 PINNED = re.compile(r"^([a-z0-9][a-z0-9._-]*)==(\S+)", re.MULTILINE)
 SHORT = 60
 
@@ -41,7 +41,9 @@ def main() -> None:
     by_licence: dict[str, list[str]] = defaultdict(list)
     for package in sorted(all_of):
         by_licence[licence(package)].append(package if package in light else f"*{package}*")
-    print("| licence | packages | which (*those of `make bench` and `make test with CI=true` alone*) |\n|---|---|---|")
+    print(
+        "| licence | packages | which (*those of `make bench`, `make docs` and `make test` with CI=true alone*) |\n|---|---|---|"
+    )
     for kind, packages in sorted(by_licence.items(), key=lambda row: (-len(row[1]), row[0])):
         print(f"| {kind} | {len(packages)} | {', '.join(packages)} |")
 
