@@ -9,10 +9,11 @@ in the update                               as individuals
 ``?cup :fits ?slot``                        a `:RelationCondition`
 ``?shelf :COLOR (?cup :red)``               a situation type without a property of its own, or with several arguments
 ``FILTER(?a != ?b)``, ``IN``, ``VALUES``    `:EqualityCondition`, several in an `:AnyOf`
+``?jug :servings ?n``, ``BIND(… AS ?m)``    ``?n`` and ``?m`` stand for numbers; a FILTER of them is a `:Comparison`
 ``FILTER EXISTS { ?x a :Tube … }``          a `:Witness` that looks for ``?x``
 ``FILTER NOT EXISTS { … }``                 what is inside, negated
 ``{ … } UNION { … }``, ``||``               an `:AnyOf`
-``INSERT``, ``DELETE``                      `:ValueEffect`; those of a further operation `:when` its WHERE held
+``INSERT``, ``DELETE``                      `:ValueEffect`, `:AmountEffect`; those of a further operation `:when` its WHERE held
 ==========================================  =====================================================================
 
 All that is asked is asked of the situation before the behaviour, also by further operations; a variable means the same in all.
@@ -21,14 +22,18 @@ All that is asked is asked of the situation before the behaviour, also by furthe
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from fractions import Fraction
+from typing import Any, TypeAlias
 
 import pyoxigraph as ox
 
+from reasoner.amounts import written
 from reasoner.names import local_name, nearest
 from reasoner.updates.words import (
     A,
+    Number,
     Operation,
     Said,
     Triple,
@@ -42,8 +47,12 @@ from reasoner.updates.words import (
     triples,
     words,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, PREFIXES, TYPE
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, PREFIXES, TYPE, XSD
 
+SIGNS = {sign: sign for sign in ("<", "<=", "=", ">=", ">")} | {"!=": "="}
+CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
+"""What an amount is changed by if it becomes itself, this sign, and something."""
+ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 Ask = Callable[[str], Sequence[Sequence[Any]]]
 """Returns the rows of a query."""
 
@@ -56,6 +65,9 @@ VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
   { ?term a/rdfs:subClassOf* :SituationType . BIND("situation" AS ?kind) OPTIONAL { ?term :valueProperty ?other } }
   UNION { ?other a owl:FunctionalProperty . ?term :valueProperty ?other . BIND("functional" AS ?kind) }
   UNION { ?term a/rdfs:subClassOf* :Relation . BIND("relation" AS ?kind) }
+  UNION { ?term a/rdfs:subClassOf* :Amount . BIND("amount" AS ?kind) }
+  UNION { ?term a/rdfs:subClassOf* :Relation . BIND("measure" AS ?kind)
+    { ?term a owl:DatatypeProperty } UNION { ?term :unit ?unit } UNION { ?fact :relation ?term ; :amount ?number } }
 }"""
 DECLARED = """SELECT ?behavior ?term ?type ?index WHERE {
   ?behavior a/rdfs:subClassOf* :Behavior . { ?behavior :update ?text } UNION { ?behavior :extends ?other }
@@ -110,13 +122,20 @@ class Vocabulary:
     """The properties that an update can speak of, as IRIs.
 
     `properties` leads from a value property to its situation type; `functional` are those of one value at a time; `bare` are
-    the situation types without a property, which stand for one themselves.
+    the situation types without a property, which stand for one themselves; `amounts` are the situation types, and `measures`
+    the relations, that give numbers.
     """
 
     properties: Mapping[str, str]
     functional: Collection[str]
     bare: Collection[str]
     relations: Collection[str]
+    amounts: Collection[str]
+    measures: Collection[str]
+
+    def numeric(self, prop: str) -> bool:
+        """Tell whether a property, or what stands for one, gives numbers."""
+        return prop in self.measures or self.properties.get(prop, prop) in self.amounts
 
     @classmethod
     def read(cls, ask: Ask) -> Vocabulary:
@@ -127,6 +146,8 @@ class Vocabulary:
             functional={prop for kind, _, prop in rows if kind == "functional"},
             bare={term for kind, term, prop in rows if kind == "situation" and not prop},
             relations={term for kind, term, _ in rows if kind == "relation"},
+            amounts={term for kind, term, _ in rows if kind == "amount"},
+            measures={term for kind, term, _ in rows if kind == "measure"},
         )
 
 
@@ -245,6 +266,7 @@ class _Writer:
     )
     count: dict[str, int] = field(default_factory=dict)
     prefixes: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
     now: Update = field(default_factory=lambda: Update("", "", {}))
 
     def write(self, update: Update) -> None:
@@ -271,7 +293,7 @@ class _Writer:
                     lost[0].at,
                 )
             when = self.sought(inner, within, operation.at)
-            self.effects(operation, when, within | inner.determined.keys(), group, inner)
+            self.effects(operation, when, within | (inner.names - inner.chosen.keys()), group, inner)
 
     # ---------------------------------------------------------------------------------------------------------- terms
 
@@ -318,8 +340,18 @@ class _Writer:
         """Return the node or individual of a term."""
         if isinstance(said, Truth):
             return CORE + ("true" if said.value else "false")
+        if isinstance(said, Number):
+            raise UpdateError(
+                f"'{written(said.value)}' stands where an individual belongs",
+                "name an individual, or use a variable",
+                at,
+            )
         if not said.variable:
             return self.iri(said)
+        if said in self.numbers:
+            raise UpdateError(
+                f"{said} is a number, and stands where an individual belongs", "name an individual", said.at
+            )
         if said not in known:
             raise UpdateError(
                 f"nothing says what {said} stands for",
@@ -342,8 +374,12 @@ class _Writer:
                 found.parts += inner.parts
                 found.chosen |= inner.chosen
                 found.determined |= inner.determined
+                found.numbers |= inner.numbers
+            elif part.name == "Bind":
+                found.numbers[part.var] = part.expr
             else:
                 found.parts.append(part)
+        self.numbers |= found.numbers
         return found
 
     def begins(self, one: Triple, group: _Group, known: Collection[str]) -> bool:
@@ -361,6 +397,9 @@ class _Writer:
         last = value[-1] if isinstance(value, tuple) and value else value
         if isinstance(last, Word) and last.variable and last not in known and last not in group.names:
             prop = self.iri(one.predicate)
+            if self.vocabulary.numeric(prop):
+                group.numbers[last] = one
+                return True
             if prop in self.vocabulary.functional:
                 group.determined[last] = self.vocabulary.properties[prop], last.at
             elif prop in self.vocabulary.bare:
@@ -383,6 +422,8 @@ class _Writer:
             last = _last(one)
             if last in group.determined:
                 depth[str(last)] = max(depth.get(word, 0) for word in _variables(one))
+        for name, said in group.numbers.items():
+            depth[name] = max((depth.get(word, 0) for word in _mentioned(said)), default=0)
         levels: list[list[Any]] = [[] for _ in names]
         for part in group.parts:
             levels[max((depth.get(name, 0) for name in _mentioned(part)), default=0)].append(part)
@@ -418,7 +459,6 @@ class _Writer:
         advice = {
             "MinusGraphPattern": "write FILTER NOT EXISTS { … }",
             "OptionalGraphPattern": "write an effect for some only as a further operation, behind a semicolon",
-            "Bind": "put the term itself in its place",
         }
         raise UpdateError(
             f"{part.name.removesuffix('GraphPattern').upper()} isn't read here",
@@ -444,6 +484,13 @@ class _Writer:
         if name == "Builtin_NOTEXISTS":
             group = self.group(parts(one.graph), known)
             return [self.negated(self.sought(group, known, place(one)), bool(group.determined), place(one))]
+        if (
+            name == "RelationalExpression"
+            and one.op in SIGNS
+            and (self.is_number(one.expr) or self.is_number(one.other))
+        ):
+            left, right = (self.expression(side, known, place(one)) for side in (one.expr, one.other))
+            return [self.comparison(left, SIGNS[one.op], right, one.op == "!=", place(one))]
         if name == "RelationalExpression" and one.op in ("=", "!="):
             return [self.equal(one.expr, one.other, one.op == "!=", known)]
         if name == "RelationalExpression" and one.op in ("IN", "NOT IN"):
@@ -544,6 +591,9 @@ class _Writer:
             about = self.put(one.subject, known, one.subject.at)
             return self.leaf("ClassCondition", one.subject.at, about=about, ofClass=self.iri(one.object))
         prop = self.iri(one.predicate)
+        if self.vocabulary.numeric(prop):
+            right = self.expression(_last(one), known, one.predicate.at)
+            return self.comparison(self.measured(one, known), "=", right, False, one.subject.at)
         if prop in self.vocabulary.relations:
             arguments = self.arguments(one, known)
             *first, last = arguments
@@ -587,6 +637,74 @@ class _Writer:
             at,
         )
 
+    # -------------------------------------------------------------------------------------------------------- numbers
+
+    def is_number(self, tree: Any) -> bool:
+        """Tell whether an expression is one of numbers."""
+        one = _unwrapped(tree)
+        if isinstance(one, Word):
+            return one in self.numbers
+        return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
+
+    def expression(self, tree: Any, known: Collection[str], at: int) -> _Side:
+        """Return what a number is worked out from."""
+        one = _unwrapped(tree)
+        if isinstance(one, Number):
+            return one
+        if isinstance(one, Word) and one in self.numbers and one in known:
+            said = self.numbers[one]
+            return self.measured(said, known) if isinstance(said, Triple) else self.expression(said, known, at)
+        name = getattr(one, "name", "")
+        if name == "UnaryMinus":
+            found = self.expression(one.expr, known, at)
+            return Number(-found.value) if isinstance(found, Number) else _Sum("-", Number(Fraction(0)), found)
+        if name in ARITHMETIC:
+            found = self.expression(one.expr, known, at)
+            for sign, other in zip(one.op, one.other, strict=True):
+                found = _Sum(str(sign), found, self.expression(other, known, at))
+            return found
+        number = _term_or_none(one)
+        if isinstance(number, Number):
+            return number
+        what = f"{one} is no number" if isinstance(one, Word) else "this is no number"
+        raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
+
+    def measured(self, one: Triple, known: Collection[str]) -> _Measured:
+        """Return the amount of which a triple speaks."""
+        prop, at = self.iri(one.predicate), one.predicate.at
+        terms = [self.put(each, known, at) for each in (one.subject, *_middle(one))]
+        kind = "relation" if prop in self.vocabulary.measures else "situationType"
+        return _Measured(kind, self.vocabulary.properties.get(prop, prop), tuple(terms))
+
+    def comparison(self, left: _Side, sign: str, right: _Side, negated: bool, at: int) -> str:
+        node = self.new("condition", "Comparison", at)
+        self.nodes[node][CORE + "sign"] = [sign]
+        self.side(node, "left", left, at)
+        self.side(node, "right", right, at)
+        if negated:
+            self.nodes[node][CORE + "negated"] = ["true"]
+        return node
+
+    def side(self, node: str, name: str, side: _Side, at: int) -> None:
+        """Say one side of a comparison, calculation or effect: an amount on the left and a number on the right need no node."""
+        if name == "left" and isinstance(side, _Measured):
+            self.nodes[node] |= side.said()
+            return
+        if name == "right" and isinstance(side, Number):
+            self.nodes[node][CORE + "amount"] = [written(side.value)]
+            return
+        inner = self.new("amount", "Calculation", at)
+        self.nodes[node][CORE + name] = [inner]
+        match side:
+            case _Measured():
+                self.nodes[inner] |= side.said()
+            case Number(value):
+                self.nodes[inner][CORE + "amount"] = [written(value)]
+            case _Sum(sign, left, right):
+                self.nodes[inner][CORE + "sign"] = [sign]
+                self.side(inner, "left", left, at)
+                self.side(inner, "right", right, at)
+
     # -------------------------------------------------------------------------------------------------------- effects
 
     def effects(self, operation: Operation, when: Sequence[str], known: Collection[str], *asked: _Group) -> None:
@@ -596,6 +714,7 @@ class _Writer:
         for one in operation.delete:
             self.changes(one)
             one_value = self.iri(one.predicate) not in self.pairs and _last(one) != Truth(True)
+            numeric = self.vocabulary.numeric(self.iri(one.predicate)) and self.numbers.get(str(_last(one))) == one
             if not one_value:
                 self.effect(one, when, known, negated=True)
                 continue
@@ -606,7 +725,7 @@ class _Writer:
                     f"insert the one that it gets {where}",
                     one.predicate.at,
                 )
-            if (one.subject, one.predicate, one.object) not in said:
+            if (one.subject, one.predicate, one.object) not in said and not numeric:
                 raise UpdateError(
                     f"{one.predicate} is deleted with a value that WHERE doesn't say it has",
                     f"say so there, or leave out DELETE: what is inserted takes the place of what was {where}",
@@ -627,9 +746,15 @@ class _Writer:
         raise UpdateError(what, "use the property of a situation type", one.predicate.at)
 
     def effect(self, one: Triple, when: Sequence[str], known: Collection[str], negated: bool) -> None:
-        said = self.situation(one, known)
-        node = self.new("effect", "ValueEffect", one.subject.at)
-        self.nodes[node] |= {CORE + key: [value] for key, value in said.items()}
+        if self.vocabulary.numeric(self.iri(one.predicate)):
+            node = self.new("effect", "AmountEffect", one.subject.at)
+            own, by = self.measured(one, known), self.expression(_last(one), known, one.predicate.at)
+            change = CHANGES[by.sign] if isinstance(by, _Sum) and by.left == own and by.sign in CHANGES else "assign"
+            self.nodes[node] |= {**own.said(), CORE + "change": [change]}
+            self.side(node, "right", by.right if isinstance(by, _Sum) and change != "assign" else by, one.subject.at)
+        else:
+            node = self.new("effect", "ValueEffect", one.subject.at)
+            self.nodes[node] |= {CORE + key: [value] for key, value in self.situation(one, known).items()}
         if negated:
             self.nodes[node][CORE + "negated"] = ["true"]
         if when:
@@ -660,27 +785,66 @@ class _Writer:
                     yield ox.Triple(ox.NamedNode(node), ox.NamedNode(prop), _object(prop, value))
 
 
+@dataclass(frozen=True)
+class _Measured:
+    """The amount of some individuals, or the number that a relation gives for them."""
+
+    kind: str
+    of: str
+    terms: tuple[str, ...]
+
+    def said(self) -> dict[str, list[str]]:
+        """Return the properties that say it."""
+        terms = {CORE + name: [node] for name, node in zip(ARGUMENTS, self.terms, strict=False)}
+        return {CORE + self.kind: [self.of], **terms}
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Two numbers with a sign between them."""
+
+    sign: str
+    left: _Side
+    right: _Side
+
+
+_Side: TypeAlias = "_Measured | _Sum | Number"
+
+
 @dataclass
 class _Group:
     """A group of patterns, without those that only say how its variables begin.
 
     `chosen` are variables that begin with their type; `determined` those that begin as the value of a situation, each with
-    its type (a word), or the situation type if it has none, and its place.
+    its type (a word), or the situation type if it has none, and its place; `numbers` those that stand for a number, each with
+    the triple that gives it or the expression of its BIND.
     """
 
     parts: list[Any] = field(default_factory=list)
     chosen: dict[str, Word] = field(default_factory=dict)
     determined: dict[str, tuple[Word | str, int]] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
 
     @property
     def names(self) -> set[str]:
-        return {*self.chosen, *self.determined}
+        return {*self.chosen, *self.determined, *self.numbers}
 
 
 def _object(prop: str, value: str) -> ox.NamedNode | ox.Literal:
     if prop == CORE + "negated":
         return ox.Literal(True)
+    if prop == CORE + "amount":
+        return ox.Literal(value, datatype=ox.NamedNode(XSD + "decimal"))
+    if prop in (CORE + "sign", CORE + "change"):
+        return ox.Literal(value)
     return ox.Literal(int(value)) if prop == CORE + "index" else ox.NamedNode(value)
+
+
+def _term_or_none(tree: Any) -> Said | None:
+    """Return a term, if it is one."""
+    with suppress(UpdateError):
+        return term(tree, 0)
+    return None
 
 
 def _variables(one: Triple) -> list[Word]:

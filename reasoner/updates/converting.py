@@ -270,7 +270,7 @@ def _is_term(iri: str, schema: Schema) -> bool:
 
 def _is_said(iri: str, schema: Schema) -> bool:
     return any(
-        kind.startswith(CORE) and kind.endswith(("Condition", "Effect", "Of", "Witness"))
+        kind.startswith(CORE) and kind.endswith(("Condition", "Effect", "Of", "Witness", "Comparison", "Calculation"))
         for kind in schema.nodes[iri][TYPE]
     )
 
@@ -347,6 +347,7 @@ def plainly(behavior: Behavior) -> object:
         behavior.cost,
         _plain(behavior.preconditions),
         frozenset(effects),
+        frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when)) for e in behavior.amounts),
     )
 
 

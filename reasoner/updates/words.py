@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -39,8 +41,15 @@ class Truth:
     value: bool
 
 
-Said = Word | Truth
-Value = Word | Truth | tuple[Said, ...]
+@dataclass(frozen=True)
+class Number:
+    """A number, exact."""
+
+    value: Fraction
+
+
+Said = Word | Truth | Number
+Value = Word | Truth | Number | tuple[Said, ...]
 
 
 @dataclass(frozen=True)
@@ -223,7 +232,7 @@ def _value(value: Any, cells: Mapping[object, list[Any]], at: int) -> Value:
 
 
 def term(value: Any, at: int) -> Said:
-    """Return a variable, a name or a truth value.
+    """Return a variable, a name, a truth value or a number.
 
     Raises
     ------
@@ -232,8 +241,11 @@ def term(value: Any, at: int) -> Said:
     """
     if isinstance(value, Word):
         return value
-    if isinstance(getattr(value, "value", None), bool):
-        return Truth(value.value)
+    said = getattr(value, "value", None)
+    if isinstance(said, bool):
+        return Truth(said)
+    if isinstance(said, int | float | Decimal):
+        return Number(Fraction(str(value)))
     shown = f"'{value}'" if type(value).__name__ == "Literal" else "something without a name"
     raise UpdateError(f"{shown} stands where an individual belongs", "name an individual, or use a variable", at)
 

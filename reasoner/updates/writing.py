@@ -9,10 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 
+from reasoner.amounts import Amount, Calculation, Expression, Measure, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -26,6 +29,7 @@ from reasoner.symbols import (
     substituted,
 )
 
+CHANGES = {"increase": "+", "decrease": "-", "scale": "*"}
 Spell = Callable[[str], str]
 """Returns how an individual, class or property is written."""
 
@@ -51,25 +55,23 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     labels : sequence of str
         Of its preconditions, in order; they become comments.
     """
-    if behavior.amounts:
-        raise ValueError("it changes amounts, which an update can't say")
     writer = _Writer(behavior, situations, spell)
     (_, effects), *conditional = _operations(behavior)
     operations = [writer.main(effects, labels), *(writer.conditional(when, made) for when, made in conditional)]
     return " ;\n".join(operations) + "\n"
 
 
-def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect]]]:
+def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
     """Return what has to hold, besides the preconditions, and the effects of each operation; the first has no condition.
 
     Their order is that in which effects are made: only where nothing becomes false can it matter.
     """
-    found: list[tuple[tuple[Condition, ...], list[ValueEffect]]] = [((), [])]
+    found: list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]] = [((), [])]
     for effect in (e for e in behavior.effects if e.value != FALSE):
         if effect.when != found[-1][0]:
             found.append((effect.when, []))
         found[-1][1].append(effect)
-    for effect in (e for e in behavior.effects if e.value == FALSE):
+    for effect in (*(e for e in behavior.effects if e.value == FALSE), *behavior.amounts):
         group = next((effects for when, effects in found if when == effect.when), None)
         if group is None:
             group = []
@@ -84,17 +86,20 @@ class _Writer:
     situations: Situations
     spell: Spell
     names: dict[str, str] = field(default_factory=dict)
+    scope: dict[str, bool] = field(default_factory=dict)  # of the first WHERE
+    given: dict[Expression, str] = field(default_factory=dict)  # the numbers that it names
 
-    def main(self, effects: Sequence[ValueEffect], labels: Sequence[str]) -> str:
+    def main(self, effects: Sequence[ValueEffect | AmountEffect], labels: Sequence[str]) -> str:
         """Return the first operation: it says parameters and preconditions."""
         behavior = self.behavior
         for term in (*behavior.parameters, *behavior.variables):
             self.put(term.name)
         chosen = " ".join(f"{self.put(p.name)} a {self.spell(p.kind)} ." for p in behavior.parameters)
-        lines = self.group(behavior.preconditions, self.chosen(), labels)
+        self.scope = self.chosen()
+        lines = self.group(behavior.preconditions, self.scope, labels)
         return self.operation(effects, behavior.preconditions, [chosen, *lines] if chosen else lines)
 
-    def conditional(self, when: tuple[Condition, ...], effects: Sequence[ValueEffect]) -> str:
+    def conditional(self, when: tuple[Condition, ...], effects: Sequence[ValueEffect | AmountEffect]) -> str:
         """Return a further operation."""
         known = self.chosen()
         self.group(self.behavior.preconditions, known)
@@ -103,12 +108,40 @@ class _Writer:
     def chosen(self) -> dict[str, bool]:
         return {parameter.name: True for parameter in self.behavior.parameters}
 
-    def operation(self, effects: Sequence[ValueEffect], asked: Sequence[Condition], lines: Sequence[str]) -> str:
-        delete = [old for effect in effects if (old := self.before(effect, asked)) is not None]
-        insert = [self.situation(e.situation, e.arguments, e.value) for e in effects if e.value != FALSE]
+    def operation(
+        self, effects: Sequence[ValueEffect | AmountEffect], asked: Sequence[Condition], lines: Sequence[str]
+    ) -> str:
+        values = [effect for effect in effects if isinstance(effect, ValueEffect)]
+        delete = [old for effect in values if (old := self.before(effect, asked)) is not None]
+        insert = [self.situation(e.situation, e.arguments, e.value) for e in values if e.value != FALSE]
+        more: list[str] = []
+        for effect in (effect for effect in effects if isinstance(effect, AmountEffect)):
+            old, new, given = self.changed(effect)
+            delete += old
+            insert.append(new)
+            more += given
         head = [f"DELETE {{ {' . '.join(dict.fromkeys(delete))} }}"] if delete else []
         head += [f"INSERT {{ {' . '.join(insert)} }}"] if insert or not delete else []
-        return "\n".join([*head, "WHERE {", *(f"  {line}" for line in lines), "}"])
+        return "\n".join([*head, "WHERE {", *(f"  {line}" for line in (*lines, *more)), "}"])
+
+    def changed(self, effect: AmountEffect) -> tuple[list[str], str, list[str]]:
+        """Return what a change of an amount deletes and inserts, and the lines that work it out."""
+        own, lines = Amount(effect.situation, effect.arguments), list[str]()
+        given = dict(self.given)
+        before = self.number(own, lines, given)
+        by = self.number(effect.amount, lines, given)
+        if effect.operation == "assign":
+            match effect.amount:
+                case Calculation(sign, left, _) if left == own and sign in CHANGES.values():
+                    raise ValueError("it assigns an amount what another effect would be written by")
+            after = by
+        else:
+            by = f"{before} {CHANGES[effect.operation]} {by}"
+        if effect.operation != "assign" or isinstance(effect.amount, Calculation):
+            after = self.put(f"?after\0{len(self.names)}")
+            lines.append(f"BIND({by} AS {after})")
+        said = own.situation, own.arguments
+        return [self.with_number(*said, before)], self.with_number(*said, after), [" ".join(lines)] if lines else []
 
     def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
         """Return what an effect deletes: what it makes false, or the value that the conditions say was there."""
@@ -129,9 +162,9 @@ class _Writer:
         if not term.startswith("?"):
             return self.spell(term)
         if term not in self.names:
-            name = "?" + re.sub(r"\W", "_", term[1:])
+            name, number = "?" + re.sub(r"\W", "_", term[1:].partition("\0")[0]), 1
             while name in self.names.values():
-                name += "_"
+                name, number = f"{name.removesuffix(f'_{number}')}_{number + 1}", number + 1
             self.names[term] = name
         return self.names[term]
 
@@ -194,8 +227,36 @@ class _Writer:
                 return " ".join([sought, *self.group(conditions, {**dict.fromkeys(known, True), variable: True})])
             case AnyOf(alternatives):
                 return self.any_of(alternatives, known)
-            case Comparison():
-                raise ValueError("it compares amounts, which an update can't say")
+            case Comparison(left, sign, right):
+                patterns, given = list[str](), self.given if known is self.scope else {}
+                compared = f"FILTER({self.number(left, patterns, given)} {sign} {self.number(right, patterns, given)})"
+                return " ".join([*patterns, compared])
+
+    def number(self, expression: Expression, patterns: list[str], given: dict[Expression, str]) -> str:
+        """Return an expression over variables; the patterns that give them their amounts are added, unless they are there."""
+        match expression:
+            case Fraction():
+                said = written(expression)
+                if "/" in said:
+                    raise ValueError(f"{said} isn't said by a decimal number")
+                return said
+            case Calculation(sign, left, right):
+                return f"({self.number(left, patterns, given)} {sign} {self.number(right, patterns, given)})"
+            case Amount(of, arguments) | Measure(of, arguments):
+                if expression in given:
+                    return given[expression]
+                local = (
+                    re.sub(r"\W", "", self.spell(self.situations.properties.get(of, of)).rpartition(":")[2]) or "number"
+                )
+                name = self.put(f"?{local}\0{len(self.names)}")
+                patterns.append(self.with_number(of, arguments, name) + " .")
+                given[expression] = name
+                return name
+        raise TypeError(f"{expression!r} is no expression")
+
+    def with_number(self, of: str, arguments: Sequence[str], number: str) -> str:
+        subject, *rest = map(self.put, arguments)
+        return f"{subject} {self.spell(self.situations.properties.get(of, of))} {_listed([*rest, number])}"
 
     def any_of(self, alternatives: Sequence[Sequence[Condition]], known: dict[str, bool]) -> str:
         if chosen := _choice(alternatives):
