@@ -113,11 +113,13 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
 
 @cache
 def _grammar() -> pyparsing.ParserElement:
+    from rdflib import Literal
     from rdflib.plugins.sparql import parser
 
-    unit, variable, name, iri, a = deepcopy(
-        (parser.UpdateUnit, parser.Var, parser.PrefixedName, parser.IRIREF, parser.A)
+    unit, variable, name, iri, a, negative = deepcopy(
+        (parser.UpdateUnit, parser.Var, parser.PrefixedName, parser.IRIREF, parser.A, parser.DECIMAL_NEGATIVE)
     )
+    negative.set_parse_action(lambda tokens: Literal(-tokens[0].value))  # rdflib's own fails with a decimal number
 
     def word(element: pyparsing.ParserElement, spelled: Any) -> None:
         def placed(text: str, at: int, tokens: pyparsing.ParseResults) -> Word:
@@ -148,7 +150,7 @@ def _stuck(text: str) -> int:
 
     for element in unit.visit_all():  # type: ignore[no-untyped-call]
         element.set_fail_action(failed)
-    with suppress(pyparsing.ParseBaseException):
+    with suppress(pyparsing.ParseBaseException, TypeError):  # of -0.5, which is no fault
         unit.parse_string(text, parse_all=True)
     return _skipped(text, farthest)
 

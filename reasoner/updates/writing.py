@@ -71,12 +71,13 @@ def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[Va
         if effect.when != found[-1][0]:
             found.append((effect.when, []))
         found[-1][1].append(effect)
-    for effect in (*(e for e in behavior.effects if e.value == FALSE), *behavior.amounts):
-        group = next((effects for when, effects in found if when == effect.when), None)
+    others: list[ValueEffect | AmountEffect] = [e for e in behavior.effects if e.value == FALSE]
+    for other in (*others, *behavior.amounts):
+        group = next((effects for when, effects in found if when == other.when), None)
         if group is None:
             group = []
-            found.append((effect.when, group))
-        group.append(effect)
+            found.append((other.when, group))
+        group.append(other)
     return found
 
 
@@ -116,15 +117,15 @@ class _Writer:
         insert = [self.situation(e.situation, e.arguments, e.value) for e in values if e.value != FALSE]
         more: list[str] = []
         for effect in (effect for effect in effects if isinstance(effect, AmountEffect)):
-            old, new, given = self.changed(effect)
-            delete += old
-            insert.append(new)
+            before, after, given = self.changed(effect)
+            delete.append(before)
+            insert.append(after)
             more += given
         head = [f"DELETE {{ {' . '.join(dict.fromkeys(delete))} }}"] if delete else []
         head += [f"INSERT {{ {' . '.join(insert)} }}"] if insert or not delete else []
         return "\n".join([*head, "WHERE {", *(f"  {line}" for line in (*lines, *more)), "}"])
 
-    def changed(self, effect: AmountEffect) -> tuple[list[str], str, list[str]]:
+    def changed(self, effect: AmountEffect) -> tuple[str, str, list[str]]:
         """Return what a change of an amount deletes and inserts, and the lines that work it out."""
         own, lines = Amount(effect.situation, effect.arguments), list[str]()
         given = dict(self.given)
@@ -141,7 +142,7 @@ class _Writer:
             after = self.put(f"?after\0{len(self.names)}")
             lines.append(f"BIND({by} AS {after})")
         said = own.situation, own.arguments
-        return [self.with_number(*said, before)], self.with_number(*said, after), [" ".join(lines)] if lines else []
+        return self.with_number(*said, before), self.with_number(*said, after), [" ".join(lines)] if lines else []
 
     def before(self, effect: ValueEffect, asked: Sequence[Condition]) -> str | None:
         """Return what an effect deletes: what it makes false, or the value that the conditions say was there."""
