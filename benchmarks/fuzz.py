@@ -284,7 +284,7 @@ def _import_all() -> None:
     """Import what the cases need, once for all of them."""
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
-        "planner": "acting.executive experience.portfolio hierarchical.bounds paper.hierarchy",
+        "planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
         "reasoner": "validation.validate graph.apart reading.affordance",
     }
     for name in (

@@ -24,7 +24,7 @@ from confab import load as confab_scene
 from confab.cli import main as confab
 from confab.memory import Memory
 from reasoner.files import alone
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
 COMMANDS = {
     "learn": "learn",
@@ -65,8 +65,8 @@ def learn(file: Path, number: int) -> None:
     """Learn one more episode into a memory, as `confab learn` does."""
     with alone(file):
         memory = Memory.load(file)
-        lesson = Candidate(Conclusion("B1_MOVE", ("Cup", "Location")), (("turn", str(number)),))
-        memory.experience.learn([Decision(lesson)])
+        cups = GoalKind("LOCATION", ("Cup",))
+        memory.experience.learn(Lesson(counted=[(cups, ("turn", str(number)), Tally(1))]))
         memory.save(file)
 
 
@@ -86,7 +86,8 @@ def torn(folder: Path) -> list[str]:
 
 def rename(file: Path) -> str:
     """Return a rename that the memory can do: there, or back again."""
-    classes = {kind for _, conclusion, _, _ in Memory.load(file).experience for kind in conclusion.classes}
+    said = Memory.load(file).experience.said.values()
+    classes = {kind for one in said if isinstance(one, GoalKind) for kind in one.classes}
     return "Mug=Cup" if "Mug" in classes else "Cup=Mug"
 
 

@@ -35,8 +35,9 @@ from typing import Any
 
 from benchmarks._beside import beside_peers, optimal_costs
 from benchmarks.pddl import peers
-from planner.experience import portfolio as guided
-from planner.experience.portfolio import Memory
+from planner.experience.advice import Memory
+from planner.experience.advice import plan as guided
+from planner.experience.lessons import teach
 from planner.grounded.best_first import plan_level
 from planner.hierarchical import serialization as serialise
 from planner.hierarchical.planner import Compiled, compiled, plan
@@ -46,13 +47,12 @@ from planner.plan import Limits, Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import load
-from reasoner.memory.counts import Experience
+from reasoner.memory.experience import Experience
 from reasoner.reading.problem import read
 from reasoner.symbols import Domain, Problem
 from worlds.families import family as packed
 from worlds.families import random_table
 from worlds.lessons import problem as lesson
-from worlds.lessons import teach
 from worlds.truth import TooManyError, World
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
@@ -405,8 +405,8 @@ def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome
         return plan(problem, limits=limits, improve=0, using=Compiled(compiled(problem).program, Forgetful()))
 
     return {
-        "nothing, memory leading": partial(guided.plan, problem, memory, "leading", limits),
-        "nothing, memory guarded": partial(guided.plan, problem, memory, "guarded", limits),
+        "nothing, memory leading": partial(guided, problem, memory, "leading", limits),
+        "nothing, memory guarded": partial(guided, problem, memory, "guarded", limits),
         "memory": partial(plan, problem, limits=limits, improve=0),
         "memory, cached refinements": without_templates,
         "memory, relevance": without_relevance,
@@ -419,7 +419,7 @@ def parts() -> None:
     """Switch each part off in turn, `BUDGET` CPU seconds each, to see what it contributes."""
     experience = Experience("lessons")
     for family, objects, seed in product(("served", "swap", "full"), (4, 6), (100, 101)):
-        teach(experience, lesson(family, objects, seed), 1)
+        teach(experience, lesson(family, objects, seed))
     memory = Memory(experience)
     print("| family | n | without | status | CPU ms | expansions 1/2/3 | primitives |")
     print("|---|---|---|---|---|---|---|")

@@ -17,7 +17,7 @@ from confab.table import Table
 from planner.paper.transitions import ground
 from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.memory.counts_file import Lines
+from reasoner.memory.experience_file import Lines
 from reasoner.names import local_name, nearest
 from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY
 
@@ -30,8 +30,9 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 {entries}
 </catalog>
 """
-TERMS = [CORE + name for name in ("behavior", "situationType", "relation")]
-WORDS = [CORE + name for name in ("facts", "asks", "answer")]
+SPEAKS = "behavior does situationType relation termType ofClass first then refines isValueOf becomesValueOf"
+TERMS = [CORE + name for name in SPEAKS.split()]
+WORDS = [CORE + name for name in ("asks", "answer")]
 """What names terms in texts."""
 ROLES = [CORE + name for name in ARGUMENTS]
 
@@ -218,12 +219,12 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     spoken: set[str] = set()
     with suppress(SyntaxError):  # of which reading the memory tells
         quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY))
-        counters = {q.subject for q in quads if q.predicate.value == CORE + "epoch"}
+        kinds = {q.subject for q in quads if getattr(q.object, "value", "") == CORE + "GoalKind"}
         spoken = {
             q.object.value
             for q in quads
             if isinstance(q.object, ox.NamedNode)
-            and (q.predicate.value in TERMS or (q.subject in counters and q.predicate.value in ROLES))
+            and (q.predicate.value in TERMS or (q.subject in kinds and q.predicate.value in ROLES))
         }
     asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken))
     rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if spoken else []

@@ -339,7 +339,7 @@ def carry_out(
         memory = Memory.load(memory, scene)
     planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
     if planner is None and memory is not None and not isinstance(memory, Links):
-        from planner.experience.portfolio import planner_with
+        from planner.experience.advice import planner_with
 
         planner = planner_with(memory.advisor, mode)
     number("seed", seed, "an integer")

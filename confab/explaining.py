@@ -1,25 +1,21 @@
-"""Why this behaviour and not that one: the summands of cogency themselves, as text, JSON and a picture.
-
-Facts often say the same thing in other words. What is named first is a fact together with its paraphrases (`also`), without which
-the choice would have been less clear: memory is asked again as if they had never been looked at, and the lead over the alternative
-shrinks by `drop`, or turns.
-"""
+"""Why this behaviour and not that one: the rule that does it, the episodes behind it, and the summands of cogency themselves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from confab.lifted import sentence
+from confab.lifted import Sayings
 from confab.report.markup import styled, tag
-from planner.experience.choice_points import Field, Ground, single_level
-from planner.experience.scoring import TOGETHER, Judge
-from planner.hierarchical.operators import Program
+from planner.experience.advice import Memory as Advisor
+from planner.experience.evidence import View
+from planner.experience.leading import Candidate, Guide
+from planner.hierarchical.serialization import Call, compiled
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.counts import Candidate
+from reasoner.memory.experience import ITSELF, Fact, Ground, Tally
 from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -29,23 +25,16 @@ if TYPE_CHECKING:
     from confab.memory import Memory
 
 SHOWN = 8
-LEAST_DROP = 0.01  # of the lead
-PRIOR = "how often it is chosen at all"
 
 
 @dataclass(frozen=True)
 class Why:
-    """One fact: what it is of the chosen behaviour and of the alternative, and how much it spoke for the choice.
-
-    `says` and `says_other` say this in sentences, where labels were given.
-    """
+    """One fact: what it is of the chosen behaviour and of the alternative, and how much it spoke for the choice."""
 
     fact: str
     chosen: str
     other: str
     weight: float
-    drop: float | None = None
-    also: tuple[str, ...] = ()
     says: str = ""
     says_other: str = ""
 
@@ -54,13 +43,15 @@ class Why:
 class Explanation:
     """Why `chosen` was preferred to `other`; weights are differences of ln odds, `lead` is their sum.
 
-    `note` says where memory wasn't asked, or has nothing to say.
+    `rule` says what was learned in a sentence, `behind` the episodes behind it, `note` where memory has nothing to say.
     """
 
     chosen: str
     other: str
     lead: float
     reasons: tuple[Why, ...]
+    rule: str = ""
+    behind: str = ""
     note: str = ""
 
     def json(self) -> dict[str, Any]:
@@ -85,28 +76,15 @@ class Explanation:
 
     def __str__(self) -> str:
         """Return the explanation in a few lines."""
-        if not self.other:
-            return f"{self.chosen}: there was no alternative"
-        how = (
-            ""
-            if self.lead > 1e-6
-            else ", to memory just as good"
-            if self.lead > -1e-6
-            else ", which memory would rather have"
-        )
-        lines = [f"{self.chosen}, not {self.other}{how} (lead {self.lead:+.2f}), because"]
+        lines = [f"{self.chosen}{': there was no alternative' if not self.other else f', not {self.other}'}"]
+        if self.rule:
+            lines += [f"  the rule: {self.rule}", f"  behind it: {self.behind}"]
+        if self.other and self.reasons:
+            lines.append(f"  cogency speaks {'for' if self.lead >= 0 else 'against'} it by {abs(self.lead):.2f}:")
         for why in self.reasons[:SHOWN]:
-            also = (
-                f" (in other words: {', '.join(why.also[:2])}{' …' if len(why.also) > 2 else ''})" if why.also else ""
-            )
-            drop = "" if why.drop is None else f"; without it the lead is {self.lead - why.drop:+.2f}"
-            if why.says:
-                there = f"; there: {why.says_other}" if why.says_other else ""
-                also = f" ({len(why.also)} more say so in other words)" if why.also else ""
-                lines.append(f"  {why.weight:+6.2f}  {why.says}{there}{also}{drop}")
-            else:
-                lines.append(f"  {why.weight:+6.2f}  {why.fact}: {why.chosen}, there {why.other}{also}{drop}")
-        return "\n".join([*lines, *([f"({self.note})"] if self.note else [])])
+            there = f"; there: {why.says_other or why.other}" if why.other else ""
+            lines.append(f"  {why.weight:+6.2f}  {why.says or f'{why.fact}: {why.chosen}'}{there}")
+        return "\n".join([*lines, *([f"  ({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw what spoke for the choice (right) and against it (left), and save the picture if a file is given."""
@@ -154,9 +132,9 @@ def explain(
     number : int
         Which of them is to be explained.
     against : behaviour and arguments, optional
-        The alternative; if left out, the most cogent one.
+        The alternative; if left out, what else rules would do there.
     labels : Labels, optional
-        To say it in sentences.
+        To say it in people's words.
 
     Raises
     ------
@@ -165,100 +143,86 @@ def explain(
     """
     if not 0 <= number < len(steps):
         raise KnowledgeError(f"no step {number}: the plan has {len(steps)} on this level, counted from 0")
-    level = problem.domain.behaviors[steps[number][0]].level
-    within = single_level(problem, level)
-    field = Field(Program(within), within, level)
+    advisor = memory.advisor
+    call = Call(problem, compiled(problem), None, 1)
     for step in steps[:number]:
-        if not field.do(step):
+        done = call.segments.forward[step[0]](*step[1])
+        if done is None:
             raise KnowledgeError(f"{_words(step)}: its preconditions don't hold there")
-    chosen = field.candidate(steps[number])
-    if chosen is None:
-        raise KnowledgeError(f"{_words(steps[number])}: its preconditions don't hold there")
-    judge = _judge(memory, field)
-    if against is None:
-        others = [ground for ground in field.proposals(field.unmet()) if ground != steps[number]]
-        mine = judge.cogency(chosen)
-        scored = sorted(((_cogency(judge, field, ground), ground) for ground in others), reverse=True)
-        against = next((ground for score, ground in scored if score < mine - 1e-6), scored[0][1] if scored else None)
-    if against is None:
-        return Explanation(_words(steps[number]), "", 0.0, ())
-    other = field.candidate(against)
-    if other is None:
-        raise KnowledgeError(f"{_words(against)} could not be done there, so memory had no choice")
-    reasons = differences(judge, chosen, other)
-    lead = sum(why.weight for why in reasons)
-    behavior = chosen.conclusion.behavior
-    note = "" if judge.knows([behavior]) else f"memory has never seen {behavior} chosen or passed over"
-    first = _decisive(reasons, lambda facts: _lead(_judge(memory, field, facts), chosen, other), lead)
-    named = {first.fact, *first.also} if first else set()
-    rest = tuple(why for why in reasons if why.fact not in named)
-    shown = (first, *rest) if first else rest
-    if labels is None:
-        return Explanation(_words(steps[number]), _words(against), lead, shown, note)
-    said = tuple(_in_sentences(why, chosen, other, labels) for why in shown)
-    return Explanation(_sentence(steps[number], labels), _sentence(against, labels), lead, said, note)
-
-
-def _sentence(ground: Ground, labels: Labels) -> str:
-    behavior = labels.domain.behaviors[ground[0]]
-    return labels.behavior(behavior, dict(zip((p.name for p in behavior.parameters), ground[1], strict=True)))
-
-
-def _in_sentences(why: Why, chosen: Candidate, other: Candidate, labels: Labels) -> Why:
-    if why.fact == PRIOR:
-        return replace(why, says=PRIOR)
-    if why.fact == TOGETHER:
-        return why
-    says, there = (
-        sentence(why.fact, value, labels, dict(candidate.roles))
-        for value, candidate in ((why.chosen, chosen), (why.other, other))
+        call.segments.apply(done[1])
+    for asked_of, trouble in (
+        (steps[number], "its preconditions don't hold there"),
+        (against, "could not be done there"),
+    ):
+        if asked_of is not None and call.segments.forward[asked_of[0]](*asked_of[1]) is None:
+            raise KnowledgeError(f"{_words(asked_of)}: {trouble}")
+    say = Sayings(labels)
+    guide = Guide(call, advisor.rules, advisor.orders)
+    every = [c for cell in guide.open for c in guide.every(cell)]
+    ways = [c for c in every if not guide.waits(c.goal)] or every
+    view = View(call.program, call.table, call.goal)
+    chosen = _best([c for c in every if c.ground == steps[number]], advisor, view)
+    asked = (
+        [c for c in ways if c.ground != steps[number]] if against is None else [c for c in every if c.ground == against]
     )
-    return replace(why, says=says, says_other=there)
+    other = _best(asked, advisor, view)
+    what = say.step(*steps[number])
+    ground = other.ground if other is not None else against
+    instead = say.step(*ground) if ground is not None else ""
+    if chosen is None:
+        note = f"memory has no rule that would do {what} there"
+        return Explanation(what, instead, 0.0, (), note=note)
+    note = "" if other is not None or against is None else f"memory has no rule that would do {instead} there"
+    reasons = _differences(chosen, other, advisor, view, say) if other is not None else ()
+    return Explanation(
+        what,
+        instead,
+        sum(why.weight for why in reasons),
+        reasons,
+        say.rule(chosen.rule),
+        behind(memory, chosen.rule.name),
+        note,
+    )
 
 
-def _decisive(reasons: Sequence[Why], lead_without: Callable[[frozenset[str]], float], lead: float) -> Why | None:
-    """Return the strongest fact with the paraphrases that have to go with it before the lead shrinks."""
-    facts = [why for why in reasons if why.weight > 0 and why.fact not in (PRIOR, TOGETHER)]
-    words: list[Why] = []
-    for why in facts:
-        words.append(why)
-        if abs(why.weight - facts[0].weight) < 1e-6 and why is not facts[-1] and facts[len(words)].weight == why.weight:
-            continue  # counted alike so far: the same in other words
-        drop = lead - lead_without(frozenset(word.fact for word in words))
-        if drop > LEAST_DROP * abs(lead):
-            also = tuple(word.fact for word in words[1:])
-            return replace(words[0], weight=sum(word.weight for word in words), drop=drop, also=also)
-    return None
+def behind(memory: Memory, name: str) -> str:
+    """Return how often something proved good, in whose episodes."""
+    tally = memory.experience.totals().get(name, {}).get(ITSELF, Tally())
+    those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
+    lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))
+    of = f", within the episodes {lived}" if lived else ""
+    return f"chosen {tally.chosen}, passed over {tally.passed_over}, failed {tally.failed} times{of}"
 
 
-def _lead(judge: Judge, chosen: Candidate, other: Candidate) -> float:
-    return judge.cogency(chosen) - judge.cogency(other)
+def _best(ways: Sequence[Candidate], advisor: Advisor, view: View) -> Candidate | None:
+    """Return the way of the fewest steps, of these the most cogent."""
+
+    def key(c: Candidate) -> tuple[float, ...]:
+        facts, who = view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles)
+        return -c.rule.steps, advisor.judge.cogency(c.rule, facts, who)
+
+    return max(ways, key=key, default=None)
 
 
-def differences(judge: Judge, chosen: Candidate, other: Candidate) -> list[Why]:
+def _differences(chosen: Candidate, other: Candidate, advisor: Advisor, view: View, say: Sayings) -> tuple[Why, ...]:
     """Return the summands in which two cogencies differ, the greatest first."""
-    mine, theirs = judge.factors(chosen), judge.factors(other)
-    prior = (mine[0].weight if mine else 0.0) - (theirs[0].weight if theirs else 0.0)
-    here = {factor.fact: factor for factor in mine[1:]}
-    there = {factor.fact: factor for factor in theirs[1:]}
-    found = [Why(PRIOR, str(chosen.conclusion), str(other.conclusion), prior)]
-    for fact in {**here, **there}:
-        a, b = here.get(fact), there.get(fact)
-        weight = (a.weight if a else 0.0) - (b.weight if b else 0.0)
+    facts: list[dict[str, tuple[Fact, float]]] = []
+    for c in (chosen, other):
+        factors = advisor.judge.factors(c.rule, view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles))
+        facts.append({f.fact[0]: (f.fact, f.weight) for f in factors})
+    here, there = facts
+    roles = [dict(zip((role for role, _ in c.rule.kinds), c.roles, strict=True)) for c in (chosen, other)]
+    found = []
+    for asks in {**here, **there}:
+        a, b = here.get(asks), there.get(asks)
+        weight = (a[1] if a else 0.0) - (b[1] if b else 0.0)
         if abs(weight) > 1e-12:
-            found.append(Why(fact, a.value if a else "–", b.value if b else "–", weight))
-    return sorted(found, key=lambda why: (-abs(why.weight), why.fact))
-
-
-def _judge(memory: Memory, field: Field, without: Iterable[str] = ()) -> Judge:
-    behaviors = field.problem.domain.behaviors.values()
-    roles = {behavior.name: field.schema.roles(behavior) for behavior in behaviors}
-    return Judge(memory.experience, field.problem.parents, roles, frozenset(without))
-
-
-def _cogency(judge: Judge, field: Field, ground: Ground) -> float:
-    candidate = field.candidate(ground)
-    return float("-inf") if candidate is None else judge.cogency(candidate)
+            if asks == "":
+                found.append(Why("how often it is chosen at all", "", "", weight, "how often it is chosen at all"))
+                continue
+            says, says_other = (say.asked(x[0], r) if x else "" for x, r in zip((a, b), roles, strict=True))
+            found.append(Why(asks, a[0][1] if a else "–", b[0][1] if b else "–", weight, says, says_other))
+    return tuple(sorted(found, key=lambda why: (-abs(why.weight), why.fact)))
 
 
 def _words(ground: Ground) -> str:

@@ -1,81 +1,117 @@
-"""Lifted facts, by which memory tells what was chosen from what wasn't (`planner.experience.features`), as sentences in labels."""
+"""What was learned, as sentences in labels: rules, orders, methods, kinds of goals, and the facts by which cogency tells."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from confab.labels import Labels
+from planner.levels import said as plainly
+from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
+from reasoner.symbols import Condition, Domain, Fact, Symbol
 
-STEPS = {
-    "goal": "the {situation} wanted for {of}",
-    "who": "what has {of} as its {situation}",
-    "wants": "what shall have {of} as its {situation}",
-    "": "the {situation} of {of}",
-}
-TRUTH = {"yes": "", "no": "not: ", "true": "", "false": "not: "}
+MOST_SAID = 6
+"""So many conditions of a rule are said; how many more it asks for is counted."""
+ASKED = (
+    (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
+    (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),
+    (re.compile(r"who wants (\S+) as (\S+)"), "who shall have {0} as {1}: {answer}"),
+    (re.compile(r"who is (\S+)"), "{0} is {answer}"),
+    (re.compile(r"(\S+) is a (\S+)"), "{0} is a {1}: {answer}"),
+    (re.compile(r"(\S+) of (\S+)"), "the {0} of {1}: {answer}"),
+)
 
 
-def sentence(fact: str, value: str, labels: Labels, roles: Mapping[str, str]) -> str:
-    """Return a lifted fact and its value as a sentence.
+class Sayings:
+    """Says what was learned; without labels in the ontology's names.
 
     Parameters
     ----------
-    fact, value : str
-        As memory counts them: ``target · goal LOCATION = targetPlace``, ``yes``.
-    labels : Labels
-    roles : mapping of role to individual
-        Of the candidate that the fact is about.
+    labels : Labels, optional
     """
 
-    def path(text: str) -> str:
-        role, *steps = text.split(" · ")
-        said = f"{labels.name(roles[role])} (the {role})" if role in roles else f"the {role}"
-        for step in steps:
-            way, _, situation = step.rpartition(" ")
-            said = STEPS[way].format(situation=labels.name(situation), of=said)
-        return said
+    def __init__(self, labels: Labels | None = None) -> None:
+        self.labels = labels or Labels({}, {}, Domain({}, {}))
 
-    if value == "–":
-        return "no such question arises"
-    if match := re.fullmatch(r"(.+) wanted (\S+)", fact):
-        of = f"the {labels.name(match[2])} of {path(match[1])}"
-        status = {
-            "none": f"nothing is wanted of {of}",
-            "met": f"{of} is as wanted",
-            "unmet": f"{of} isn't yet as wanted",
-        }
-        return status.get(value, f"{of} is {value}")
-    if match := re.fullmatch(r"how many (\S+) (.+)", fact):
-        return f"{value} {labels.name(match[1])} {path(match[2])}"
-    if match := re.fullmatch(r"(.+) (\S+) how many", fact):
-        return f"{path(match[1])} {labels.name(match[2])} {value}"
-    if match := re.fullmatch(r"something (\S+) (\S+) and (.+)", fact):
-        if value == "none":
-            return f"nothing is {path(match[3])}"
-        none = "nothing" if value == "no" else "something"
-        return f"{none} {labels.name(match[1])} both {path(match[2])} and {path(match[3])}"
-    if match := re.fullmatch(r"others of (\S+) · (\S+) is", fact):
-        return f"the {labels.name(match[2])} of the others like {path(match[1])} is {labels.name(value)}"
-    if match := re.fullmatch(r"(.+) is(?: who)?", fact):
-        return f"{path(match[1])} is {labels.name(value)}"
-    if match := re.fullmatch(r"(.+) = (\S+)", fact):
-        if value == "none":
-            return f"nothing is {path(match[1])}"
-        return f"{path(match[1])} is {'not ' if value == 'no' else ''}{path(match[2])}"
-    return _tied(fact, value, labels, path)
+    def name(self, name: str) -> str:
+        """Return what people call a role, class or term."""
+        role = re.fullmatch(r"\?(.+?)(\d*)", name)
+        if role is None or name in self.labels.words:
+            return self.labels.name(name)
+        kind = next(
+            (k for k in (role[1], role[1].upper(), role[1][:1].upper() + role[1][1:]) if k in self.labels.words),
+            role[1],
+        )
+        return self.labels.name(kind) + (f" {role[2]}" if role[2] else "")
+
+    def condition(self, condition: Condition) -> str:
+        """Return a condition as a sentence."""
+        return plainly(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.name(what))
+
+    def fact(self, fact: Fact) -> str:
+        """Return a fact about roles."""
+        terms = {t: self.name(t) for t in (*fact.symbol.arguments, fact.value)}
+        put = Fact(Symbol(fact.symbol.situation, tuple(terms[a] for a in fact.symbol.arguments)), terms[fact.value])
+        if fact.value in ("true", "false"):
+            put = Fact(put.symbol, fact.value)
+        return self.labels.fact(put)
+
+    def step(self, behavior: str, terms: Sequence[str]) -> str:
+        """Return a behaviour with roles or individuals."""
+        known = self.labels.domain.behaviors.get(behavior)
+        if known is None or len(known.parameters) != len(terms):
+            return " ".join((self.labels.name(behavior), *map(self.name, terms)))
+        put = {p.name: self.name(term) for p, term in zip(known.parameters, terms, strict=True)}
+        return self.labels.behavior(known, put)
+
+    def goal(self, rule: Rule) -> str:
+        """Return what a rule is for."""
+        return self.fact(Fact(Symbol(rule.goal.situation, rule.goal.arguments), rule.goal.value))
+
+    def rule(self, rule: Rule, beyond: Collection[Condition] = ()) -> str:
+        """Return a rule as a sentence; conditions that its successor asks for, too, may be left out."""
+        asks = [self.condition(c) for c in rule.asks if c not in beyond]
+        more = f" and {len(asks) - MOST_SAID} things more" if len(asks) > MOST_SAID else ""
+        when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""
+        steps = "the last step" if rule.steps == 1 else f"{rule.steps} steps to go"
+        return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)} ({steps})"
+
+    def said(self, one: Said) -> str:
+        """Return what something says that was learned."""
+        match one:
+            case Rule():
+                return self.rule(one)
+            case Order(first, then, shared):
+                same = " of the same individual" if shared else ""
+                return f"{self.name(first)} before {self.name(then)}{same}"
+            case Method(behavior, _, steps, _):
+                return f"{self.name(behavior)} by {', '.join(self.name(name) for name, _ in steps)}"
+            case GoalKind(situation, classes):
+                return f"{self.name(situation)} of {', '.join(map(self.name, classes))}"
+        raise TypeError(one)
+
+    def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:
+        """Return a fact that cogency looked at, with individuals for roles."""
+        asks, answer = fact
+
+        def put(word: str) -> str:
+            return self.labels.name(roles["?" + word]) if "?" + word in roles else self.name(word)
+
+        for pattern, sentence in ASKED:
+            if match := pattern.fullmatch(asks):
+                return sentence.format(*map(put, match.groups()), answer=put(answer))
+        return f"{' '.join(map(put, asks.split()))}: {answer}"
 
 
-def _tied(fact: str, value: str, labels: Labels, path: object) -> str:
-    """Return a fact that ties two ends to each other by a relation, or a situation type to two roles."""
-    assert callable(path)
-    words = re.fullmatch(
-        r"(\S+(?: · (?:(?:goal|who|wants) )?\S+)*) (\S+) (\S+(?: · (?:(?:goal|who|wants) )?\S+)*)", fact
-    )
-    if words is None or fact.startswith("goal "):
-        return f"{fact}: {value}"
-    if words[1] in labels.domain.situations:
-        return TRUTH.get(value, "") + f"{path(words[2])} {labels.verbs.get(words[1], words[1])} {path(words[3])}"
-    if value == "none":
-        return f"nothing is {path(words[3] if ' · ' in words[3] else words[1])}"
-    return TRUTH.get(value, f"{value}: ") + f"{path(words[1])} {labels.name(words[2])} {path(words[3])}"
+def successors(rules: Iterable[Rule]) -> dict[str, Rule]:
+    """Return for each rule the one that most likely follows it: for the same goal, with a step less, of the most common asks."""
+    by_rank: dict[tuple[object, int], list[Rule]] = {}
+    for rule in rules:
+        by_rank.setdefault((rule.goal, rule.steps), []).append(rule)
+    found = {}
+    for (goal, steps), those in by_rank.items():
+        for rule in those:
+            after = by_rank.get((goal, steps - 1), ())
+            if after:
+                found[rule.name] = max(after, key=lambda other: (len(set(other.asks) & set(rule.asks)), other.name))
+    return found

@@ -1,28 +1,30 @@
 """The memory at the front desk: load it, learn into it, save it, merge it, look at it.
 
-One file holds both kinds of experience: the counts of lifted facts, from which the planner plans (`reasoner.memory.counts`),
-and the paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.memory.links`).
+One file holds both kinds of experience: rules with counts, by which the planner is led (`reasoner.memory.experience`), and the
+paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.memory.links`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.accepting import AnyPlan, plan_of
+from confab.lifted import Sayings, successors
 from confab.table import Table
 from planner.paper.learning import LearningError
 from planner.paper.learning import learn as learn_plan
 from planner.plan import Plan, Step
 from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.counts import Decision, Experience, Tallies
-from reasoner.memory.counts_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
+from reasoner.memory.experience import ITSELF, Experience, GoalKind, Method, Order, Rule, Tally
+from reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from reasoner.memory.links import Links
 from reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
 from reasoner.names import Names
@@ -31,8 +33,9 @@ if TYPE_CHECKING:
     from rich.console import Group
 
     from confab.known import Known
+    from confab.labels import Labels
     from planner.acting.episode import Episode
-    from planner.experience.portfolio import Memory as Advisor
+    from planner.experience.advice import Memory as Advisor
     from reasoner.symbols import Problem
 
 
@@ -53,9 +56,11 @@ class Memory:
     scene : str
         IRI of the scene that the memory file imports.
     experience : Experience
-        Counts of what was chosen, passed over and failed, by lifted facts.
+        Rules, orders of goals and methods, with what was chosen, passed over and failed.
     trusted : set of replica
         Whose experience may lead: by default the replica that learns here. With any other, planning is strict.
+    labels : function, optional
+        What people call the scene's terms, asked for where something is said.
     """
 
     links: Links
@@ -63,11 +68,12 @@ class Memory:
     scene: str
     experience: Experience = field(default_factory=lambda: Experience(new_replica()))
     trusted: set[str] = field(default_factory=set)
+    labels: Callable[[], Labels] | None = None
 
     @classmethod
     def of(cls, scene: Known) -> Memory:
         """Return an empty memory for a scene."""
-        return cls(Links(), scene.names, scene.iri)
+        return cls(Links(), scene.names, scene.iri, labels=_labels(scene))
 
     @classmethod
     def load(
@@ -104,6 +110,7 @@ class Memory:
                 found.experience = parse(lines, str(path), names)
             elif not len(found.links):
                 raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")
+        found.labels = _labels(scene) if scene is not None else None
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
 
@@ -124,6 +131,7 @@ class Memory:
             The plan can't be done in that situation; nothing is learned then.
         """
         from planner.acting.episode import Episode
+        from planner.experience.lessons import live
 
         if isinstance(episode := getattr(plan, "episode", None), Episode):
             self.live(scene.problem, episode)
@@ -132,41 +140,35 @@ class Memory:
         problem = replace(scene.problem, goal=planned.goal)
         plan = plan_of(plan, problem)
         try:
-            lived = decisions_of(problem, plan, failed)
-            if failed is None:
-                self.links = self._linked(scene, plan)
+            links = self._linked(scene, plan) if failed is None else self.links
+            live(self.experience, problem, plan, failed)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
-        self.experience.learn(lived)
+        self.links = links
 
     def teach(self, scene: Known, plan: AnyPlan) -> None:
-        """Learn how a scene is best solved, on its first two levels: see `planner.experience.demonstrations`.
+        """Learn how a scene is solved, with its goals in several orders: see `planner.experience.lessons`.
 
         Parameters
         ----------
         scene : Scene
         plan : Plan, Result or file
-            For the paper's links.
+            How it was solved.
 
         Raises
         ------
         KnowledgeError
             The plan can't be done in the scene's situation; nothing is learned then.
         """
-        from planner.experience.choice_points import decisions, single_level
-        from planner.experience.demonstrations import example
-        from planner.hierarchical.operators import Program
+        from planner.experience.lessons import teach
 
+        made = plan_of(plan, scene.problem)
         try:
-            links = self._linked(scene, plan_of(plan, scene.problem))
+            links = self._linked(scene, made)
+            teach(self.experience, scene.problem, made)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
-        lived: list[Decision] = []
-        for level in scene.problem.domain.levels[:2]:
-            within = single_level(scene.problem, level)
-            lived += decisions(Program(within), within, level, example(scene.problem, level))
         self.links = links
-        self.experience.learn(lived)
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
         """Return the paper's links with a plan learned, or as they are where that would be too many."""
@@ -204,14 +206,14 @@ class Memory:
             In which the episode's task was planned.
         episode : Episode
         """
+        from planner.experience.lessons import live
+
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
-        lived: list[Decision] = []
-        if not episode.interventions and not episode.failures:
-            with suppress(LearningError):  # what was done doesn't follow from what was seen in the beginning
-                lived += decisions_of(begun, episode.done)
-        lived += vain(begun, episode)
-        if lived:
-            self.experience.learn(lived)
+        vain = list(in_vain(problem, episode))
+        whole = not episode.interventions and not episode.failures
+        with suppress(LearningError):  # what was done doesn't follow from what was seen in the beginning
+            if whole or vain:
+                live(self.experience, begun, episode.done if whole else Plan(()), vain=vain)
 
     def save(self, target: str | Path) -> Path:
         """Write the memory as Turtle, whole or not at all, and return where; to an endpoint, this replica's own counters.
@@ -231,7 +233,7 @@ class Memory:
             push(url, self.experience, self.names, self.scene)
             return Path(target)
         links = [links_text(self.links, self.names, self.scene)] if len(self.links) else []
-        lines = chain(turtle(self.experience, self.names, self.scene), links)
+        lines = chain(turtle(self.experience, self.names, self.scene, words=self.sayings().said), links)
         write_whole(Path(target), lines, check=self._check_written)
         return Path(target)
 
@@ -247,7 +249,7 @@ class Memory:
     @property
     def advisor(self) -> Advisor:
         """The memory as the fast planner takes it."""
-        from planner.experience.portfolio import Memory as Advisor
+        from planner.experience.advice import Memory as Advisor
 
         mine = {self.experience.replica, *self.trusted}
         return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
@@ -263,28 +265,51 @@ class Memory:
         rows.sort(key=lambda row: (-float(row[3]), row))
         return Table(("behaviour", "symbol", "value", "p(value | behaviour)"), tuple(rows[:most]))
 
-    def counts(self, most: int | None = None) -> Table:
-        """Return what was counted of single facts, what tells chosen from passed over first."""
-        from planner.experience.counts import Ledger
+    def sayings(self) -> Sayings:
+        """Return what says in sentences what was learned."""
+        return Sayings(self.labels() if self.labels is not None else None)
 
-        behaviors: dict[str, Tallies] = {}
-        for conclusion, patterns in self.experience.totals().items():
-            behaviors.setdefault(conclusion.behavior, {})[conclusion] = patterns
-        rows: list[tuple[float, tuple[str, ...]]] = []
-        for behavior, tallies in behaviors.items():
-            ledger = Ledger(tallies)
-            sums = ledger.sums()
-            for (fact, value), code in ledger.code.items():
-                c, p = (float(counts[code]) for counts in sums.values)
-                share = (
-                    f"{c / sums.chosen if sums.chosen else 0:.2f}",
-                    f"{p / sums.passed if sums.passed else 0:.2f}",
-                )
-                relevance = float(sums.relevance[ledger.facts[fact]])
-                rows.append((relevance, (behavior, fact, value, f"{c:g}", f"{p:g}", *share)))
-        rows.sort(key=lambda row: (-row[0], row[1]))
-        columns = ("behaviour", "fact", "value", "chosen", "not", "p(value | chosen)", "p(value | not)", "relevance")
-        return Table(columns, tuple((*row, f"{relevance:.2f}") for relevance, row in rows[:most]))
+    def advice(self, most: int | None = None) -> Table:
+        """Return the rules by kind of goal, the shortest ways first; of each what it asks beyond the rule that follows it."""
+        say, totals = self.sayings(), self.experience.totals()
+        rules = [one for one in self.experience.said.values() if isinstance(one, Rule)]
+        after = successors(rules)
+        rows = []
+        for rule in sorted(rules, key=lambda r: (r.goals.situation, r.goals.classes, r.steps, r.name)):
+            t = totals.get(rule.name, {}).get(ITSELF, Tally())
+            kind = totals.get(rule.goals.name, {}).get(ITSELF, Tally())
+            record = f"{say.said(rule.goals)} ({kind.chosen} of {kind.chosen + kind.failed})"
+            then = after.get(rule.name)
+            text = say.rule(rule, then.asks if then is not None else ())
+            text += "" if rule.name not in self.experience.disabled else " – disabled"
+            rows.append((record, text, f"{t.chosen}", f"{t.passed_over}", f"{t.failed}"))
+        return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
+
+    def page(self, most: int | None = None) -> str:
+        """Return the advice as a page: the rules for each kind of goal, then the orders of goals and the methods."""
+        lines, last = [self.said()], None
+        for record, rule, chosen, passed, failed in list(self.advice(most)):
+            if record != last:
+                lines += ["", f"{record} reached by rules alone:"]
+                last = record
+            lines.append(f"  – {rule}. Chosen {chosen}, passed over {passed}, failed {failed} times.")
+        others = self.also()[:most]
+        return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
+
+    def also(self) -> list[str]:
+        """Return the orders and methods that were learned, as sentences with how often."""
+        from planner.experience.leading import usable
+
+        say, totals = self.sayings(), self.experience.totals()
+        orders = [
+            f"{say.said(order)}: so in {totals[order.name][ITSELF].chosen} cases" for order in usable(self.experience)
+        ]
+        methods = [one for one in self.experience.said.values() if isinstance(one, Method)]
+        counted_ = [(totals.get(one.name, {}).get(ITSELF, Tally()).chosen, say.said(one)) for one in methods]
+        return [
+            *orders,
+            *(f"{text}: {times} times" for times, text in sorted(counted_, key=lambda pair: (-pair[0], pair[1]))),
+        ]
 
     def __repr__(self) -> str:
         """Return how much was learned."""
@@ -297,21 +322,37 @@ class Memory:
         """Return how much was learned, as a sentence."""
         lived = counted(sum(self.experience.episodes.values()), "episode")
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
-        counters = counted(len(self.experience), "counter")
-        return f"{lived} so far, {counters} of what was chosen and what wasn't; of the paper's memory {links}."
+        kinds = [
+            counted(sum(isinstance(one, kind) for one in self.experience.said.values()), noun)
+            for kind, noun in ((Rule, "rule"), (Order, "order of goals"), (Method, "method"))
+        ]
+        kinds[1] = kinds[1].replace("order of goalss", "orders of goals")
+        return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."
 
     def __rich__(self) -> Group:
         """Return what was learned for rich, what tells chosen from passed over first."""
         from rich.console import Group
 
-        return Group(self.said(), self.counts(20).__rich__())
+        return Group(self.said(), self.advice(20).__rich__())
 
     def _repr_html_(self) -> str:
         from confab.report.markup import styled, tag
         from confab.report.pieces import table
 
-        shown = [table(list(t.columns), list(t)) for t in (self.counts(20), self.table(20)) if len(t)]
+        shown = [table(list(t.columns), list(t)) for t in (self.advice(20), self.table(20)) if len(t)]
         return styled(tag("p", self.said()), *shown)
+
+
+def _labels(scene: Known) -> Callable[[], Labels]:
+    """Return what reads the labels of a scene's terms, once somebody asks."""
+
+    @cache
+    def read() -> Labels:
+        from confab.labels import labels_of
+
+        return labels_of(scene.knowledge, scene.names, scene.problem)
+
+    return read
 
 
 def counted(number: int, noun: str) -> str:
@@ -342,63 +383,17 @@ def undisturbed(target: str | Path) -> AbstractContextManager[None]:
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
-def decisions_of(problem: Problem, plan: Plan, failed: tuple[int, ...] | None = None) -> list[Decision]:
-    """Return the decisions of a plan: of its first level, and of the next one seen as a problem of its own.
-
-    Raises
-    ------
-    LearningError
-        A step's preconditions don't hold where it is done.
-    """
-    from planner.experience.choice_points import Ground, decisions, single_level
-    from planner.hierarchical.operators import Program
-
-    found: list[Decision] = []
-    tops: Sequence[Step] = plan.steps
-    for level in problem.domain.levels[:2]:
-        steps = [step for step in plan.walk() if step.level == level]
-        if any(step.level > level for step in tops):
-            continue  # part of the plan was made without this level
-        at = None
-        if failed is not None:
-            at = next((i for i, step in enumerate(steps) if failed[: len(step.path)] == step.path), None)
-        grounds: list[Ground] = [(step.behavior, step.arguments) for step in steps]
-        within = single_level(problem, level)
-        if grounds:
-            found += decisions(Program(within), within, level, grounds, at)
-    return found
-
-
-def vain(problem: Problem, episode: Episode) -> list[Decision]:
-    """Return the behaviours of the upper levels that were begun in an episode and failed, where they can still be described."""
-    from planner.experience.choice_points import Field, single_level
-    from planner.hierarchical.operators import Program
-
+def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step]]:
+    """Yield the behaviours of the most abstract level that were begun in an episode and failed, with the state where they did."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
-    found: list[Decision] = []
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments
-        for level in problem.domain.levels[:2]:
-            above = next(
-                (
-                    step
-                    for step in Plan(tuple(plans)).walk()
-                    if step.level == level
-                    and step.path == failure.step.path[: len(step.path)]
-                    and any((under.behavior, under.arguments) == wanted for under in Plan((step,)).primitives)
-                ),
-                None,
-            )
-            if above is None:
-                continue
-            within = single_level(problem, level)
-            for state in (failure.state, episode.initial):
-                field = Field(Program(within), replace(within, initial=state), level)
-                candidate = field.candidate((above.behavior, above.arguments))
-                if candidate is not None:
-                    found.append(Decision(candidate, succeeded=False))
-                    break
-    return found
+        for step in plans:
+            under = [(low.behavior, low.arguments) for low in Plan((step,)).primitives]
+            if step.path == failure.step.path[:1] and wanted in under:
+                for state in (failure.state, episode.initial):
+                    yield replace(problem, initial=state, goal=episode.goal), step
+                break
 
 
-__all__ = ["FORMAT", "Memory", "decisions_of", "probability"]
+__all__ = ["FORMAT", "GoalKind", "Memory", "Order", "probability"]

@@ -3,9 +3,9 @@
 =========  ==========================================================  ================================
 mode       how it plans                                                 module
 =========  ==========================================================  ================================
-guarded    goals in series; experience leads where that gets stuck      `planner.experience.portfolio`
-leading    the same, and experience leads as long as it gets on         `planner.experience.portfolio`
-strict     the same, and experience gets a twentieth of the effort      `planner.experience.portfolio`
+guarded    goals in series; rules lead where they have helped          `planner.experience.advice`
+leading    the same, and rules lead whatever their record is           `planner.experience.advice`
+strict     the same, and rules get a twentieth of the effort           `planner.experience.advice`
 optimal    shortened until a lower bound is met, without memory         `planner.hierarchical.bounds`
 paper      A* with eq. (5) on each level                                `planner.paper.hierarchy`
 =========  ==========================================================  ================================
@@ -25,7 +25,7 @@ from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
-    from planner.experience.portfolio import Memory
+    from planner.experience.advice import Memory
     from reasoner.memory.links import Links
 
 DEFAULT_MODE = "guarded"
@@ -100,7 +100,7 @@ def _with_experience(request: Request) -> Outcome:
         from planner.hierarchical.planner import plan as without
 
         return without(request.problem, limits=request.limits, leave_levels=request.leave_levels)
-    from planner.experience.portfolio import plan
+    from planner.experience.advice import plan
 
     return plan(request.problem, request.memory, request.mode, request.limits, leave_levels=request.leave_levels)
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from planner.experience.choice_points import decisions, single_level
-from planner.experience.demonstrations import lesson
-from planner.experience.portfolio import Memory
-from planner.hierarchical.operators import Program
+from planner.experience.advice import Memory
+from planner.experience.lessons import teach
 from reasoner.generate import generate
 from reasoner.graph.knowledge import load
-from reasoner.memory.counts import Experience
+from reasoner.memory.experience import Experience
 from reasoner.reading.problem import Reading, read
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
@@ -49,22 +48,18 @@ def recognised(family: str, objects: int, seed: int = 0, clutter: int = 0) -> Pr
         return recognise(load(path)).problem
 
 
-def teach(experience: Experience, problem: Problem, level: int = 1) -> None:
-    """Let an experience live one good example."""
-    steps = lesson(problem, level)
-    if steps:
-        within = single_level(problem, level)
-        experience.learn(decisions(Program(within), within, level, steps))
+def single_level(problem: Problem, level: int) -> Problem:
+    """Return a problem whose first level is `level`: the levels above it are left out."""
+    behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level >= level}
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
 
 
 @lru_cache(maxsize=8)
-def taught(
-    families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100, 101, 102, 103)
-) -> Memory:
-    """Return a memory that saw scenes of 4 to 8 objects."""
+def taught(families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100,)) -> Memory:
+    """Return a memory that saw scenes of 4 and 6 objects."""
     experience = Experience("taught")
     for family in families:
-        for objects in (4, 6, 8):
+        for objects in (4, 6):
             for seed in seeds:
-                teach(experience, problem(family, objects, seed), level)
+                teach(experience, single_level(problem(family, objects, seed), level))
     return Memory(experience)

@@ -85,7 +85,7 @@ def learn(
                 remembered.teach(loaded, result.plan)
                 advance(f"learned {name}", 1)
             if remembered.links is links:
-                remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only counts were learned")
+                remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only rules were learned")
         assert remembered is not None
         if remembered.experience.episodes:
             remembered.save(memory)
@@ -124,15 +124,15 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 @click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="So many rows.")
 @AS_JSON
 def show(memory: str, most: int, as_json: bool) -> None:
-    """Show what a memory has counted, what discriminates first."""
+    """Show what a memory advises: rules by kind of goal, orders of goals and methods."""
     from confab.memory import Memory
 
     loaded = Memory.load(memory)
     if as_json:
-        show_result({"memory": memory, "summary": repr(loaded), "counts": loaded.counts(most).records()})
+        rules, also = loaded.advice(most).records(), loaded.also()[:most]
+        show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also})
     else:
-        show_result(repr(loaded))
-        show_result(loaded.counts(most))
+        show_result(loaded.page(most))
 
 
 @memory_app.command(epilog=examples("memory merge"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -353,8 +352,6 @@ def _by_memory(result: Result, memory: Memory, which: str, against: str | None, 
     steps = [(s.behavior, s.arguments) for s in on]
     other = ground_named(result.problem, against) if against else None
     found = explain_step(result.problem, memory, steps, on.index(asked), other, result.labels)
-    if not found.note and not any(counts.evaluated for counts in result.outcome.search.values()):
-        found = replace(found, note="the planner found this plan before memory was asked: so memory sees its choices")
     if plot is not None:
         found.plot(plot)
     return found

@@ -9,7 +9,6 @@ from string import Template
 from typing import TYPE_CHECKING, Protocol
 
 import ontology
-from confab.lifted import sentence
 from confab.report.course import Course, of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of, place_map
 from confab.report.markup import Markup, asset, joined, tag
@@ -102,7 +101,7 @@ def report_html(
     if course is not None:
         parts += [tag("h2", "Who did what when, and what that changed"), timeline(course, labels, speed)]
         parts += [tag("h2", "The plan, and why"), _plan(course, labels, report, execution)]
-    parts += [_wanted(course, problem, labels), _learned(learned, labels)]
+    parts += [_wanted(course, problem, labels), _learned(learned)]
     parts += [tag("h2", "Again"), tag("pre", again or _again(scene, report, execution)), *_small_print(outcome)]
     return Template(asset("page.html")).substitute(
         title=joined(title), style=asset("style.css"), body=joined(parts), script=asset("script.js")
@@ -296,20 +295,14 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
     return joined(tag("h2", "What was wanted"), table(columns, rows))
 
 
-def _learned(memory: Memory | None, labels: Labels) -> Markup | None:
+def _learned(memory: Memory | None) -> Markup | None:
     if memory is None:
         return None
-    found = [
-        (-float(relevance or 0), sentence(str(fact), str(value), labels, {}), str(behavior), f"{chosen} : {passed}")
-        for behavior, fact, value, chosen, passed, _, _, relevance in memory.counts(LEARNED * LEARNED)
-    ]
-    found.sort(key=lambda row: (row[0], len(row[1])))  # the most relevant; of equals the plainest
-    columns = ("behaviour", "where this held", "chosen : passed over")
-    rows = [(labels.name(behavior), said, counts) for _, said, behavior, counts in found[:LEARNED]]
+    advice = memory.advice(LEARNED)
     return joined(
         tag("h2", "What was learned"),
         tag("p", memory.said()),
-        table(columns, rows) if rows else None,
+        table(list(advice.columns), list(advice)) if len(advice) else None,
     )
 
 

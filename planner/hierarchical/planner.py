@@ -15,6 +15,7 @@ flat search             the rest, both ways, until a limit comes        `planner
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
@@ -49,6 +50,7 @@ def plan(
     using: Compiled | None = None,
     watch: Watch = nobody,
     leave_levels: bool = True,
+    ahead: Callable[[Call], bool] | None = None,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
 
@@ -65,13 +67,15 @@ def plan(
         relaxed reachability disproves nothing.
     leave_levels : bool
         Whether steps of a lower level may stand where a level has no plan that can be refined.
+    ahead : function of a call, optional
+        Does steps before any search, and tells whether all goals are reached then; if not, planning begins anew.
 
     Returns
     -------
     Outcome
     """
     with paused_collection():
-        return _plan(problem, limits, improve, using, watch, leave_levels)
+        return _plan(problem, limits, improve, using, watch, leave_levels, ahead)
 
 
 def _plan(
@@ -81,19 +85,30 @@ def _plan(
     using: Compiled | None,
     watch: Watch,
     leave_levels: bool,
+    ahead: Callable[[Call], bool] | None,
 ) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
-    call = Call(problem, using or compiled(problem), deadline, limits.expansions)
-    call.segments.watch = watch
-    if not leave_levels:
-        call.ladder = [(level, attempt) for level, attempt in call.ladder if level == call.program.levels[0]]
+    using = using or compiled(problem)
+
+    def begun() -> Call:
+        call = Call(problem, using, deadline, limits.expansions)
+        call.segments.watch = watch
+        if not leave_levels:
+            call.ladder = [(level, attempt) for level, attempt in call.ladder if level == call.program.levels[0]]
+        return call
+
+    call = begun()
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         return call.outcome(status, plan, reason, perf_counter() - begin)
 
     try:
-        if call.serialise() or call.anew(list(dict(call.ladder))):
+        led = ahead is not None and ahead(call)
+        if ahead is not None and not led:
+            spent, call = call.segments, begun()
+            call.segments.counts, call.segments.expanded = spent.counts, spent.expanded
+        if led or call.serialise() or call.anew(list(dict(call.ladder))):
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
                     shorten(call, improve, leave_levels)

@@ -16,7 +16,7 @@ import pyoxigraph as ox
 
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
-from reasoner.memory.counts_file import Lines, lines
+from reasoner.memory.experience_file import Lines, lines
 from reasoner.memory.links import Links
 from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE, Symbol

@@ -21,7 +21,7 @@ from reasoner.files import alone, write_whole
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline, LimitError
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
 Answer = tuple[int, str, str]
 Ask = Callable[..., Answer]
@@ -73,7 +73,7 @@ ODD_NAMES = [
 
 def lived(replica: str, word: str = "yes") -> Experience:
     experience = Experience(replica)
-    experience.learn([Decision(Candidate(Conclusion("B1_WASH", ("Plate",)), (("item is", word),)))])
+    experience.learn(Lesson(counted=[(GoalKind("B1_WASH", ("Plate",)), ("item is", word), Tally(1))]))
     return experience
 
 
@@ -201,7 +201,7 @@ def test_a_rename_waits_for_whoever_writes_and_says_so(
     renaming.join()
     found = Memory.load(file)
     assert found.experience.episodes == {"me": 1, "other": 1}
-    assert {c.behavior for _, c, _, _ in found.experience} == {"B1_CLEAN"}
+    assert {one.situation for one in found.experience.said.values() if isinstance(one, GoalKind)} == {"B1_CLEAN"}
     assert "waiting for another process" in caplog.text
 
 

@@ -170,7 +170,7 @@ UNWANTED = (
         "reasoner.embodiment",
         "reasoner.validation",
         "reasoner.pddl",
-        "reasoner.memory.counts_file",
+        "reasoner.memory.experience_file",
     ),
 )
 """What a plan in a shipped scene has no use for: heavy, or other commands' rooms."""

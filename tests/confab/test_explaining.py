@@ -1,4 +1,4 @@
-"""An explanation names what decided: without it the choice flips or gets less clear."""
+"""An explanation says the rule, the episodes behind it, and what spoke for it and against the alternative."""
 
 from pathlib import Path
 
@@ -6,10 +6,8 @@ import pytest
 
 import confab
 from confab.explaining import Explanation, explain
-from planner.experience.choice_points import Field, Ground
-from planner.experience.scoring import Judge
-from planner.hierarchical.operators import Program
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.experience import Ground
 from worlds.lessons import taught
 
 STEPS: list[Ground] = [("B1_MOVE", ("cup1", "location7"))]
@@ -29,24 +27,20 @@ def explanation(memory: confab.Memory) -> Explanation:
 
 
 def test_the_weights_add_up_to_the_lead(explanation: Explanation) -> None:
-    assert explanation.lead > 0
     assert sum(why.weight for why in explanation.reasons) == pytest.approx(explanation.lead)
 
 
-def test_without_what_is_named_first_the_choice_flips_or_is_less_clear(
-    memory: confab.Memory, explanation: Explanation
-) -> None:
-    first = explanation.reasons[0]
-    problem = confab.load("beverage-serving").problem
-    field = Field(Program(problem), problem, 1)
-    roles = {b.name: field.schema.roles(b) for b in problem.domain.behaviors.values()}
-    without = Judge(memory.experience, problem.parents, roles, frozenset({first.fact, *first.also}))
-    chosen, other = field.candidate(STEPS[0]), field.candidate(AGAINST)
-    assert chosen is not None
-    assert other is not None
-    lead = without.cogency(chosen) - without.cogency(other)
-    assert lead < explanation.lead
-    assert first.drop == pytest.approx(explanation.lead - lead)
+def test_the_rule_is_a_sentence_and_the_episodes_behind_it_are_counted(explanation: Explanation) -> None:
+    assert explanation.rule.startswith("so that movable LOCATION location, when ")
+    assert explanation.rule.endswith("B1_MOVE movable location (the last step)")
+    assert "chosen" in explanation.behind
+    assert "taught" in explanation.behind
+
+
+def test_where_memory_has_no_rule_it_says_so(memory: confab.Memory) -> None:
+    scene = confab.load("beverage-serving")
+    told = explain(scene.problem, confab.Memory.of(scene), STEPS)
+    assert told.note == "memory has no rule that would do B1_MOVE cup1 location7 there"
 
 
 def test_it_comes_as_text_json_and_picture(explanation: Explanation, tmp_path: Path) -> None:

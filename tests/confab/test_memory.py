@@ -11,12 +11,11 @@ from click.testing import CliRunner
 
 import confab
 from confab.cli import app
-from confab.explaining import explain
 from planner.acting.episode import Failure
-from planner.experience.demonstrations import lesson
+from planner.plan import Plan
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
+from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +25,7 @@ def scene() -> confab.Scene:
 
 def test_trust_is_kept_in_the_file_and_not_passed_on(tmp_path: Path, scene: confab.Scene) -> None:
     memory, other = confab.Memory.of(scene), Experience("other")
-    other.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup", "Location")), (("a", "b"),)))])
+    other.learn(Lesson(counted=[(GoalKind("LOCATION", ("Cup",)), ITSELF, Tally(1))]))
     memory.experience.merge(other)
     assert not memory.advisor.trusted
     with pytest.raises(KnowledgeError, match="no replica 'nobody'"):
@@ -50,17 +49,39 @@ def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -
     assert one.experience.totals() == other.experience.totals() != {}
 
 
-def test_teaching_shows_good_examples_of_two_levels(scene: confab.Scene) -> None:
+def test_teaching_gives_rules_and_methods_of_every_level(scene: confab.Scene) -> None:
     memory, plan = confab.Memory.of(scene), scene.plan().plan
     memory.teach(scene, plan)
-    chosen = [(c.behavior, t.chosen) for c, table in memory.experience.totals().items() for t in table.values()]
-    for level in (1, 2):
-        steps = lesson(scene.problem, level)
-        assert sum(count for behavior, count in chosen if behavior.startswith(f"B{level}_")) == len(steps)
-        assert 0 < len(steps) <= len(plan.at_level(level))
+    said = memory.experience.said.values()
+    assert {one.does[0] for one in said if isinstance(one, Rule)} == {"B1_MOVE", "B1_POUR"}
+    assert {one.behavior[:3] for one in said if isinstance(one, Method)} == {"B1_", "B2_"}
     assert len(memory.links)
     with pytest.raises(KnowledgeError):
         memory.teach(confab.load("moved-serving"), plan)
+
+
+def test_advice_reads_like_a_page_and_an_edited_rule_changes_the_plan(tmp_path: Path, scene: confab.Scene) -> None:
+    memory, path = confab.Memory.of(scene), tmp_path / "memory.ttl"
+    memory.teach(scene, scene.plan().plan)
+    memory.save(path)
+    assert "move movable to location (the last step)" in memory.page()
+    led, rules = scene.plan(memory=path), [one for one in memory.experience.said.values() if isinstance(one, Rule)]
+    move = next(rule for rule in rules if rule.does[0] == "B1_MOVE")
+    text = path.read_text()
+    assert f"m:{move.name} a owl:NamedIndividual, :LearnedRule ;" in text
+    path.write_text(
+        text.replace(
+            f"m:{move.name} a owl:NamedIndividual, :LearnedRule ;", f"m:{move.name} :enabled false ; a :LearnedRule ;"
+        )
+    )
+    without = confab.Memory.load(path, scene).advisor
+    assert move not in without.rules
+    assert led.solved
+    wary = text.replace(
+        f":stepsToGo 1 ; :does {text.split(':does ')[1].split(' ')[0]}", ":stepsToGo 1 ; :does <https://x.org/nothing>"
+    )
+    path.write_text(wary)
+    assert scene.plan(memory=path).solved
 
 
 def test_a_scene_too_large_for_the_papers_links_teaches_counts_alone(
@@ -69,19 +90,10 @@ def test_a_scene_too_large_for_the_papers_links_teaches_counts_alone(
     monkeypatch.setattr("confab.memory.MOST_LINKS", 10)
     told = CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", str(tmp_path / "memory.ttl")])
     assert told.exit_code == 0, told.output
-    assert "only counts were learned" in told.stderr
+    assert "only rules were learned" in told.stderr
     memory = confab.Memory.load(tmp_path / "memory.ttl", scene)
     assert not len(memory.links)
     assert len(memory.experience)
-
-
-def test_every_level_is_learned_where_no_shortest_plan_is_found(tmp_path: Path) -> None:
-    write_scene(tmp_path / "full.ttl", "full", 12, seed=1)
-    made = confab.load(tmp_path / "full.ttl")
-    memory = confab.Memory.of(made)
-    assert lesson(made.problem, 1) == []
-    memory.teach(made, made.plan().plan)
-    assert {c.behavior[:3] for c in memory.experience.totals()} == {"B1_", "B2_"}
 
 
 def test_a_scene_without_plan_is_named_and_the_others_are_learned(tmp_path: Path) -> None:
@@ -104,27 +116,12 @@ def test_learners_at_the_same_file_lose_nothing(tmp_path: Path) -> None:
     assert sum(confab.Memory.load(tmp_path / "memory.ttl").experience.episodes.values()) == 3
 
 
-def test_an_explanation_says_when_memory_had_no_part_and_when_it_knows_nothing(
-    tmp_path: Path, scene: confab.Scene
-) -> None:
-    memory = str(tmp_path / "memory.ttl")
-    assert CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", memory]).exit_code == 0
-    told = CliRunner().invoke(app, ["explain", "beverage-serving", "--memory", memory])
-    assert "before memory was asked" in told.output
-    steps = [(step.behavior, step.arguments) for step in scene.plan().plan.at_level(1)]
-    assert (
-        explain(scene.problem, confab.Memory.of(scene), steps).note
-        == f"memory has never seen {steps[0][0]} chosen or passed over"
-    )
-
-
 def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:
     memory = confab.Memory.of(scene)
+    memory.teach(scene, scene.plan().plan)
     episode = scene.execute().episode
-    primitive = episode.planned.primitives[0]
-    failure = Failure(primitive, "slipped", (), "it slipped", episode.initial)
-    memory.live(scene.problem, replace(episode, failures=(failure,)))
-    tallies = [(c.behavior, t) for _, c, _, t in memory.experience]
-    above = [step.behavior for step in episode.planned.walk() if step.path in (primitive.path[:1], primitive.path[:2])]
-    assert sorted(behavior for behavior, _ in tallies) == sorted(above)
-    assert all((t.chosen, t.failed) == (0, 1) for _, t in tallies)
+    failure = Failure(episode.planned.primitives[0], "slipped", (), "it slipped", episode.initial)
+    memory.live(scene.problem, replace(episode, failures=(failure,), done=Plan(())))
+    failed = {name for name, facts in memory.experience.totals().items() for t in facts.values() if t.failed}
+    did = {one.does[0] for name, one in memory.experience.said.items() if name in failed and isinstance(one, Rule)}
+    assert did == {episode.planned.steps[0].behavior}

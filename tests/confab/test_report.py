@@ -199,7 +199,7 @@ def test_notebooks_show_the_same_pieces(scene: confab.Scene, serving: confab.Res
     for (_, name), show in SHOWN.items():
         value = next(value for value in values if type(value).__name__ == name)
         assert "confab" in show(value)
-    assert isinstance(Memory.of(scene).counts(), Table)
+    assert isinstance(Memory.of(scene).advice(), Table)
 
 
 def test_a_result_and_an_execution_write_their_page(

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from planner.experience.choice_points import Field
 from planner.hierarchical.operators import Achiever, Program
+from planner.hierarchical.serialization import Call, Compiled
 from planner.hierarchical.subgoals import Env, Wants
 from reasoner.symbols import Condition, Problem
 from worlds.families import family, random_table
@@ -32,7 +32,7 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
     asked = 0
     program = Program(problem)
     for level in problem.domain.levels:
-        kept, fresh = Field(program, problem, level), Field(program, problem, level)
+        kept, fresh = (Call(problem, Compiled(program), None, 100_000) for _ in range(2))
         ask_anew(fresh.segments.wants, monkeypatch)
         for _ in range(12):
             breadth = rng.choice((1, 12))
@@ -50,10 +50,14 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
                                 assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
                                 assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
                                 asked += 1
-            found = kept.proposals(kept.unmet(), breadth=1)
+            kept.segments.wants.breadth = 1
+            off = {cell: value for cell, value in kept.goal.items() if not kept.met(cell)}
+            found = list(kept.segments.relevant(level, off, 3))
             if not found:
                 break
             ground = rng.choice(found)
-            assert kept.do(ground)
-            assert fresh.do(ground)
+            for field in (kept, fresh):
+                done = field.segments.forward[ground[0]](*ground[1])
+                assert done is not None
+                field.segments.apply(done[1])
     assert asked or not problem.goal

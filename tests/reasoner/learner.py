@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience
-from reasoner.memory.counts_file import load, save
+from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
+from reasoner.memory.experience_file import load, save
 from reasoner.names import Names
 
 
@@ -12,7 +12,7 @@ def main(path: Path) -> None:
     experience = load(path) if path.is_file() else Experience("robot")
     while True:
         number = experience.episodes.get("robot", 0)
-        experience.learn([Decision(Candidate(Conclusion("MOVE", ("Cup",)), (("number", str(number)),)))])
+        experience.learn(Lesson(counted=[(GoalKind("MOVE", ("Cup",)), ("number", str(number)), Tally(1))]))
         save(path, experience, Names(()), "https://x.org/k")
         print(experience.episodes["robot"], flush=True)
 

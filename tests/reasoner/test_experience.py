@@ -5,22 +5,16 @@ from copy import deepcopy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience, Tally
+from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Order, Tally
 
-candidates = st.builds(
-    lambda behavior, kind, value, who: Candidate(
-        Conclusion(behavior, (kind,)), (("object is", value),), (("object", who),)
-    ),
-    st.sampled_from(["MOVE", "POUR"]),
-    st.sampled_from(["Cup", "Bottle"]),
-    st.sampled_from(["met", "unmet", "none"]),
-    st.sampled_from(["cup1", "cup2"]),
-)
-decisions = st.builds(Decision, candidates, st.lists(candidates, max_size=3).map(tuple), st.booleans())
-histories = st.lists(st.lists(decisions, max_size=3), max_size=3)
+things = st.sampled_from([GoalKind("LOCATION", ("Cup",)), GoalKind("BEVERAGE", ("Cup",)), Order("A", "B", ((0, 0),))])
+facts = st.sampled_from([ITSELF, ("cup is a Bowl", "yes"), ("cup is a Bowl", "no"), ("who is hand", "left_hand")])
+tallies = st.builds(Tally, *[st.integers(0, 2)] * 3)
+counted = st.lists(st.tuples(things, facts, tallies), max_size=3)
+histories = st.lists(st.builds(Lesson, st.lists(things, max_size=2), counted, counted), max_size=3)
 
 
-def lived(replica: str, history: list[list[Decision]]) -> Experience:
+def lived(replica: str, history: list[Lesson]) -> Experience:
     found = Experience(replica)
     for episode in history:
         found.learn(episode)
@@ -55,13 +49,3 @@ def test_an_older_copy_of_the_same_replica_adds_nothing(a: object, b: object) ->
     for episode in b:  # type: ignore[attr-defined]
         late.learn(episode)
     assert merged(early, late) == merged(late)
-
-
-def test_success_and_failure_are_counted_apart() -> None:
-    move = Candidate(Conclusion("MOVE", ("Cup",)), (("object is", "met"),))
-    pour = Candidate(Conclusion("POUR", ("Cup",)), (("object is", "met"),))
-    experience = Experience("one")
-    experience.learn([Decision(move, (pour,)), Decision(move, succeeded=False)])
-    totals = experience.totals()
-    assert totals[move.conclusion][move.pattern] == Tally(chosen=1, failed=1)
-    assert totals[pour.conclusion][pour.pattern] == Tally(passed_over=1)

@@ -15,25 +15,46 @@ import pytest
 import rdflib
 
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.counts import Candidate, Conclusion, Decision, Experience, Pattern
-from reasoner.memory.counts_file import load, pull, push, save
+from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Said, Tally
+from reasoner.memory.experience_file import load, pull, push, save
 from reasoner.names import Names
+from reasoner.symbols import AnyOf, ClassCondition, EqualityCondition, RelationCondition, ValueCondition, Witness
 
 NAMES = Names(f"https://x.org/k#{name}" for name in ("B1_MOVE", "B1_POUR", "Cup", "Bottle"))
 DOMAIN = "https://x.org/k"
 
 
+IN, NOBODY = ValueCondition("LOCATION", ("?cup",), "?place"), ValueCondition("LOCATION", ("?anyone",), "?place")
+RULE = Rule(
+    IN,
+    (
+        AnyOf(((ClassCondition("?cup", "Bottle", True),), (EqualityCondition("?cup", "?place", True), IN)), True),
+        ClassCondition("?cup", "Bottle", True),
+        RelationCondition("canReach", ("?hand", "?place")),
+        ValueCondition("BEVERAGE", ("?cup",), "true", True),
+        Witness("?anyone", "Cup", (NOBODY,), True),
+    ),
+    ("B1_MOVE", ("?cup", "?place")),
+    3,
+    (("?cup", "Cup"), ("?place", "A|B"), ("?hand", "Hand")),
+)
+METHOD = Method(
+    "B1_MOVE",
+    2,
+    (("B2_PICK", (2, 0)), ("B2_PLACE", (2, 1))),
+    (OpenRole("Hand", None, "HOLDS"), OpenRole("A|B", ("LOCATION", (0,)), None)),
+)
+SAID: list[Said] = [RULE, Order("LOCATION", "BEVERAGE", ((0, 0), (1, 1))), METHOD]
+
+
 def lived(replica: str, episodes: int) -> Experience:
     experience = Experience(replica)
     for number in range(episodes):
-        chosen = Candidate(
-            Conclusion("B1_MOVE", ("Cup",)), (("object · goal LOCATION", "unmet"), ('odd "fact": \\', "a:b"))
-        )
-        other = Candidate(
-            Conclusion("B1_POUR", ("Bottle", "Cup")), (("n", str(number % 3)),), (("source", "bottle1"),), ("source",)
-        )
-        alike = Candidate(other.conclusion, other.pattern, (("source", "bottle2"),), ("source",))
-        experience.learn([Decision(chosen, (other,)), Decision(other, (alike,), number % 2 == 0)])
+        facts = [ITSELF, ("LOCATION of cup", "unmet"), ('odd "fact": \\', "a:b"), ("n", str(number % 3))]
+        lesson = Lesson(SAID, [(RULE, fact, Tally(1, 0, number % 2)) for fact in facts])
+        lesson.counted.append((GoalKind("LOCATION", ("Cup",)), ITSELF, Tally(1)))
+        lesson.personal.append((RULE, ("who is hand", "left_hand"), Tally(passed_over=1)))
+        experience.learn(lesson)
     return experience
 
 
@@ -45,48 +66,33 @@ def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: P
     assert load(tmp_path / "theirs.ttl", NAMES) == experience
 
 
-def older(text: str, pattern: Pattern) -> str:
-    """Return a memory of one pattern as it was written before facts were individuals."""
-    facts = " | ".join(f"{fact}: {value}" for fact, value in pattern)
-    text = re.sub(r"m:fact_\w+ a [^\n]*\n", "", text).replace(":memoryFormat 3", ":memoryFormat 2")
-    return re.sub(r":Pattern ; [^\n]*\n", f':Pattern ; :facts "{facts}" .\n', text)
-
-
-def test_facts_of_a_pattern_can_be_asked_for(tmp_path: Path) -> None:
-    experience = Experience("robot")
-    facts = tuple((f"object · goal LOCATION {number}", str(number % 3)) for number in range(12))
-    shown = ('object "is" \\', "Cup, or: none"), ("first", "")
-    for pattern in (facts, facts[::-1], shown, ()):
-        experience.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup",)), pattern))])
-    save(tmp_path / "now.ttl", experience, NAMES, DOMAIN)
-    assert load(tmp_path / "now.ttl", NAMES) == experience
+def test_a_rule_can_be_asked_for_in_the_words_of_conditions(tmp_path: Path) -> None:
+    save(tmp_path / "now.ttl", lived("robot", 2), NAMES, DOMAIN)
     graph = rdflib.Graph().parse(tmp_path / "now.ttl")
-    asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?what ?answer WHERE {
-      ?counter :associatedWith ?pattern . ?pattern :fact ?fact . ?fact :asks ?what ; :answer ?answer ; :index 0 } ORDER BY ?what"""
+    asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?steps ?class ?failed WHERE {
+      ?rule a :LearnedRule ; :does <https://x.org/k#B1_MOVE> ; :stepsToGo ?steps ; :asksFor ?condition .
+      ?condition a :ClassCondition ; :negated true ; :ofClass ?class .
+      ?counter :countsFor ?rule . [] owl:annotatedSource ?counter ; owl:annotatedTarget ?rule ; :failed ?failed }"""
     assert [tuple(map(str, row)) for row in graph.query(asked) if isinstance(row, tuple)] == [
-        shown[0],
-        facts[0],
-        facts[-1],
+        ("3", "https://x.org/k#Bottle", "1")
     ]
-    labels = graph.query("SELECT ?l WHERE { ?p a <https://w3id.org/confab/core#Pattern> ; rdfs:label ?l } ORDER BY ?l")
-    assert "object · goal LOCATION 0: 0, object · goal LOCATION 1: 1, object · goal LOCATION 2: 2 and 9 more" in {
-        str(row[0]) for row in labels if isinstance(row, tuple)
-    }
-    graph.serialize(tmp_path / "theirs.ttl")  # any other layout
-    assert load(tmp_path / "theirs.ttl", NAMES) == experience
 
 
-def test_the_first_files_of_this_format_are_read_and_spoilt_ones_say_so(tmp_path: Path) -> None:
-    experience = Experience("robot")
-    pattern = (("object · goal LOCATION", "unmet"), ("object is", "Cup"))
-    experience.learn([Decision(Candidate(Conclusion("B1_MOVE", ("Cup",)), pattern))])
-    save(tmp_path / "now.ttl", experience, NAMES, DOMAIN)
-    text = older((tmp_path / "now.ttl").read_text(), pattern)
-    for between, name in ((r"\n", "first.ttl"), ("n", "spoilt.ttl")):  # the OWL API made a plain n of the line breaks
-        (tmp_path / name).write_text(text.replace("unmet | object", f"unmet{between}object"))
-    assert load(tmp_path / "first.ttl", NAMES) == experience
-    with pytest.raises(KnowledgeError, match="can't be told apart"):
-        load(tmp_path / "spoilt.ttl", NAMES)
+def test_an_edited_rule_keeps_its_counts_a_disabled_one_says_so_and_a_deleted_one_is_gone(tmp_path: Path) -> None:
+    path, experience = tmp_path / "memory.ttl", lived("robot", 2)
+    save(path, experience, NAMES, DOMAIN)
+    text = path.read_text()
+    path.write_text(text.replace(":stepsToGo 3", ":stepsToGo 2 ; :enabled false"))
+    edited = load(path, NAMES)
+    rule = next(one for one in edited.said.values() if isinstance(one, Rule))
+    assert (rule.steps, edited.disabled) == (2, {rule.name})
+    assert edited.totals()[rule.name] == experience.totals()[RULE.name]
+    save(path, edited, NAMES, DOMAIN)
+    assert load(path, NAMES) == edited
+    path.write_text("".join(line for line in text.splitlines(True) if not line.startswith(f"m:{RULE.name}")))
+    deleted = load(path, NAMES)
+    assert RULE.name not in deleted.said
+    assert RULE.name not in deleted.totals()
 
 
 def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> None:
@@ -96,7 +102,7 @@ def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> No
     (tmp_path / "both.ttl").write_text((tmp_path / "one.ttl").read_text() + (tmp_path / "two.ttl").read_text())
     one.merge(two)
     both = load(tmp_path / "both.ttl", NAMES)
-    assert (both.counts, both.episodes) == (one.counts, one.episodes)
+    assert (both.counts, both.episodes, both.said) == (one.counts, one.episodes, one.said)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +110,7 @@ def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> No
     [
         ("<a> <b", "broken memory"),
         ("<a> <b> <c> .", "says no :memoryFormat"),
-        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 3"),
+        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 4"),
     ],
 )
 def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content: str, message: str) -> None:
@@ -198,7 +204,7 @@ def test_robots_that_write_to_one_endpoint_lose_nothing(endpoint: str) -> None:
     for robot in robots:
         push(endpoint, robot, NAMES, DOMAIN)
     for robot in robots:
-        robot.learn([])
+        robot.learn(Lesson())
         push(endpoint, robot, NAMES, DOMAIN)
     found = pull(endpoint, NAMES, replica="reader")
     expected = Experience("reader")

@@ -1,0 +1,235 @@
+"""Planning with experience, which may lead but not spoil.
+
+=========  ====================================================================================================
+guarded    rules lead from the beginning on, for those kinds of goals on which they have helped as often as not
+leading    rules lead whatever their record is
+strict     memoryless search plans, exactly as without; rules try a step of their own for every `SHARE` expansions of it
+=========  ====================================================================================================
+
+Where rules run out, search takes the next goal and they go on from there. What is left in the end is for the search without
+memory: from there with a bounded number of expansions, if three quarters of the goals are reached, else from the beginning. That
+there is no plan is for it to prove. Memory that isn't trusted runs in strict mode whatever was asked for, and one that knows none
+of the goals isn't asked at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+
+from planner.experience.evidence import Judge, View
+from planner.experience.leading import NEARBY, SEARCHING, Candidate, Guide, follow, go_on, usable
+from planner.experience.lessons import rules_in
+from planner.hierarchical import planner as fast
+from planner.hierarchical.refinement_cache import OpenRole, Template
+from planner.hierarchical.serialization import LONGER, Call, Compiled
+from planner.hierarchical.subplans import LimitError
+from planner.plan import Limits, Outcome, Status
+from reasoner.amounts import meets
+from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
+from reasoner.symbols import Problem
+
+SHARE = 20
+
+
+@dataclass
+class Memory:
+    """Experience as the planner takes it.
+
+    Parameters
+    ----------
+    experience : Experience
+    trusted : bool
+        Whether it may lead; else it runs in strict mode.
+    """
+
+    experience: Experience
+    trusted: bool = True
+
+    @cached_property
+    def rules(self) -> list[Rule]:
+        """The rules that may be followed."""
+        return rules_in(self.experience)
+
+    @cached_property
+    def orders(self) -> list[Order]:
+        """The orders that hold."""
+        return usable(self.experience)
+
+    @cached_property
+    def totals(self) -> Counts:
+        """What was counted."""
+        return self.experience.totals()
+
+    @cached_property
+    def judge(self) -> Judge:
+        """What says how cogent a rule is."""
+        return Judge(self.experience)
+
+    def knows(self, problem: Problem) -> bool:
+        """Whether there is a rule for some open goal."""
+        open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
+        return any(rule.goal.situation in open_ and rule.does[0] in problem.domain.behaviors for rule in self.rules)
+
+    def helps(self, rule: Rule) -> bool:
+        """Whether rules for such goals reached them as often as not; as long as nothing was tried, one is hopeful."""
+        record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
+        return record.chosen + 1 >= record.failed
+
+    def guide(self, call: Call, guarded: bool) -> Guide:
+        """Return the rules bound to a call, with what says which of them is most cogent."""
+        view = View(call.program, call.table, call.goal)
+
+        def score(c: Candidate) -> float:
+            return self.judge.cogency(c.rule, view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles))
+
+        rules = [rule for rule in self.rules if not guarded or self.helps(rule)]
+        return Guide(call, rules, self.orders, score)
+
+    def warmed(self, using: Compiled) -> Compiled:
+        """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
+        templates = {name: list(known) for name, known in using.templates.items()}
+        for name, one in sorted(self.experience.said.items()):
+            if isinstance(one, Method) and name not in self.experience.disabled and self._fits(one, using):
+                tally = self.totals.get(name, {}).get(ITSELF, Tally())
+                template = Template(one.steps, tuple(OpenRole(r.kind, r.source, r.becomes) for r in one.open))
+                known = templates.setdefault(one.behavior, [])
+                if tally.failed <= tally.chosen and template not in known:
+                    known.append(template)
+                    known.sort(key=lambda template: len(template.steps))
+        return replace(using, templates=templates)
+
+    def _fits(self, method: Method, using: Compiled) -> bool:
+        """Whether a domain has the behaviours of a method, with as many roles."""
+        behaviors = using.program.domain.behaviors
+        own = behaviors.get(method.behavior)
+        if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:
+            return False
+        situations = using.program.domain.situations
+        return all(
+            name in behaviors and len(behaviors[name].parameters) == len(places) for name, places in method.steps
+        ) and all(
+            role.kind in using.program.problem.classes
+            and (role.source is None or role.source[0] in situations)
+            and (role.becomes is None or role.becomes in situations)
+            for role in method.open
+        )
+
+
+def plan(
+    problem: Problem,
+    memory: Memory | None = None,
+    mode: str = "guarded",
+    limits: Limits = Limits(),  # noqa: B008 - frozen
+    using: Compiled | None = None,
+    improve: int = fast.IMPROVEMENTS,
+    leave_levels: bool = True,
+) -> Outcome:
+    """Plan with experience.
+
+    Parameters
+    ----------
+    problem : Problem
+    memory : Memory, optional
+    mode : str
+        ``strict``, ``guarded`` or ``leading``: how far experience may lead.
+    limits, using, improve, leave_levels
+        As for `planner.hierarchical.planner.plan`.
+
+    Returns
+    -------
+    Outcome
+        `search` counts the steps of rules that were tried as expansions.
+    """
+    using = using or fast.compiled(problem)
+    if memory is None or not memory.knows(problem):
+        return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
+    if mode == "strict" or not memory.trusted:
+        return _strictly(problem, memory, limits, using, improve, leave_levels)
+
+    def ahead(call: Call) -> bool:
+        return led(call, memory.guide(call, guarded=mode == "guarded"))
+
+    warm = memory.warmed(using)
+    return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, ahead=ahead)
+
+
+def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], Outcome]:
+    """Return what plans any problem of one domain with experience."""
+    return lambda problem: plan(problem, memory, mode)
+
+
+def led(call: Call, guide: Guide) -> bool:
+    """Let rules lead, with search between them and after them; whether all goals are reached."""
+    if not guide.by_situation:
+        return False
+    segments, most = call.segments, call.segments.most
+    goals = len(guide.open)
+    try:
+        for _ in go_on(guide):
+            pass
+        if not guide.open:
+            return True
+        if 4 * len(guide.open) > goals:
+            return False
+        segments.most = min(most, segments.expanded + SEARCHING + goals - len(guide.open))
+        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        call.ladder = [(call.program.levels[0], attempt) for attempt in (LONGER, NEARBY)]
+        return call.serialise()
+    except LimitError:
+        if segments.most == most or (segments.deadline is not None and perf_counter() > segments.deadline):
+            raise
+        return False
+    finally:
+        segments.most = most
+
+
+class _ArrivedError(Exception):
+    """Rules reached the goal while the memoryless search was at it."""
+
+
+def _strictly(
+    problem: Problem, memory: Memory, limits: Limits, using: Compiled, improve: int, leave_levels: bool
+) -> Outcome:
+    """Plan without memory, and let rules do a step of their own for every `SHARE` expansions."""
+    began = perf_counter()
+    first = problem.domain.levels[0]
+    deadline = None if limits.seconds is None else began + limits.seconds
+    call = Call(problem, memory.warmed(using), deadline, limits.expansions)
+    base = 0
+    spent: dict[int, int] = {}
+    stream: Iterator[Candidate] = iter(())
+    guide: Guide | None = None
+
+    def watch(level: int | None) -> None:
+        nonlocal base, stream, guide
+        if level is None:
+            return
+        if level == first and (base + 1) // SHARE > call.segments.counts[first].expanded:
+            if guide is None:
+                guide = memory.guide(call, guarded=False)
+                stream = follow(guide)
+            with suppress(LimitError):
+                if next(stream, None) is None and not guide.open:
+                    raise _ArrivedError
+        base += level == first
+        spent[level] = spent.get(level, 0) + 1
+
+    try:
+        outcome = fast.plan(
+            problem, limits=limits, improve=improve, using=using, watch=watch, leave_levels=leave_levels
+        )
+    except _ArrivedError:
+        with suppress(LimitError):
+            fast.shorten(call, improve, leave_levels)
+        outcome = call.outcome(Status.SOLVED, call.tree(), None, 0.0)
+        for level, expanded in spent.items():
+            outcome.search[level].expanded += expanded
+        return replace(outcome, seconds=perf_counter() - began)
+    for level, counts in call.segments.counts.items():
+        if level in outcome.search:
+            outcome.search[level].add(counts)
+    return replace(outcome, seconds=perf_counter() - began)

@@ -1,0 +1,190 @@
+"""Which of several ways to follow rules: cogency, from what held of those that were chosen and of those that were passed over.
+
+Of each individual in a role of a rule these facts are looked at, none of them written by hand: to which of the classes that
+behaviours tell apart it belongs, its values and what the task wants of it, whether somebody has it or wants it as a value, and the
+static relations that tie it to the other roles.
+
+Cogency is eq. (1) of the paper as ln odds: ln((c + ½)/(p + ½)) for how often the rule was chosen and passed over or failed, and for
+each fact ln(p(fact | chosen)/p(fact | not)), since the facts of two candidates differ. What was never seen says nothing: a class
+that is new is judged by the classes above it. Who was preferred weighs a tenth less with each episode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import log
+from typing import TypeAlias
+
+from planner.hierarchical.operators import Program
+from planner.language import walk
+from planner.transitions import Cell, Table
+from reasoner.memory.experience import ITSELF, Experience, Fact, Rule, Tally
+from reasoner.symbols import FALSE, ClassCondition, Problem, Witness
+
+DECAY = 0.9
+CROWD = 4
+"""In roles of classes with at most so many members somebody himself may be preferred."""
+Reader: TypeAlias = "Callable[[tuple[str, ...]], list[Fact]]"
+
+
+class View:
+    """Reads facts about the individuals in a rule's roles off one table and goal."""
+
+    def __init__(self, program: Program, table: Table, goal: Mapping[Cell, str]) -> None:
+        self.problem, self.table, self.goal = program.problem, table, goal
+        self.constants = frozenset(program.named)
+        self.kinds = told_apart(self.problem)
+        self.wanters: dict[tuple[str, str], list[Cell]] = {}
+        for cell, value in goal.items():
+            self.wanters.setdefault((cell[0], value), []).append(cell)
+        self._plans: dict[str, list[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]] = {}
+
+    def facts(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
+        """Return the facts about the individuals in a rule's roles."""
+        plan = self._plans.get(rule.name)
+        if plan is None:
+            plan = self._plans[rule.name] = list(self._questions(rule))
+        named = {who: role for (role, _), who in zip(rule.kinds, roles, strict=True)}
+        return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
+
+    def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
+        """Return who fills those roles in which few could."""
+        members = self.problem.members
+        return [
+            (f"who is {role[1:]}", who)
+            for (role, kind), who in zip(rule.kinds, roles, strict=True)
+            if 1 < len(members(kind)) <= CROWD
+        ]
+
+    def _questions(self, rule: Rule) -> Iterator[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]:
+        members, situations = self.problem.members, self.problem.domain.situations.values()
+        for i, (role, kind) in enumerate(rule.kinds):
+            here, name = members(kind), role[1:]
+            for other in self.kinds:
+                among = members(other)
+                if not here <= among and not here.isdisjoint(among):
+                    yield i, f"{name} is a {other}", lambda who, _, among=among: "yes" if who in among else "no"  # type: ignore[misc]
+            for s in situations:
+                if len(s.arguments) == 1 and not here.isdisjoint(members(s.arguments[0])):
+                    yield i, f"{s.name} of {name}", self._value(s.name)
+                    yield i, f"wanted {s.name} of {name}", self._wanted(s.name)
+                if not s.boolean and len(s.arguments) == 1 and not here.isdisjoint(members(s.range)):
+                    yield i, f"who has {name} as {s.name}", self._holders(s.name)
+                    yield i, f"who wants {name} as {s.name}", self._wanting(s.name, rule)
+            for relation, rows in self.problem.relations.items():
+                ends = next(iter(rows), ())
+                if len(ends) == 2:
+                    for j, (other, of) in enumerate(rule.kinds):
+                        if j != i and any(a in here and b in members(of) for a, b in rows):
+                            yield i, f"{name} {relation} {other[1:]}", self._tied(rows, other)
+
+    def _value(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
+        now = self.table.now[situation]
+
+        def answer(who: str, named: Mapping[str, str]) -> str:
+            value = now.get(who)
+            if value is None:
+                return "none"
+            return value if value in self.constants else named.get(value, "?another")[1:]
+
+        return answer
+
+    def _wanted(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
+        now, goal = self.table.now[situation], self.goal
+
+        def answer(who: str, _: Mapping[str, str]) -> str:
+            wanted = goal.get((situation, who))
+            return "nothing" if wanted is None else "as it is" if now.get(who, FALSE) == wanted else "not yet"
+
+        return answer
+
+    def _holders(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
+        holders = self.table.who[situation]
+
+        def answer(who: str, named: Mapping[str, str]) -> str:
+            keys = holders.get(who)
+            if not keys:
+                return "nobody"
+            return next((named[key][1:] for key in keys if isinstance(key, str) and key in named), "somebody")
+
+        return answer
+
+    def _wanting(self, situation: str, rule: Rule) -> Callable[[str, Mapping[str, str]], str]:
+        now, wanters = self.table.now[situation], self.wanters
+        own = rule.goal.arguments if rule.goal.situation == situation else ()
+
+        def answer(who: str, named: Mapping[str, str]) -> str:
+            mine = {individual for individual, role in named.items() if role in own}
+            for _, key in wanters.get((situation, who), ()):
+                if now.get(key, FALSE) != who and key not in mine:
+                    return "somebody"
+            return "nobody"
+
+        return answer
+
+    def _tied(self, rows: frozenset[tuple[str, ...]], other: str) -> Callable[[str, Mapping[str, str]], str]:
+        def answer(who: str, named: Mapping[str, str]) -> str:
+            return "yes" if any(role == other and (who, end) in rows for end, role in named.items()) else "no"
+
+        return answer
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A summand of a cogency: the fact that it is of, and its weight in ln odds."""
+
+    fact: Fact
+    weight: float
+
+
+class Judge:
+    """Says how cogent it is to follow a rule, from what was counted."""
+
+    def __init__(self, experience: Experience) -> None:
+        self.totals = experience.totals()
+        self.preferred = experience.preferences(DECAY)
+        self._answers: dict[str, dict[str, int]] = {}
+
+    def factors(self, rule: Rule, facts: list[Fact], individuals: list[Fact] = ()) -> list[Factor]:  # type: ignore[assignment]
+        """Return the summands of the cogency of following a rule where these facts hold."""
+        counted = self.totals.get(rule.name)
+        if counted is None:
+            return []
+        whole = counted.get(ITSELF, Tally())
+        not_ = whole.passed_over + whole.failed
+        found = [Factor(ITSELF, log((whole.chosen + 0.5) / (not_ + 0.5)))]
+        answers = self._answers.get(rule.name)
+        if answers is None:
+            answers = self._answers[rule.name] = {}
+            for asks, _ in counted:
+                answers[asks] = answers.get(asks, 0) + 1
+        for fact in facts:
+            tally = counted.get(fact)
+            if tally is not None:
+                spread = answers[fact[0]]
+                chosen = (tally.chosen + 1) / (whole.chosen + spread)
+                passed = (tally.passed_over + tally.failed + 1) / (not_ + spread)
+                found.append(Factor(fact, log(chosen / passed)))
+        liked = self.preferred.get(rule.name, {})
+        for fact in individuals:
+            c, p = liked.get(fact, (0.0, 0.0))
+            if c or p:
+                found.append(Factor(fact, log((c + 0.5) / (p + 0.5))))
+        return found
+
+    def cogency(self, rule: Rule, facts: list[Fact], individuals: list[Fact]) -> float:
+        """Return the sum."""
+        return sum(factor.weight for factor in self.factors(rule, facts, individuals))
+
+
+def told_apart(problem: Problem) -> tuple[str, ...]:
+    """Return the classes that behaviours, situation types or terms tell apart: what can be done depends on no other."""
+    found: dict[str, None] = {}
+    for behavior in problem.domain.behaviors.values():
+        found.update(dict.fromkeys(behavior.kinds.values()))
+        for condition in (*behavior.preconditions, *(c for effect in behavior.effects for c in effect.when)):
+            found.update((inner.kind, None) for inner in walk(condition) if isinstance(inner, ClassCondition | Witness))
+    for situation in problem.domain.situations.values():
+        found.update(dict.fromkeys((*situation.arguments, situation.range)))
+    return tuple(sorted(found))

@@ -1,0 +1,261 @@
+"""What an episode teaches: rules, the order of goals, methods, and how good what was known before proved.
+
+steps      of a plan, each with its refinement
+before     what is known already is tried first: which goals it reaches by itself is its record, for each kind of goal
+regress    the plan becomes rules (`planner.experience.regression`)
+replay     where rules apply, that which the plan did was chosen and the others passed over, with the facts of each
+orders     a teacher plans for the same goals in other orders, too: only what is the same in all of them must be so
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from planner.experience.evidence import View
+from planner.experience.leading import Candidate, Guide, follow, usable
+from planner.experience.regression import Course
+from planner.hierarchical import planner as fast
+from planner.hierarchical.refinement_cache import Refiner
+from planner.hierarchical.serialization import Call, Compiled, compiled
+from planner.hierarchical.subplans import LimitError
+from planner.paper.learning import LearningError
+from planner.plan import Limits, Plan, Step
+from planner.transitions import Cell
+from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, OpenRole, Rule, Tally
+from reasoner.symbols import Problem
+
+SINGLE, OTHERS = 6, 2
+"""So many goals are taught one by one, and so many other orders of all."""
+SHORT = Limits(expansions=20_000, seconds=20.0)
+CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
+
+
+def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:
+    """Learn how a problem is solved, with its goals in several orders and one by one; return the plan, None if there is none.
+
+    Parameters
+    ----------
+    experience : Experience
+    problem : Problem
+    plan : Plan, optional
+        Made if left out.
+    """
+    using = compiled(problem)
+    plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
+    if plan is None:
+        return None
+    lesson = tried(experience, problem, using)
+    for variant in variants(problem):
+        found = fast.plan(variant, limits=SHORT, using=using, improve=0).plan
+        if found is not None:
+            course = Course(variant, grounds(found.steps))
+            lesson.said += course.rules_of()
+            lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
+    rules = [one for one in lesson.said if isinstance(one, Rule)]
+    lesson += learned(experience, problem, plan, using, rules=rules)
+    experience.learn(lesson)
+    return plan
+
+
+def variants(problem: Problem) -> Iterator[Problem]:
+    """Yield the problem as it is, with its goals in other orders, and with some of its goals alone."""
+    goals = list(problem.goal.items())
+    yield problem
+    if len(goals) > 1:
+        half = len(goals) // 2
+        for order in (goals[::-1], goals[half:] + goals[:half])[:OTHERS]:
+            yield replace(problem, goal=dict(order))
+        for goal in goals[:: max(1, len(goals) // SINGLE)][:SINGLE]:
+            yield replace(problem, goal=dict([goal]))
+
+
+def live(
+    experience: Experience,
+    problem: Problem,
+    plan: Plan,
+    failed: tuple[int, ...] | None = None,
+    vain: Iterable[tuple[Problem, Step]] = (),
+) -> None:
+    """Learn from a plan that was carried out.
+
+    Parameters
+    ----------
+    experience : Experience
+    problem : Problem
+        Its initial state is where the plan began.
+    plan : Plan
+    failed : path of a step, optional
+        It failed; what comes after it wasn't tried.
+    vain : iterable of (problem, step)
+        Other steps that failed, with the state in which they were begun.
+
+    Raises
+    ------
+    LearningError
+        A step's preconditions don't hold where it is done; nothing is learned then.
+    """
+    using = compiled(problem)
+    lesson = tried(experience, problem, using) if failed is None and plan.steps else Lesson()
+    if plan.steps:
+        lesson += learned(experience, problem, plan, using, failed)
+    for there, step in vain:
+        lesson += in_vain(experience, there, step, using)
+    experience.learn(lesson)
+
+
+def grounds(steps: Sequence[Step]) -> list[tuple[str, tuple[str, ...]]]:
+    """Return steps as behaviours with their arguments."""
+    return [(step.behavior, step.arguments) for step in steps]
+
+
+def rules_in(experience: Experience) -> list[Rule]:
+    """Return the rules that may be followed."""
+    return [
+        one
+        for name, one in sorted(experience.said.items())
+        if isinstance(one, Rule) and name not in experience.disabled
+    ]
+
+
+def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
+    """Return how good what is known proves on a problem: which of its goals it reaches by itself."""
+    rules = rules_in(experience)
+    call = Call(problem, using, None, SHORT.expansions)
+    guide = Guide(call, rules, usable(experience))
+    lesson = Lesson()
+    if not guide.by_situation:
+        return lesson
+    open_ = list(guide.open)
+    with suppress(LimitError):
+        for _ in follow(guide):
+            pass
+    for cell in open_:
+        kinds = {rule.goals for rule in guide.by_situation.get(cell[0], ())}
+        lesson.counted += [
+            (kind, ITSELF, FAILED if cell in guide.open else CHOSEN) for kind in kinds if about(kind, cell, problem)
+        ]
+    return lesson
+
+
+def about(kind: GoalKind, cell: Cell, problem: Problem) -> bool:
+    """Whether a goal is of a kind."""
+    from planner.transitions import arguments_of
+
+    return kind.situation == cell[0] and all(
+        who in problem.members(of) or who == of for who, of in zip(arguments_of(cell[1]), kind.classes, strict=True)
+    )
+
+
+def learned(
+    experience: Experience,
+    problem: Problem,
+    plan: Plan,
+    using: Compiled,
+    failed: tuple[int, ...] | None = None,
+    rules: Sequence[Rule] = (),
+) -> Lesson:
+    """Return what a plan teaches: its rules and orders, its methods, and what it chose and passed over."""
+    steps = list(plan.steps)
+    at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
+    if at is not None:
+        lesson = in_vain(experience, problem, steps[at], using, steps[:at])
+        return lesson
+    course = Course(problem, grounds(steps))
+    lesson = Lesson(said=list(course.rules_of()))
+    lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
+    lesson.counted += [(method, ITSELF, CHOSEN) for method in methods(problem, plan, using)]
+    own = [rule for rule in lesson.said if isinstance(rule, Rule)]
+    lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
+    return lesson
+
+
+def methods(problem: Problem, plan: Plan, using: Compiled) -> Iterator[Method]:
+    """Yield how each step of a plan was refined."""
+    refiner = Call(problem, using, None, 1).refiner
+    for step in plan.walk():
+        if step.steps:
+            variables = using.program.variables[step.behavior]
+            own = (*step.arguments, *(step.bindings[v] for v in variables if v in step.bindings))
+            yield method_of(refiner, step, own)
+
+
+def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> Method:
+    """Return a step's refinement over roles."""
+    template = refiner.template(grounds(step.steps), own)
+    opened = tuple(OpenRole(role.kind, role.source, role.becomes) for role in template.open)
+    return Method(step.behavior, len(own), template.steps, opened)
+
+
+def chosen(
+    rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
+) -> Lesson:
+    """Return what a plan chose where rules applied: the candidates of least rank that it did, and those that it passed over."""
+    call = Call(problem, using, None, SHORT.expansions)
+    guide = Guide(call, rules, usable(experience))
+    view = View(using.program, call.table, call.goal)
+    later = grounds(steps)
+    lesson = Lesson()
+    for number, ground in enumerate(later):
+        tried_ = guide.next(None)
+        done = [c for c in tried_ if c.ground == ground]
+        if done:
+            rest = set(later[number + 1 :])
+            passed = {c.ground: c for c in tried_ if c.ground != ground and c.ground not in rest}
+            lesson += compared(view, done, list(passed.values()))
+        mark = len(call.table.trail)
+        changes = call.segments.forward[ground[0]](*ground[1])
+        if changes is None:
+            raise LearningError(
+                f"step {number} ({' '.join((ground[0], *ground[1]))}): its preconditions don't hold there"
+            )
+        call.segments.apply(changes[1])
+        guide.look(mark)
+    return lesson
+
+
+def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate]) -> Lesson:
+    """Return what is counted where these were chosen and those passed over."""
+    lesson = Lesson()
+    for candidates, tally in ((done, CHOSEN), (passed, PASSED)):
+        for c in {c.rule.name: c for c in candidates}.values() if tally is CHOSEN else candidates:
+            facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
+            lesson.counted += [(c.rule, fact, tally) for fact in facts]
+    for c in done:
+        for other in passed:
+            who = [
+                (a, b)
+                for a, b in zip(
+                    view.individuals(c.rule, c.roles), view.individuals(other.rule, other.roles), strict=False
+                )
+                if a != b
+            ]
+            if c.rule == other.rule and len(who) == 1:
+                lesson.personal += [(c.rule, who[0][0], CHOSEN), (other.rule, who[0][1], PASSED)]
+    return lesson
+
+
+def in_vain(
+    experience: Experience, problem: Problem, step: Step, using: Compiled, before: Sequence[Step] = ()
+) -> Lesson:
+    """Return what a step teaches that failed: the rules that would have chosen it, with its facts, and its method."""
+    call = Call(problem, using, None, SHORT.expansions)
+    guide = Guide(call, rules_in(experience), usable(experience))
+    for ground in grounds(before):
+        changes = call.segments.forward[ground[0]](*ground[1])
+        if changes is None:
+            raise LearningError(f"{' '.join((ground[0], *ground[1]))}: its preconditions don't hold there")
+        mark = len(call.table.trail)
+        call.segments.apply(changes[1])
+        guide.look(mark)
+    view = View(using.program, call.table, call.goal)
+    lesson = Lesson()
+    wanted = (step.behavior, step.arguments)
+    for cell in guide.open:
+        for c in guide.every(cell):
+            if c.ground == wanted:
+                facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
+                lesson.counted += [(c.rule, fact, FAILED) for fact in facts]
+                lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
+    return lesson

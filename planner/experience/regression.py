@@ -1,0 +1,268 @@
+"""From a plan to rules: what a goal needed before each step that led to it, over roles instead of individuals.
+
+need     the conditions under which the rest of the steps leads to the goal; in the end the goal alone
+back     a step serves the need if some of it doesn't hold before the step: that is replaced by what the step asks
+lift     each individual that no behaviour names becomes a role of the narrowest class that is asked of it
+
+Goal regression as R. Waldinger had it, "Achieving several goals simultaneously", Machine Intelligence 8 (1977), to lifted rules as
+Moose learns them: D. Z. Chen et al., AAAI 2026. What a condition is isn't looked at but for those that look for an individual or
+offer alternatives: of these the individual, or the alternative, that there was is asked for. The checker's reading of conditions
+is used, so that a new kind of condition needs nothing here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+from planner.hierarchical.operators import named
+from planner.language import terms, walk
+from planner.paper.learning import LearningError
+from planner.validation import Facts, Rules
+from reasoner.amounts import meets
+from reasoner.memory.experience import Ground, Order, Rule
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Fact,
+    Problem,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+
+WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf
+"""What memory's files have words for; a rule that asks for anything else isn't learned."""
+LONGEST = 12
+"""Rules for more steps than this ask for so much that they seldom apply."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """A step that was done: what it asked, as ground conditions, and the changes that it made, with the conditions of each."""
+
+    ground: Ground
+    asked: tuple[Condition, ...]
+    changes: tuple[tuple[str, tuple[str, ...], str, tuple[Condition, ...]], ...]
+    mark: int
+
+
+class Course:
+    """The steps of a plan, one after the other, on the checker's facts.
+
+    Parameters
+    ----------
+    problem : Problem
+    steps : sequence of behaviour and arguments
+    """
+
+    def __init__(self, problem: Problem, steps: Sequence[Ground]) -> None:
+        self.problem, self.rules, self.facts = problem, Rules(problem), Facts(problem, problem.initial)
+        self.constants = frozenset(named(problem)) | {TRUE, FALSE}
+        self.done: list[Done] = []
+        self.achieved: dict[Fact, int] = {}
+        for number, (name, arguments) in enumerate(steps):
+            self._do(number, name, arguments)
+
+    def _do(self, number: int, name: str, arguments: tuple[str, ...]) -> None:
+        behavior, facts = self.problem.domain.behaviors[name], self.facts
+        given = {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
+        bound = self.rules.satisfied(behavior.preconditions, given, behavior.kinds, facts)
+        if bound is None:
+            raise LearningError(f"step {number} ({' '.join((name, *arguments))}): its preconditions don't hold there")
+        asked = [c for lifted in behavior.preconditions for c in self.plain(substituted(lifted, bound), behavior.kinds)]
+        kinds = [ClassCondition(argument, p.kind) for p, argument in zip(behavior.parameters, arguments, strict=True)]
+        because: dict[tuple[str, tuple[str, ...]], list[Condition]] = {}
+        for effect in behavior.effects:
+            inner = self.rules.satisfied(effect.when, bound, behavior.kinds, facts) if effect.when else None
+            if inner is not None:
+                cell = effect.situation, tuple([inner.get(a, a) for a in effect.arguments])
+                when = [c for lifted in effect.when for c in self.plain(substituted(lifted, inner), behavior.kinds)]
+                because.setdefault(cell, []).extend(when)
+        made = self.rules.changes(behavior, arguments, facts)
+        if made is None:
+            raise LearningError(f"step {number} ({' '.join((name, *arguments))}): an amount would be what it can't be")
+        changes = [(situation, key, value, tuple(because.get((situation, key), ()))) for situation, key, value in made]
+        self.done.append(Done((name, arguments), (*kinds, *asked), tuple(changes), len(facts.log)))
+        before = [s for s, value in self.problem.goal.items() if meets(facts.value(s.situation, s.arguments), value)]
+        for situation, key, value, _ in changes:
+            facts.put(situation, key, value)
+        for symbol, value in self.problem.goal.items():
+            if symbol not in before and meets(facts.value(symbol.situation, symbol.arguments), value):
+                self.achieved[Fact(symbol, value)] = number
+
+    def plain(self, condition: Condition, kinds: Mapping[str, str]) -> Iterator[Condition]:
+        """Yield a condition that holds now without choices: the individual and the alternative that there are."""
+        if isinstance(condition, Witness) and not condition.negated:
+            inner = {**kinds, condition.variable: condition.kind}
+            wanted = (*condition.conditions, ClassCondition(condition.variable, condition.kind))
+            found = self.rules.satisfied(wanted, {}, inner, self.facts)
+            for c in wanted if found is not None else ():
+                yield from self.plain(substituted(c, found or {}), inner)
+        elif isinstance(condition, AnyOf) and not condition.negated:
+            for group in condition.alternatives:
+                found = self.rules.satisfied(group, {}, kinds, self.facts)
+                if found is not None:
+                    for c in group:
+                        yield from self.plain(substituted(c, found), kinds)
+                    return
+        else:
+            yield condition
+
+    # -------------------------------------------------------------------------------------------------------- regressing
+
+    def rules_of(self) -> Iterator[Rule]:
+        """Yield the rules of each goal: over the steps since the goal before it was achieved."""
+        last = -1
+        starts: dict[int, int] = {}
+        for number in sorted(set(self.achieved.values())):
+            starts[number] = last + 1
+            last = number
+        for fact, number in sorted(self.achieved.items()):
+            yield from self.regressed(fact, starts[number], number)
+
+    def regressed(self, goal: Fact, start: int, end: int) -> Iterator[Rule]:
+        """Yield the rules for a goal from the step that achieves it backwards."""
+        facts = Facts(self.problem, self.problem.initial)
+        for done in self.done[: end + 1]:
+            for situation, key, value, _ in done.changes:
+                facts.put(situation, key, value)
+        wanted = ValueCondition(goal.symbol.situation, goal.symbol.arguments, goal.value)
+        need: dict[Condition, None] = {wanted: None}
+        order: dict[str, None] = dict.fromkeys((*wanted.arguments, wanted.value))
+        steps, level = 0, self.problem.domain.levels[0]
+        for done in reversed(self.done[start : end + 1]):
+            after = dict(need)
+            while len(facts.log) > done.mark:
+                situation, key, old = facts.log[-1]
+                facts.put(situation, key, old)
+                del facts.log[-2:]
+            if self.problem.domain.behaviors[done.ground[0]].level != level:
+                return  # part of the way left the level: what must be at rest after it, goals don't say
+            served = [c for c in after if self.rules.satisfied([c], {}, {}, facts) is None]
+            if not served:
+                continue
+            need = {c: None for c in after if c not in served}
+            need.update(dict.fromkeys(done.asked))
+            for condition in served:
+                need.update(dict.fromkeys(self.before(condition, done, facts)))
+            steps += 1
+            if steps > LONGEST:
+                return
+            order.update(dict.fromkeys(done.ground[1]))
+            order.update((t, None) for c in need for inner in walk(c) for t in terms(inner) if not t.startswith("?"))
+            rule = self.lifted(wanted, tuple(need), done.ground, steps, tuple(order))
+            if rule is not None:
+                yield rule
+
+    def before(self, condition: Condition, done: Done, facts: Facts) -> Iterator[Condition]:
+        """Yield what must hold before a step for what it makes true: its effects' conditions, and none but those it took away."""
+        about = {(c.situation, c.arguments) for c in walk(condition) if isinstance(c, ValueCondition)}
+        situations = {situation for situation, _ in about}
+        plain = isinstance(condition, ValueCondition)
+        for situation, key, _, when in done.changes:
+            if when and ((situation, key) in about if plain else situation in situations):
+                yield from when
+        if isinstance(condition, Witness) and condition.negated:
+            kinds = {condition.variable: condition.kind}
+            others = condition.conditions
+            for _ in range(len(self.problem.classes.get(condition.kind, ()))):
+                wanted = (*others, ClassCondition(condition.variable, condition.kind))
+                found = self.rules.satisfied(wanted, {}, kinds, facts)
+                if found is None:
+                    break
+                who = found[condition.variable]
+                others = (*others, EqualityCondition(condition.variable, who, negated=True))
+            yield replace(condition, conditions=others)
+
+    def lifted(
+        self, goal: ValueCondition, need: Sequence[Condition], step: Ground, steps: int, order: Sequence[str]
+    ) -> Rule | None:
+        """Return a rule: the individuals of a need as roles, and no condition that others imply; None if it says too little."""
+        members = self.problem.members
+        if not all(isinstance(inner, WRITABLE) for c in need for inner in walk(c)):
+            return None
+        kinds: dict[str, str] = {}
+
+        def narrow(who: str, kind: str) -> None:
+            known = kind in self.problem.classes and who not in self.constants
+            if known and (who not in kinds or len(members(kind)) < len(members(kinds[who]))):
+                kinds[who] = kind
+
+        for c in need:
+            if isinstance(c, ClassCondition) and not c.negated:
+                narrow(c.term, c.kind)
+        situations = self.problem.domain.situations
+        for c in (goal, *need):
+            for inner in walk(c):
+                if isinstance(inner, ValueCondition):
+                    kind = situations[inner.situation]
+                    for who, of in zip((*inner.arguments, inner.value), (*kind.arguments, kind.range), strict=True):
+                        if who not in kinds and not who.startswith("?"):
+                            narrow(who, of)
+                elif isinstance(inner, RelationCondition):
+                    for who in inner.arguments:
+                        if who not in kinds and not who.startswith("?"):
+                            of = next((k for k in self.problem.classes if who in members(k)), "")
+                            narrow(who, of)
+        roles: dict[str, str] = {}
+        for who in order:
+            if who in kinds:
+                of = kinds[who]
+                base = "?" + (of.lower() if of.isupper() else of[0].lower() + of[1:])
+                same = sum(role.rstrip("0123456789") == base for role in roles.values())
+                roles[who] = base if not same else f"{base}{same + 1}"
+        known = {(c.situation, c.arguments) for c in need if isinstance(c, ValueCondition) and not c.negated}
+        asks: dict[Condition, None] = {}
+        for c in need:
+            if isinstance(c, EqualityCondition):
+                continue  # different roles are different individuals
+            if isinstance(c, ValueCondition) and c.negated and (c.situation, c.arguments) in known:
+                continue
+            if isinstance(c, ClassCondition) and not c.negated:
+                known_already = c.term in self.constants or members(kinds[c.term]) <= members(c.kind)
+                if known_already:
+                    continue
+            asks[ordered_inside(substituted(c, roles))] = None
+        own = {term: roles.get(term, term) for term in (*goal.arguments, goal.value, *step[1])}
+        return Rule(
+            ValueCondition(goal.situation, tuple(own[a] for a in goal.arguments), own[goal.value]),
+            tuple(sorted(asks, key=repr)),
+            (step[0], tuple(own[a] for a in step[1])),
+            steps,
+            tuple((role, kinds[who]) for who, role in roles.items() if self._used(role, asks, own)),
+        )
+
+    def _used(self, role: str, asks: Iterable[Condition], own: Mapping[str, str]) -> bool:
+        return role in own.values() or any(role in terms(inner) for c in asks for inner in walk(c))
+
+    # ------------------------------------------------------------------------------------------------------------ order
+
+    def orders(self) -> Iterator[Order]:
+        """Yield for each two goals that were achieved one after the other which came first."""
+        for first, then in permutations(self.achieved, 2):
+            if self.achieved[first] < self.achieved[then]:
+                yield ordered(first, then, self.constants)
+
+
+def ordered_inside(condition: Condition) -> Condition:
+    """Return a condition with those inside it in one order, so that the same rule has one name."""
+    if isinstance(condition, Witness):
+        return replace(condition, conditions=tuple(sorted(map(ordered_inside, condition.conditions), key=repr)))
+    if isinstance(condition, AnyOf):
+        groups = (tuple(sorted(map(ordered_inside, group), key=repr)) for group in condition.alternatives)
+        return replace(condition, alternatives=tuple(sorted(groups, key=repr)))
+    return condition
+
+
+def ordered(first: Fact, then: Fact, constants: frozenset[str] | set[str]) -> Order:
+    """Return the order of two goals, by what they share."""
+    one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
+    shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
+    return Order(first.symbol.situation, then.symbol.situation, tuple(shared))

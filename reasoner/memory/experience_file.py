@@ -1,0 +1,313 @@
+"""Experience on disk and in stores: rules and methods as triples, counts as annotated axioms, in Turtle that Protégé opens.
+
+What was learned is written once (`reasoner.memory.rules_file`). Each counter is an individual per replica, epoch and thing that it
+`:countsFor`, `:associatedWith` that thing itself and the lifted facts that held; an ``owl:Axiom`` on each of these links has
+`:chosen`, `:passedOver`, `:failed` and the `:probability` that they amount to. Writers never share a counter, all else is named by
+its content: the union of two files is a file of both memories. A rule that was edited keeps its counts.
+
+A file is written one link a line, and such lines are read by a regular expression; in any other layout (Protégé's, say) the
+triples themselves are read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import uuid
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import astuple, dataclass, field
+from pathlib import Path
+from urllib.error import URLError
+from urllib.parse import quote, urlencode
+from urllib.request import Request, urlopen
+
+import pyoxigraph as ox
+
+from reasoner.files import write_whole
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.memory.experience import ITSELF, Experience, Fact, Said, Tally
+from reasoner.memory.rules_file import Reader, Words, Writer, label
+from reasoner.names import Names
+from reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
+
+FORMAT = 4
+TALLY = ("chosen", "passedOver", "failed")
+PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
+
+HEAD = """@prefix : <{core}> .
+@prefix owl: <{owl}> .
+@prefix rdfs: <{rdfs}> .
+@prefix m: <{space}> .
+
+{iri} a owl:Ontology ; owl:imports {domain} ; :memoryFormat {format} ; :learnsAs {replica} .
+"""
+LINK = (
+    "m:{counter} :associatedWith m:{pattern} . [] a owl:Axiom ; owl:annotatedSource m:{counter} ; "
+    "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
+    ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
+)
+MOST = 2**53  # so far counts are exact as floating-point numbers
+COUNTS = re.compile(
+    r"^m:(?:(fact_\w+) a owl:NamedIndividual, :LiftedFact ; :asks \"([^\"\\\n]*)\" ; :answer \"([^\"\\\n]*)\" ; "
+    r"rdfs:label [^\n]* \.\n|"
+    r"(\S+) :associatedWith m:(\S+) \. \[\] a owl:Axiom ; owl:annotatedSource m:\4 ; "
+    r"owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:\5 ; "
+    r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
+    re.MULTILINE,
+)
+"""Most of a file are such lines: lifted facts, or counts of a link. The rest, in any layout, is left to the Turtle parser."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A memory file taken apart: the links with their counts, the lifted facts by name, and the rest as Turtle."""
+
+    links: list[tuple[str, str, Tally]] = field(default_factory=list)
+    facts: dict[str, Fact] = field(default_factory=dict)
+    rest: str = ""
+
+
+def lines(text: str) -> Lines:
+    """Take a memory file apart."""
+    links, facts, rest, at = [], {}, [], 0
+    for match in COUNTS.finditer(text):
+        if match.start() > at:
+            rest.append(text[at : match.start()])
+        at = match.end()
+        fact, asks, answer, counter, about, *counts = match.groups()
+        if fact is not None:
+            facts[fact] = asks, answer
+        else:
+            links.append((counter, about, Tally(*map(int, counts))))
+    return Lines(links, facts, "".join([*rest, text[at:]]))
+
+
+def new_replica() -> str:
+    """Return an ID for a new memory, which no other has."""
+    return str(uuid.uuid4())
+
+
+def probability(tally: Tally) -> float:
+    """Return how probable it is that such a candidate is chosen and works, with half a choice and half a pass as prior.
+
+    >>> probability(Tally(chosen=3, passed_over=0))
+    0.875
+    """
+    total = tally.chosen + tally.passed_over + tally.failed
+    return (tally.chosen + PRIOR / 2) / (total + PRIOR)
+
+
+# ------------------------------------------------------------------------------------------------------------- writing
+
+
+def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
+    """Write a memory file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    experience : Experience
+    names : Names
+        Lead the behaviours' and classes' names back to IRIs.
+    domain : str
+        IRI of the ontology that the file imports, for Protégé.
+    """
+    write_whole(path, turtle(experience, names, domain))
+
+
+def turtle(
+    experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
+) -> Iterator[str]:
+    """Yield a memory as Turtle, thing by thing; `only` what one replica counted. `words` say what something is called."""
+    iri = _node("urn:uuid:", experience.replica)
+    prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
+    replica = _text(experience.replica)
+    yield HEAD.format(**prefixes, iri=iri, domain=ox.NamedNode(domain), format=FORMAT, replica=replica)
+    for replica in sorted(experience.trusts) if only is None else ():
+        yield f"{iri} :trusts {_text(replica)} .\n"
+    for replica, episodes in sorted(experience.episodes.items()):
+        if only in (None, replica):
+            node = _node(MEMORY, "replica_" + replica)
+            yield f"{node} a owl:NamedIndividual, :Replica ; :replica {_text(replica)} ; :episodes {episodes} .\n"
+    writer = Writer(names, words)
+    for name, one in sorted(experience.said.items()):
+        yield writer.said(one, name not in experience.disabled)
+    facts: dict[Fact, str] = {}
+    for (replica, epoch), counts in sorted(experience.counts.items()):
+        if only not in (None, replica):
+            continue
+        for name, tallies in sorted(counts.items()):
+            counter = f"counter_{name}_{epoch}_{_digest(replica)}"
+            yield (
+                f"m:{counter} a owl:NamedIndividual, :Counter ; :replica {_text(replica)} ; :epoch {epoch} ; "
+                f":countsFor m:{name} .\n"
+            )
+            for fact, tally in sorted(tallies.items()):
+                if fact != ITSELF and fact not in facts:
+                    facts[fact] = f"fact_{_digest(repr(fact))}"
+                    asks, answer = fact
+                    yield (
+                        f"m:{facts[fact]} a owl:NamedIndividual, :LiftedFact ; :asks {_text(asks)} ; :answer {_text(answer)} ; "
+                        f"rdfs:label {_text(f'{asks}: {answer}')} .\n"
+                    )
+                target = name if fact == ITSELF else facts[fact]
+                yield LINK.format(counter=counter, pattern=target, t=tally, p=probability(tally))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha1(text.encode(), usedforsecurity=False).hexdigest()[:16]
+
+
+def _node(space: str, name: str) -> str:
+    """Return the IRI of any name in a namespace, as Turtle and SPARQL write it."""
+    return str(ox.NamedNode(space + quote(name, safe="")))
+
+
+def _text(text: str) -> str:
+    return str(ox.Literal(text))
+
+
+# ------------------------------------------------------------------------------------------------------------- reading
+
+
+def load(path: Path, names: Names | None = None) -> Experience:
+    """Read a memory file.
+
+    Raises
+    ------
+    KnowledgeError
+        The file is missing, broken, of a newer format or no memory of this kind; the message says which, and what to do.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise KnowledgeError(f"{path}: no memory: it can't be read as text ({error})") from error
+    return parse(lines(text), str(path), names)
+
+
+def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
+    """Read a memory; `source` names it in messages."""
+    try:
+        triples = [q.triple for q in ox.parse(found.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
+    except SyntaxError as error:
+        raise KnowledgeError(f"{source}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
+    return _experience(triples, found, source, names)
+
+
+def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: Names | None) -> Experience:
+    links, facts = list(found.links), dict(found.facts)
+    nodes: dict[str, dict[str, list[str]]] = {}
+    for triple in triples:
+        values = nodes.setdefault(_id(triple.subject), {}).setdefault(triple.predicate.value.removeprefix(CORE), [])
+        if (value := _id(triple.object)) not in values:
+            values.append(value)
+    heads = {iri: node for iri, node in nodes.items() if "memoryFormat" in node}
+    if not heads:
+        raise KnowledgeError(
+            f"{source}: no memory of counts: it says no :memoryFormat; a memory of the paper's mode has none"
+        )
+    head = next(iter(heads.values()))
+    if head["memoryFormat"] != [str(FORMAT)]:
+        raise KnowledgeError(
+            f"{source}: memory of format {', '.join(head['memoryFormat'])}, wanted {FORMAT}: this version doesn't read it; "
+            "learn anew, or use the version of Confab that wrote it"
+        )
+    if "learnsAs" not in head:
+        raise KnowledgeError(f"{source}: broken memory: it doesn't say who learns into it (:learnsAs); restore a copy")
+    experience = Experience(head["learnsAs"][0], trusts=set(head.get("trusts", ())))
+    reader = Reader(nodes, names)
+    try:
+        named: dict[str, str] = {}  # an edited rule has another name, and the counts of its node
+        for subject, node in nodes.items():
+            one: Said | None = reader.said(subject)
+            if one is not None:
+                named[_local(subject)] = one.name
+                experience.said[one.name] = one
+                if "false" in node.get("enabled", ()):
+                    experience.disabled.add(one.name)
+            if "episodes" in node:
+                experience.episodes[node["replica"][0]] = _count(node["episodes"][0], "episodes")
+            if "chosen" in node:  # the paper's links have a probability alone
+                counter, target = (
+                    _local(reader.one(subject, OWL + end)) for end in ("annotatedSource", "annotatedTarget")
+                )
+                links.append((counter, target, Tally(*(int(node.get(key, ["0"])[0]) for key in TALLY))))
+            if "asks" in node:
+                facts[_local(subject)] = reader.one(subject, "asks"), reader.one(subject, "answer")
+        counters: dict[str, dict[Fact, Tally]] = {}
+        for subject, node in nodes.items():
+            if "epoch" in node:
+                who = reader.one(subject, "replica"), _count(reader.one(subject, "epoch"), "epoch")
+                about = _local(reader.one(subject, "countsFor"))
+                if about in named:  # what was deleted isn't counted any more
+                    tallies = experience.counts.setdefault(who, {}).setdefault(named[about], {})
+                    counters[_local(subject)] = tallies
+                else:
+                    counters[_local(subject)] = {}
+        for counter, target, tally in links:
+            fact = facts[target] if target.startswith("fact_") else ITSELF
+            tallies = counters[counter]
+            if not 0 <= min(tally.chosen, tally.passed_over, tally.failed) <= sum(astuple(tally)) < MOST:
+                raise ValueError(f"{counter} counts {tally}; wanted numbers from 0 to {MOST}")
+            tallies[fact] = tallies[fact] | tally if fact in tallies else tally
+    except KnowledgeError:
+        raise
+    except (KeyError, ValueError, IndexError) as error:
+        raise KnowledgeError(f"{source}: broken memory: a rule, link or counter lacks a part ({error})") from error
+    return experience
+
+
+def _count(text: str, what: str) -> int:
+    """Return a number that something was counted to; raise ValueError if that can't be."""
+    if not 0 <= (number := int(text)) < MOST:
+        raise ValueError(f":{what} {number}; wanted a number from 0 to {MOST}")
+    return number
+
+
+def _id(term: object) -> str:
+    return str(getattr(term, "value", term))
+
+
+def _local(iri: str) -> str:
+    return iri.rsplit("#", 1)[-1].rsplit("/", 1)[-1]
+
+
+# ------------------------------------------------------------------------------------------------------------ endpoints
+
+
+def pull(endpoint: str, names: Names | None = None, replica: str | None = None, timeout: float = 60.0) -> Experience:
+    """Read all memories that a SPARQL endpoint has, as one.
+
+    Each replica has a named graph of its own there, so that writers never meet. An endpoint without memory gives an empty one.
+    """
+    query = f'CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{MEMORY}graph/")) }}'
+    answer = _ask(endpoint, {"query": query}, timeout)
+    own = replica or new_replica()
+    triples = [q.triple for q in ox.parse(answer, format=ox.RdfFormat.N_TRIPLES)]
+    if not triples:
+        return Experience(own)
+    found = _experience(triples, Lines(), endpoint, names)
+    found.replica = own
+    return found
+
+
+def push(endpoint: str, experience: Experience, names: Names, domain: str, timeout: float = 60.0) -> None:
+    """Replace this replica's own graph at a SPARQL endpoint by what it has counted; no other replica's is touched."""
+    graph = _node(MEMORY + "graph/", experience.replica)
+    text = "".join(turtle(experience, names, domain, only=experience.replica))
+    data = ox.serialize([q.triple for q in ox.parse(text, format=ox.RdfFormat.TURTLE)], format=ox.RdfFormat.N_TRIPLES)
+    body = (data or b"").decode("utf-8")
+    _ask(endpoint, {"update": f"DROP SILENT GRAPH {graph} ; INSERT DATA {{ GRAPH {graph} {{ {body} }} }}"}, timeout)
+
+
+def _ask(endpoint: str, form: Mapping[str, str], timeout: float) -> bytes:
+    url = endpoint if "query" in form else re.sub(r"/(query|sparql)/?$", "/update", endpoint)
+    headers = {"Content-Type": "application/x-www-form-urlencoded", "Accept": "application/n-triples"}
+    try:
+        with urlopen(Request(url, urlencode(form).encode(), headers), timeout=timeout) as answer:
+            found: bytes = answer.read()
+            return found
+    except (URLError, OSError) as error:
+        raise KnowledgeError(f"{endpoint}: no memory there: {error}; is it a SPARQL 1.1 endpoint?") from error

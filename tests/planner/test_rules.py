@@ -1,0 +1,228 @@
+"""Experience becomes rules: they lead in larger worlds and never spoil; what was never seen is treated as its like."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from planner.experience.advice import Memory, plan
+from planner.experience.evidence import View
+from planner.experience.leading import Guide
+from planner.experience.lessons import compared, rules_in, teach
+from planner.experience.regression import Course
+from planner.hierarchical import planner as fast
+from planner.hierarchical.operators import Program
+from planner.hierarchical.serialization import Call, compiled
+from planner.plan import Outcome, Status
+from planner.validation import validate
+from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Order, Rule, Tally
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse_files
+from reasoner.symbols import Problem
+from tests.planner.small import van
+from worlds.lessons import problem, taught
+
+FAMILIES = "served", "swap", "rotate", "handover", "blocked", "full"
+FERRY = """(define (domain ferry) (:requirements :strips :typing) (:types car place)
+(:predicates (at ?c - car ?p - place) (ship ?p - place) (on ?c - car) (empty))
+(:action sail :parameters (?a ?b - place) :precondition (and (ship ?a) (not (ship ?b)))
+ :effect (and (not (ship ?a)) (ship ?b)))
+(:action board :parameters (?c - car ?p - place) :precondition (and (at ?c ?p) (ship ?p) (empty))
+ :effect (and (not (at ?c ?p)) (not (empty)) (on ?c)))
+(:action leave :parameters (?c - car ?p - place) :precondition (and (on ?c) (ship ?p))
+ :effect (and (at ?c ?p) (empty) (not (on ?c)))))"""
+
+
+def ferry(folder: Path, cars: int, places: int) -> Problem:
+    (folder / "domain.pddl").write_text(FERRY)
+    at = " ".join(f"(at c{i} p{i % places})" for i in range(cars))
+    goal = " ".join(f"(at c{i} p{(i * 3 + 1) % places})" for i in range(cars))
+    objects = f"{' '.join(f'c{i}' for i in range(cars))} - car {' '.join(f'p{i}' for i in range(places))} - place"
+    text = (
+        f"(define (problem p) (:domain ferry) (:objects {objects}) (:init (empty) (ship p0) {at}) (:goal (and {goal})))"
+    )
+    (folder / "problem.pddl").write_text(text)
+    return imported(parse_files(folder / "domain.pddl", folder / "problem.pddl")).problem
+
+
+def expanded(outcome: Outcome, level: int = 1) -> int:
+    return sum(counts.expanded for at, counts in outcome.search.items() if at == level)
+
+
+def inverted(memory: Memory) -> Memory:
+    """Return a memory whose rules promise the most where they are nearest, and that prefers what was passed over."""
+    experience = Experience("inverted", {"inverted": 1})
+    rules = rules_in(memory.experience)
+    longest = max(rule.steps for rule in rules)
+    wrong = [replace(rule, steps=longest + 1 - rule.steps, asks=rule.asks[::2]) for rule in rules]
+    experience.learn(Lesson(said=list(wrong), counted=[(rule, ITSELF, Tally(passed_over=5)) for rule in wrong]))
+    return Memory(experience)
+
+
+def foreign() -> Memory:
+    """Return a memory of behaviours that this domain doesn't have."""
+    experience = Experience("foreign")
+    rules = rules_in(taught().experience)
+    experience.learn(Lesson(said=[replace(rule, does=(f"OTHER_{rule.does[0]}", rule.does[1])) for rule in rules]))
+    return Memory(experience)
+
+
+def test_five_rules_are_learned_of_a_ferry_and_lead_to_every_goal_of_a_hundred_cars(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    for cars, places in ((1, 3), (2, 4), (3, 3)):
+        teach(experience, ferry(tmp_path, cars, places))
+    assert sorted(rule.steps for rule in rules_in(experience)) == [1, 2, 3, 4, 4]
+    large = ferry(tmp_path, 100, 30)
+    outcome = plan(large, Memory(experience), improve=0)
+    assert outcome.plan is not None
+    assert validate(large, outcome.plan) == []
+    assert expanded(outcome) == len(outcome.plan.steps)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_after_six_small_lessons_a_larger_table_takes_hardly_more_expansions_than_steps(family: str) -> None:
+    within = problem(family, 20, 5000)
+    alone, led = fast.plan(within, improve=0), plan(within, taught(FAMILIES), improve=0)
+    assert led.plan is not None
+    assert validate(within, led.plan) == []
+    assert expanded(led) <= max(1.6 * len(led.plan.steps), 1.2 * expanded(alone) + 2 * (10 + len(within.goal)))
+
+
+@pytest.mark.parametrize("family", ["served", "full", "random"])
+@pytest.mark.parametrize("kind", ["good", "inverted", "wrong domain"])
+def test_in_strict_mode_expansions_never_exceed_the_memoryless_ones_by_more_than_a_twentieth(
+    family: str, kind: str
+) -> None:
+    memory = {"good": taught(), "inverted": inverted(taught()), "wrong domain": foreign()}[kind]
+    within = problem(family, 8, 1)
+    alone, with_memory = fast.plan(within), plan(within, memory, "strict")
+    assert with_memory.status is alone.status
+    assert expanded(with_memory) <= 1.05 * expanded(alone)
+
+
+def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
+    for family in ("served", "swap", "full"):
+        within = problem(family, 12, 1)
+        alone, misled = fast.plan(within), plan(within, inverted(taught()), "leading")
+        assert misled.plan is not None
+        assert validate(within, misled.plan) == []
+        assert expanded(misled) <= expanded(alone) + 4 * (10 + len(within.goal))
+
+
+def test_a_memory_that_knows_none_of_the_behaviours_is_not_asked() -> None:
+    within = problem("swap", 8)
+    alone, with_memory = fast.plan(within), plan(within, foreign())
+    assert {k: c.expanded for k, c in with_memory.search.items()} == {k: c.expanded for k, c in alone.search.items()}
+
+
+def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> None:
+    within, memory = problem("rotate", 12, 1), taught(FAMILIES)
+    poor = Experience("robot")
+    poor.merge(memory.experience)
+    kinds = {rule.goals for rule in memory.rules}
+    poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
+    assert expanded(plan(within, Memory(poor))) == expanded(fast.plan(within))
+    assert expanded(plan(within, memory)) < expanded(fast.plan(within))
+
+
+def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
+    within, untrusted = problem("swap", 8), Memory(taught().experience, trusted=False)
+    assert expanded(plan(within, untrusted, "leading")) == expanded(plan(within, taught(), "strict"))
+
+
+def test_what_is_unsolvable_stays_so() -> None:
+    assert plan(problem("unsolvable", 4), taught()).status is Status.UNSOLVABLE
+
+
+def test_the_same_call_gives_the_same_plan() -> None:
+    within = problem("swap", 8, 1)
+    assert plan(within, taught()).plan == plan(within, taught()).plan
+
+
+def test_refinements_are_remembered_and_not_searched_again() -> None:
+    within, methods = problem("served", 8), [m for m in taught().experience.said.values() if isinstance(m, Method)]
+    assert {m.behavior for m in methods} == {"B1_MOVE", "B1_POUR", "B2_PICK", "B2_PLACE", "B2_POUR"}
+    led = plan(within, taught())
+    assert led.misses == 0 < fast.plan(within).misses
+
+
+def test_a_class_never_seen_does_exactly_as_well() -> None:
+    bowl = "\n:Bowl a owl:Class, owl:NamedIndividual ; rdfs:subClassOf k:Cup .\n"
+
+    def bowls(text: str) -> str:
+        return text.replace("owl:NamedIndividual, k:Cup", "owl:NamedIndividual, :Bowl") + bowl
+
+    seen, unseen = problem("served", 12, 1), problem("served", 12, 1, edit=bowls)
+    assert unseen.classes["Bowl"] == seen.classes["Cup"]
+    one, other = plan(seen, taught()), plan(unseen, taught())
+    assert one.plan is not None
+    assert other.plan is not None
+    assert [str(s) for s in one.plan.steps] == [str(s) for s in other.plan.steps]
+    assert expanded(one) == expanded(other)
+
+
+def two_hands(experience: Experience) -> tuple[Rule, Fact, Fact]:
+    """Return a rule in which one of two hands does as well as the other, and who is preferred by it."""
+    rule = next(r for r in rules_in(experience) if any(role == "?hand" for role, _ in r.kinds))
+    return rule, ("who is hand", "left"), ("who is hand", "right")
+
+
+def test_a_preference_that_flips_is_relearned_within_ten_episodes_after_forty() -> None:
+    experience = Experience("robot")
+    experience.merge(taught().experience)
+    rule, left, right = two_hands(experience)
+
+    def prefers(one: Fact, other: Fact) -> bool:
+        judge = Memory(experience).judge
+        return judge.cogency(rule, [], [one]) > judge.cogency(rule, [], [other])
+
+    for _ in range(40):
+        experience.learn(Lesson(personal=[(rule, left, Tally(chosen=1)), (rule, right, Tally(passed_over=1))]))
+    assert prefers(left, right)
+    episodes = 0
+    while not prefers(right, left):
+        experience.learn(Lesson(personal=[(rule, right, Tally(chosen=1)), (rule, left, Tally(passed_over=1))]))
+        episodes += 1
+    assert episodes <= 10
+
+
+def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
+    within, memory = problem("served", 6, 1), taught()
+    call = Call(within, compiled(within), None, 1000)
+    guide = Guide(call, memory.rules, memory.orders)
+    one, other = guide.next(None)[:2]
+    view = View(Program(within), call.table, call.goal)
+    lesson = compared(view, [one], [other])
+    assert (one.rule, ITSELF, Tally(chosen=1)) in lesson.counted
+    experience = Experience("robot")
+    experience.learn(lesson)
+    before = Memory(experience).judge.cogency(one.rule, [], [])
+    experience.learn(Lesson(counted=[(one.rule, ITSELF, Tally(failed=3))]))
+    assert Memory(experience).judge.cogency(one.rule, [], []) < before
+
+
+def test_regression_asks_for_what_the_way_to_the_goal_needs_and_for_nobody_but_who_is_moved_away() -> None:
+    within = problem("swap", 4, 1)
+    found = fast.plan(within, improve=0).plan
+    assert found is not None
+    rules = list(Course(within, [(s.behavior, s.arguments) for s in found.steps]).rules_of())
+    assert {rule.goals for rule in rules} <= {GoalKind("LOCATION", (kind,)) for kind in within.classes}
+    assert any("negated=True" in repr(rule.asks) and "EqualityCondition" in repr(rule.asks) for rule in rules)
+    constants = {name for members in within.classes.values() for name in members}
+    assert not constants & {term for rule in rules for term in (*rule.goal.arguments, rule.goal.value, *rule.does[1])}
+
+
+def test_what_comes_first_is_learned_from_several_orders() -> None:
+    orders = [one for one in taught().experience.said.values() if isinstance(one, Order)]
+    first = Order("LOCATION", "BEVERAGE", ((0, 0),))
+    assert first in orders
+    assert first in taught().orders
+    assert first.reversed not in taught().orders
+
+
+def test_a_way_that_leaves_the_level_teaches_no_rule_of_that_level() -> None:
+    within = van().problem
+    lower = [name for name, b in within.domain.behaviors.items() if b.level > 1]
+    experience = Experience("robot")
+    teach(experience, within)
+    assert not {rule.does[0] for rule in rules_in(experience)} & set(lower)
