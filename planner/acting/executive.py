@@ -39,6 +39,7 @@ from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from planner.validation import successor
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
 logger = logging.getLogger(__name__)
@@ -244,7 +245,7 @@ class _Run:
 
     def finish(self) -> None:
         """Nothing is left to be done: either what is wanted is there, or the agenda must be looked at again."""
-        missing = [Fact(s, v) for s, v in self.belief.goal.items() if self.belief.initial.get(s, FALSE) != v]
+        missing = [Fact(s, v) for s, v in self.belief.goal.items() if not meets(self.belief.initial.get(s, FALSE), v)]
         if missing:
             self.doubt(f"{missing[0]} doesn't hold yet")
             return
@@ -464,7 +465,7 @@ class _Run:
         proved = outcome is not None and outcome.status is Status.UNSOLVABLE and not self.withdrawn
         hopeless = []
         for symbol, value in self.belief.goal.items():
-            if proved and self.belief.initial.get(symbol, FALSE) != value:
+            if proved and not meets(self.belief.initial.get(symbol, FALSE), value):
                 alone = replace(self.belief, goal={symbol: value})
                 steps, single = replan(alone, None, self.using, self.patience.planning)
                 if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:

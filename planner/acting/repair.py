@@ -27,6 +27,7 @@ from planner.hierarchical.unsolvability import unattainable
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6, expansions=400)
@@ -400,7 +401,7 @@ def _last_steps(call: Call) -> set[int]:
     found: set[int] = set()
     for symbol, value in call.problem.goal.items():
         cell = symbol.situation, key_of(symbol.arguments)
-        if cell in last and start.get(symbol, FALSE) != value:
+        if cell in last and not meets(start.get(symbol, FALSE), value):
             found |= together[last[cell]]
     return found
 

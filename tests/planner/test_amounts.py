@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 
+import confab
 from planner.grounded.best_first import plan_level
 from planner.plan import Status
 from planner.solve import Request, solve
@@ -112,3 +113,9 @@ def test_a_product_of_amounts_that_change_is_searched_only_where_states_are_look
     outcome = solve(Request(replace(problem, domain=domain), "paper"))
     assert outcome.plan is not None
     assert meets(str(outcome.plan.length[1]), "2")
+
+
+def test_a_world_with_amounts_is_carried_out_to_its_goal() -> None:
+    execution = confab.load("canteen-small").execute()
+    assert execution.reached
+    assert not execution.episode.replans
