@@ -134,12 +134,14 @@ class Table:
 class Derived(dict[Key, str]):
     """In place of the cells of a situation type that is defined: nothing is kept in it, and `get` works a value out."""
 
-    def __init__(self, name: str, stratum: Stratum) -> None:
+    def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
         super().__init__()
-        self.name, self.stratum = name, stratum
+        self.name, self.alone, self.stratum = name, arity == 1, stratum
 
     def get(self, key: Key, default: str | None = None) -> str:  # type: ignore[override]
-        """Return whether it holds of the arguments behind a key."""
+        """Return whether it holds of the arguments behind a key; of a key that has more or fewer, nothing is said."""
+        if isinstance(key, str) is not self.alone:
+            return default  # type: ignore[return-value]
         return TRUE if self.stratum.holds((self.name, key)) else FALSE
 
 
@@ -227,7 +229,7 @@ class Writer:
         for group in strata(rules):
             stratum = Stratum(table)
             for name in group:
-                table.now[name] = Derived(name, stratum)
+                table.now[name] = Derived(name, len(self.problem.domain.situations[name].arguments), stratum)
         tests = self._define(table.now, table.who)
         for name in rules:
             cells = table.now[name]

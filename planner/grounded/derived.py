@@ -13,10 +13,10 @@ import heapq
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bit:
     """A bit, as a mask, that is set where a state has all bits of one of the masks; `opposite`: where it has none of them."""
 
@@ -110,20 +110,18 @@ def _worked_out(part: tuple[Bit, ...], state: int) -> int:
             if state & wanted == wanted:
                 return state & ~bit.mask if bit.opposite else state | bit.mask
         return state | bit.mask if bit.opposite else state & ~bit.mask
-    own = sum(bit.mask for bit in part)
+    own, ways = _circular(part)
     state &= ~own
     lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: how many are lacking, and of what
     waiting: list[int] = []
-    for bit in part:
-        for wanted in bit.alternatives:
-            inside = wanted & own
-            if state & (wanted ^ inside) == wanted ^ inside:
-                if not inside:
-                    waiting.append(bit.mask)
-                    break
-                entry = [inside.bit_count(), bit.mask]
-                for low in _single(inside):
-                    lacking[low].append(entry)
+    for outside, inside, mask in ways:
+        if state & outside == outside:
+            if not inside:
+                waiting.append(mask)
+                continue
+            entry = [len(inside), mask]
+            for low in inside:
+                lacking[low].append(entry)
     while waiting:
         mask = waiting.pop()
         if state & mask:
@@ -134,6 +132,13 @@ def _worked_out(part: tuple[Bit, ...], state: int) -> int:
             if not entry[0]:
                 waiting.append(entry[1])
     return state
+
+
+@lru_cache(maxsize=4096)
+def _circular(part: tuple[Bit, ...]) -> tuple[int, list[tuple[int, tuple[int, ...], int]]]:
+    """Return the bits of a part, and each alternative as what it needs of other parts, and of this one, for which bit."""
+    own = sum(bit.mask for bit in part)
+    return own, [(way & ~own, tuple(_single(way & own)), bit.mask) for bit in part for way in bit.alternatives]
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:

@@ -164,6 +164,9 @@ class Call:
                 if cell in self.kept and not self.met(cell):
                     del self.kept[cell]
                     active.append(cell)
+                elif cell in asleep and self.met(cell):
+                    del asleep[cell]
+                    active.append(cell)
 
         while active or asleep:
             mark = len(self.table.trail)

@@ -147,22 +147,23 @@ class Definitions:
 
     # -------------------------------------------------------------------------------------------------------- properties
 
-    def rules(self, prop: str, situation: str, kinds: Sequence[str]) -> list[Rule]:
+    def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
         """Return the rules that axioms about a value property say: it follows from others, or from chains of them.
 
-        A transitive one is followed from what it follows from otherwise, one link after the other.
+        A transitive one is followed from what it follows from otherwise, one link after the other; `more` tells whether there are
+        rules of another kind from which it does.
         """
         said = self.nodes.get(prop, {})
         ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
         ways += [tuple(self._items(chain)) for chain in said.get(OWL + "propertyChainAxiom", ())]
         types = said.get(RDF + "type", ())
         if OWL + "TransitiveProperty" in types:
-            ways += [(*way, prop) for way in ways if prop not in way]
+            ways += [(*way, prop) for way in ways if prop not in way] + [(prop, prop)] * more
         found = [self._way(way, situation, kinds) for way in ways]
         inverses = [*said.get(OWL + "inverseOf", ()), *self._inverses(prop)]
-        inverses += [prop] if OWL + "SymmetricProperty" in types and found else []
+        inverses += [prop] if OWL + "SymmetricProperty" in types and (found or more) else []
         for other in dict.fromkeys(inverses):
-            if other != prop or found:
+            if other != prop or found or more:
                 found.append(self._rule(situation, kinds, (self._related(other, "?to", "?from"),), ()))
         return found
 

@@ -870,24 +870,26 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
     for iri in schema.of_kind("SituationType"):
         name = parts.names.short(iri)
         kinds, said = situations[name].arguments, parts.values(iri, "holdsOf")
+        if by := [*written[iri], *said]:
+            if iri in changed:
+                who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
+                raise KnowledgeError(
+                    f"<{who}> changes {name}, which is defined by <{min(by)}>; change what that reads, or drop the definition"
+                )
+            if not situations[name].boolean:
+                raise KnowledgeError(
+                    f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false: "
+                    "make its value property not functional"
+                )
         rules = [parts.rule(rule, kinds) for rule in written[iri]]
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
             rules.append(Rule(name, head, (), parts.definitions.conditions("?it", kind)))
         if iri not in changed and iri in schema.pairs:
             for prop in parts.values(iri, "valueProperty"):
-                rules += parts.definitions.rules(prop, name, kinds)
+                rules += parts.definitions.rules(prop, name, kinds, bool(rules))
         if not rules:
             continue
-        if iri in changed:
-            who = min(e for e in schema.of_kind("ValueEffect") if parts.values(e, "situationType") == [iri])
-            raise KnowledgeError(
-                f"<{who}> changes {name}, which is defined by <{min([*written[iri], *said])}>; change what that reads"
-            )
-        if not situations[name].boolean:
-            raise KnowledgeError(
-                f"<{iri}> is defined, but has values; what is defined is true or false: make its value property not functional"
-            )
         found[name] = tuple(rules)
     for name, other in circles(found):
         raise KnowledgeError(

@@ -20,7 +20,7 @@ from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.problem import Reading
 from reasoner.symbols import FALSE, AnyOf, Behavior, Condition, Problem, ValueCondition, Witness
-from reasoner.vocabulary import OWL, RDF, RDFS, XSD
+from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 
 Fault = tuple[str, str, str, str]
 """Node, what, why, remedy."""
@@ -197,7 +197,9 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
     """Find variables that an effect or a negated condition names and that nothing determines."""
     if case.reading is None:
         return
-    for name, behavior in case.reading.problem.domain.behaviors.items():
+    domain = case.reading.problem.domain
+    rules = [(name, rule.behavior) for name, its in domain.rules.items() for rule in its]
+    for name, behavior in (*domain.behaviors.items(), *rules):
         node = case.reading.names.iri(name)
         bound = {parameter.name for parameter in behavior.parameters}
         free = _undetermined(behavior.preconditions, bound)
@@ -312,10 +314,70 @@ def _words(condition: Condition) -> str:
     return type(condition).__name__
 
 
+AXIOMS_OF_PROPERTIES = {
+    OWL + "TransitiveProperty": "is transitive",
+    OWL + "SymmetricProperty": "is symmetric",
+    OWL + "ReflexiveProperty": "is reflexive",
+}
+NOT_EVALUATED = {
+    OWL + "sameAs": "that two names mean one individual",
+    OWL + "hasKey": "keys",
+    OWL + "NegativePropertyAssertion": "negative assertions",
+    OWL + "disjointUnionOf": "unions of disjoint classes",
+}
+
+
+def definitions_without_effect(case: Case) -> Iterator[Fault]:
+    """Find what OWL says of situations and planning doesn't evaluate, and facts stated of what is defined."""
+    if case.reading is None:
+        return
+    schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules
+    of = {
+        prop: iri
+        for iri in schema.of_kind("SituationType")
+        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
+    }
+    why = "only what no behaviour changes is defined by axioms; planning takes no notice of this one"
+    mend = "change another property, which follows into this one, or drop the axiom"
+    for triple in case.triples:
+        subject, predicate, value = triple.subject, triple.predicate.value, triple.object
+        named = subject.value if isinstance(subject, ox.NamedNode) else ""
+        other = value.value if isinstance(value, ox.NamedNode) else ""
+        said = ""
+        if named in of and predicate == RDF + "type" and other in AXIOMS_OF_PROPERTIES:
+            said, prop = f"{local_name(named)} {AXIOMS_OF_PROPERTIES[other]}", named
+        elif named in of and predicate == OWL + "propertyChainAxiom":
+            said, prop = f"{local_name(named)} is a chain", named
+        elif other in of and predicate == RDFS + "subPropertyOf" and named != other:
+            said, prop = f"{local_name(named)} is below {local_name(other)}", other
+        elif named in of and other in of and predicate == OWL + "inverseOf":
+            said, prop = f"{local_name(named)} is the inverse of {local_name(other)}", named
+            if names.short(of[other]) in rules:
+                continue
+        if said and names.short(of[prop]) not in rules:
+            yield of[prop], f"that {said} isn't evaluated, since behaviours change it or nothing leads to it", why, mend
+        if predicate in of and names.short(of[predicate]) in rules and named:
+            yield (
+                named,
+                f"{local_name(named)} states {local_name(predicate)}, which is defined",
+                "what is defined follows from other facts, in every state; what is stated of it isn't read",
+                "state what it follows from, or drop the fact",
+            )
+        beyond = predicate if predicate in NOT_EVALUATED else other if predicate == RDF + "type" else ""
+        if beyond in NOT_EVALUATED:
+            yield (
+                named or "the ontology",
+                f"{NOT_EVALUATED[beyond]} ({local_name(beyond)}) are nothing that planning evaluates",
+                "individuals are told apart by their names, and what isn't stated is false",
+                "say it in a rule or in the scene's facts, or drop it",
+            )
+
+
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undeclared-term": undeclared_terms,
     "missing-all-different": individuals_not_different,
     "file-name-and-iri": files_and_iris,
     "undetermined-variable": undetermined_variables,
     "unreachable": unreachable_behaviors,
+    "definition-without-effect": definitions_without_effect,
 }
