@@ -32,7 +32,7 @@ from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Tal
 from reasoner.memory.experience_file import load, save
 from reasoner.names import Names
 from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse_files
+from reasoner.pddl.syntax import PddlError, parse_files
 from reasoner.symbols import Problem
 from worlds.lessons import problem, taught
 
@@ -158,8 +158,12 @@ def pddl() -> None:
     print(HEAD)
     for domain, training, testing in folders():
         experience, begin = Experience("lesson"), process_time()
-        for file in training:
-            teach(experience, imported(parse_files(domain, file)).problem)
+        try:
+            for file in training:
+                teach(experience, imported(parse_files(domain, file)).problem)
+        except PddlError as error:
+            print(f"| {domain.parent.name}: {error} | | | | | | |")
+            continue
         name = "/".join(domain.parent.parts[-2:])
         print(f"| **{name}**, {len(rules_in(experience))} rules in {process_time() - begin:.1f} s | | | | | | |")
         for file in testing:
