@@ -52,7 +52,6 @@ class Wants:
         self.program = program
         self.table = table
         self.goal = goal
-        self.breadth = 1
         self._cursors: dict[int, int] = {}
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
@@ -60,7 +59,7 @@ class Wants:
         self._open: set[tuple[str, Key, bool]] = set()  # what is defined, and being asked what brings it about
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
-        self._free: dict[tuple[str, str, int], list[str]] = {}
+        self._free: dict[tuple[str, str], list[str]] = {}
         self._tests: dict[tuple[int, tuple[str, ...], bool], Callable[..., Any]] = {}
         self._concern: frozenset[str] = frozenset()
         self._circular = circular(program.domain.rules)
@@ -75,7 +74,7 @@ class Wants:
         scope = self._scopes.get((id(achiever), number))
         if scope is None:
             scope = self._scopes[id(achiever), number] = self._scope(achiever, achiever.soft[number])
-        key = id(achiever), number, level, self.breadth, *[env.get(term) for term in scope]
+        key = id(achiever), number, level, *[env.get(term) for term in scope]
         found = self._fresh.get(key)
         if found is None:
             found = self._fresh[key] = list(self.of(achiever, achiever.soft[number], env, level))
@@ -147,7 +146,7 @@ class Wants:
         if situation in self._circular:  # then it depends on where one comes from
             return list(dict.fromkeys(self._defining(situation, key, wanted, level)))
         self._forget()
-        asked = situation, key, wanted, level, self.breadth
+        asked = situation, key, wanted, level
         found = self._fresh.get(asked)
         if found is None:
             found = self._fresh[asked] = list(dict.fromkeys(self._defining(situation, key, wanted, level)))
@@ -295,7 +294,7 @@ class Wants:
         if len(members) <= FEW:
             return members
         self._forget()
-        found = self._free.get((situation, kind, self.breadth))
+        found = self._free.get((situation, kind))
         if found is None:
             groups, wanted, who = (
                 self.program.alike.groups(members),
@@ -303,10 +302,8 @@ class Wants:
                 self.table.who[situation],
             )
 
-            found = representatives(
-                groups, who, wanted, self.breadth, self._cursors, lambda value: self.burden(situation, value)
-            )
-            self._free[situation, kind, self.breadth] = found
+            found = representatives(groups, who, wanted, self._cursors, lambda value: self.burden(situation, value))
+            self._free[situation, kind] = found
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
             return (goal, *found)

@@ -116,7 +116,6 @@ class Segments:
         The table is left as it was found.
         """
         table, now = self.table, self.table.now
-        self.wants.breadth = 1
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []

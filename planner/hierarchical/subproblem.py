@@ -130,7 +130,6 @@ def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Wi
     met: dict[str, None] = dict.fromkeys(program.named)
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
-    segments.wants.breadth = 1
     for cell, value in targets.items():
         for _ in segments.chains(level, cell, value, width.questions, met):
             pass

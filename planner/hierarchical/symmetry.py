@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from heapq import nsmallest
 from itertools import chain
 
 from planner.transitions import Key
@@ -84,13 +83,12 @@ def representatives(
     groups: Sequence[Sequence[str]],
     who: Mapping[str, Mapping[Key, None]],
     wanted: Mapping[str, object],
-    breadth: int = 1,
     cursors: dict[int, int] | None = None,
     burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
     """Return one value per group: the first that nobody has and no goal wants.
 
-    Where there is none, a few that nobody has; where there are none of these either, the `breadth` of least `burden`. With
+    Where there is none, a few that nobody has; where there are none of these either, that of least `burden`. With
     `cursors` (by the group's `id`) the first is looked for from where the last one was found, so that a long group isn't gone
     through anew.
 
@@ -109,5 +107,5 @@ def representatives(
                 break
         else:
             free = [value for value in group if not who.get(value)][:4]
-            found.extend(free or nsmallest(breadth, group, key=burden))
+            found.extend(free or [min(group, key=burden)])
     return found

@@ -35,9 +35,6 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
         kept, fresh = (Call(problem, Compiled(program), None, 100_000) for _ in range(2))
         ask_anew(fresh.segments.wants, monkeypatch)
         for _ in range(12):
-            breadth = rng.choice((1, 12))
-            for field in (kept, fresh):
-                field.segments.wants.breadth = breadth
             for (at, situation), achievers in program.achievers.items():
                 cells = [cell for cell in kept.goal.items() if cell[0][0] == situation]
                 for achiever in achievers if at == level else ():
@@ -50,7 +47,6 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
                                 assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
                                 assert list(kept.segments.wants.towards(achiever, number, env, level)) == anew
                                 asked += 1
-            kept.segments.wants.breadth = 1
             off = {cell: value for cell, value in kept.goal.items() if not kept.met(cell)}
             found = list(kept.segments.relevant(level, off, 3))
             if not found:
