@@ -195,7 +195,8 @@ def _check_goal(scene: Known, problem: Problem) -> None:
         raise KnowledgeError(f"{scene.iri} has no task with goals; plan in a scene that has one, or give a goal")
     allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}
     for symbol, value in problem.goal.items():
-        if value not in allowed[symbol.situation]:
+        counted = problem.domain.situations[symbol.situation].quantity is not None
+        if not counted and value not in allowed[symbol.situation]:
             values = allowed[symbol.situation] - {TRUE, FALSE}
             raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
 

@@ -17,6 +17,7 @@ from planner.plan import Broken, Left, Plan, Step
 from planner.validation import Bindings, Cell, Facts, Rules, stretches
 from reasoner.amounts import Amount, Calculation, Expression, Measure, written
 from reasoner.symbols import (
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -103,7 +104,7 @@ class _Watch:
         """Yield what a change breaks, if no behaviour of the level could make it now."""
         best: Broken | None = None
         for behavior in self.problem.domain.at_level(level):
-            for effect in behavior.effects:
+            for effect in behavior.every_effect:
                 terms = self.unified(behavior, effect, change)
                 if terms is None:
                     continue
@@ -118,21 +119,24 @@ class _Watch:
                     best = Broken(step.path, change, behavior.name, arguments, asked, text)
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
 
-    def unified(self, behavior: Behavior, effect: ValueEffect, change: Fact) -> Bindings | None:
+    def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
         """Return what the terms of an effect stand for if it is this change."""
         kinds, terms = behavior.kinds, dict[str, str]()
         if effect.situation != change.symbol.situation:
             return None
-        for term, given in zip(
-            (*effect.arguments, effect.value), (*change.symbol.arguments, change.value), strict=True
-        ):
+        said, is_ = effect.arguments, change.symbol.arguments
+        if isinstance(effect, ValueEffect):  # what comes of an amount is found out by doing it
+            said, is_ = (*said, effect.value), (*is_, change.value)
+        for term, given in zip(said, is_, strict=True):
             if terms.setdefault(term, given) != given or (term not in kinds and term != given):
                 return None
             if term in kinds and given not in self.problem.members(kinds[term]):
                 return None
         return {term: given for term, given in terms.items() if term in kinds}
 
-    def could(self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, change: Fact) -> bool:
+    def could(
+        self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
+    ) -> bool:
         """Whether a behaviour could make a change, alone or together with others of its effects made just before."""
         view = self.views[level]
         conditions, kinds = (*behavior.preconditions, *effect.when), behavior.kinds
@@ -166,7 +170,7 @@ class _Watch:
         return Facts(self.problem, values if seen is None else {**values, symbol: seen})
 
     def nearest(
-        self, level: int, behavior: Behavior, effect: ValueEffect, terms: Bindings, symbol: Symbol
+        self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, symbol: Symbol
     ) -> tuple[Bindings, tuple[Condition, ...]]:
         """Return the fewest conditions without which a behaviour would be applicable, with individuals put in."""
         conditions = (*behavior.preconditions, *effect.when)

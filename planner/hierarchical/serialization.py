@@ -296,6 +296,8 @@ class Call:
     def hopeful(self) -> bool:
         """Whether every goal could be reached from here on the lowest level if nothing ever became false."""
         initial = {**self.problem.initial, **self.table.state()}
+        if any(s.quantity is not None for s in self.problem.domain.situations.values()):
+            return self.sufficient(initial)
         try:
             reached = closed(self.problem, self.program.levels[-1], self.segments.deadline, initial)
         except TooLargeError:
@@ -303,6 +305,22 @@ class Call:
         except OutOfTimeError as error:
             raise LimitError("the time limit") from error
         return all(reached.possible(symbol, value) for symbol, value in self.problem.goal.items())
+
+    def sufficient(self, initial: State) -> bool:
+        """Whether every goal could be reached from a state if nothing became false and no amount were in the way of another."""
+        from planner.grounded.grounding import ground
+        from planner.grounded.hff_amounts import heuristic
+
+        level, deadline = self.program.levels[-1], self.segments.deadline
+        try:
+            task = ground(self.problem, level, initial, most=MOST_ROWS, deadline=deadline)
+        except TooLargeError:
+            return True
+        except OutOfTimeError as error:
+            raise LimitError("the time limit") from error
+        if isinstance(task, Reason) or task.amounts is None:
+            return not isinstance(task, Reason)
+        return heuristic(task)(task.initial) is not None
 
     def tidily(self, mark: int, do: Callable[[], Done | None]) -> Done | None:
         """Do once more what was done since a mark, so that all goals can be reached; None, and the table as at the mark, if not.

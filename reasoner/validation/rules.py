@@ -16,10 +16,21 @@ from urllib.parse import unquote
 import pyoxigraph as ox
 
 import ontology
+from reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in, terms_of
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.problem import Reading
-from reasoner.symbols import FALSE, AnyOf, Behavior, Condition, Problem, ValueCondition, Witness
+from reasoner.symbols import (
+    FALSE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    Comparison,
+    Condition,
+    Problem,
+    ValueCondition,
+    Witness,
+)
 from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 
 Fault = tuple[str, str, str, str]
@@ -203,10 +214,11 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
         node = case.reading.names.iri(name)
         bound = {parameter.name for parameter in behavior.parameters}
         free = _undetermined(behavior.preconditions, bound)
-        for effect in behavior.effects:
+        for effect in behavior.every_effect:
             inner = set(bound)
             free |= _undetermined(effect.when, inner)
-            free |= {term for term in (*effect.arguments, effect.value) if term.startswith("?")} - inner
+            named = terms_of(effect.amount) if isinstance(effect, AmountEffect) else (effect.value,)
+            free |= {term for term in (*effect.arguments, *named) if term.startswith("?")} - inner
         for variable in sorted(free):
             yield (
                 node,
@@ -242,6 +254,8 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def _terms(condition: Condition) -> set[str]:
+    if isinstance(condition, Comparison):
+        return {t for t in (*terms_of(condition.left), *terms_of(condition.right)) if t.startswith("?")}
     values = [value for name, value in vars(condition).items() if name != "negated"]
     flat = [term for value in values for term in (value if isinstance(value, tuple) else (value,))]
     return {term for term in flat if term.startswith("?")}
@@ -255,7 +269,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     present = {symbol.situation for symbol in problem.initial}
-    changed = {effect.situation for behavior in problem.domain.behaviors.values() for effect in behavior.effects}
+    changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
     for situation in (
         problem.domain.situations.values()
     ):  # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
@@ -279,6 +293,8 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
             "add a behaviour with that effect, state it in the scene, or drop the precondition",
         )
     for symbol, value in problem.goal.items():
+        if problem.domain.situations[symbol.situation].quantity is not None:
+            continue  # what it can come to is for planning to find out
         if problem.initial.get(symbol, FALSE) != value and (symbol.situation, value) not in there:
             yield (
                 names.iri(symbol.arguments[0]),
@@ -373,6 +389,61 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
             )
 
 
+def unlike_units(case: Case) -> Iterator[Fault]:
+    """Find amounts of different units that are compared, added, or assigned to one another."""
+    if case.reading is None:
+        return
+    reading = case.reading
+    units = {name: s.quantity.unit for name, s in reading.problem.domain.situations.items() if s.quantity}
+    relations = {
+        reading.names.short(iri): node.get(CORE + "unit", [""])[0] for iri, node in reading.schema.nodes.items()
+    }
+
+    def unit(expression: Expression) -> tuple[str, str]:
+        """Return the unit of an amount, none if it has none or could have any, and two that don't go together."""
+        match expression:
+            case Amount(situation):
+                return units.get(situation, ""), ""
+            case Measure(relation):
+                return relations.get(relation, ""), ""
+            case Calculation(sign, left, right):
+                (one, wrong), (other, also) = unit(left), unit(right)
+                if sign in "+-" and one and other and one != other:
+                    return one, f"{one} and {other}"
+                if sign in "*/" and one and other:
+                    return "", wrong or also  # servings by the hour
+                return one or (other if sign != "/" else ""), wrong or also
+        return "", ""
+
+    for name, behavior in reading.problem.domain.behaviors.items():
+        pairs: list[tuple[Expression, Expression, str]] = []
+        waiting = list(behavior.conditions)
+        while waiting:
+            match waiting.pop():
+                case Comparison(left, _, right):
+                    pairs.append((left, right, "compares"))
+                case Witness(_, _, inner):
+                    waiting += inner
+                case AnyOf(alternatives):
+                    waiting += [condition for group in alternatives for condition in group]
+        for effect in behavior.amounts:
+            by: Expression = effect.amount
+            if effect.operation == "scale":  # by a number without a unit
+                by = Calculation("*", Amount(effect.situation, effect.arguments), effect.amount)
+            pairs.append((Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"))
+        for left, right, does in pairs:
+            (one, wrong), (other, also) = unit(left), unit(right)
+            both = wrong or also or (f"{one} and {other}" if one and other and one != other else "")
+            if both:
+                about = " and ".join(sorted(situations_in(left) | situations_in(right)))
+                yield (
+                    reading.names.iri(name),
+                    f"{name} {does} {both} ({about})",
+                    "a number of one unit says nothing of an amount of another",
+                    "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
+                )
+
+
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undeclared-term": undeclared_terms,
     "missing-all-different": individuals_not_different,
@@ -380,4 +451,5 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undetermined-variable": undetermined_variables,
     "unreachable": unreachable_behaviors,
     "definition-without-effect": definitions_without_effect,
+    "unit-mismatch": unlike_units,
 }

@@ -1,0 +1,52 @@
+"""Faults in amounts, seeded into the shipped canteen: validation names the node, and what to do."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import ontology
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.problem import read
+from reasoner.validation.validate import validate
+
+CATALOG = """<catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+<uri name="https://w3id.org/confab/canteen" uri="canteen.ttl"/></catalog>"""
+
+
+@pytest.fixture
+def canteen(tmp_path: Path) -> Callable[[str, str], Path]:
+    def changed(old: str, new: str) -> Path:
+        for file in (ontology.ROOT / "domains" / "canteen.ttl", ontology.ROOT / "scenes" / "canteen-small.ttl"):
+            text = file.read_text(encoding="utf-8")
+            (tmp_path / file.name).write_text(text.replace(old, new), encoding="utf-8")
+        (tmp_path / ontology.CATALOG).write_text(CATALOG, encoding="utf-8")
+        return tmp_path / "canteen-small.ttl"
+
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("d:servings 1.5", "d:servings -1.5", "<jug1, SERVINGS> is -1.5; it has to be at least 0"),
+        ("d:battery 6.0", "d:battery 26.0", "<trolley, BATTERY> is 26; it has to be at least 0 and at most 20"),
+        (':battery ; c:fromLevel 2 ; c:unit "Wh"', ':battery ; c:fromLevel 2 ; c:unit "min"', "decreases min and Wh"),
+        (':BATTERY ; c:sign "<"', ':TROLLEY_AT ; c:sign "<"', "TROLLEY_AT is no amount, so that no number compares with it"),
+        ('c:change "assign"', 'c:change "set"', "has no change, two, or one that is none"),
+        ('c:sign "<" ; c:amount 20.0', 'c:sign "<"', "L2_CHARGE.notFull> has neither :amount nor :right"),
+        ("owl:NamedIndividual, c:SituationType, c:Amount", "owl:NamedIndividual, c:SituationType", "isn't declared as an amount"),
+    ],
+)  # fmt: skip
+def test_a_fault_in_amounts_is_found_with_its_node_and_its_mend(
+    canteen: Callable[[str, str], Path], old: str, new: str, said: str
+) -> None:
+    found = [finding for finding in validate([canteen(old, new)]) if said in finding.what]
+    assert found, said
+    assert all(finding.remedy for finding in found)
+
+
+def test_a_goal_that_compares_what_cant_be_is_refused(canteen: Callable[[str, str], Path]) -> None:
+    path = canteen('c:sign ">=" ; c:amount 0.5', 'c:sign ">=" ; c:right :round.half')
+    with pytest.raises(KnowledgeError, match=r"used as a calculation"):
+        read(load(path))
