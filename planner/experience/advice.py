@@ -21,7 +21,7 @@ from functools import cached_property
 from time import perf_counter
 
 from planner.experience.evidence import Judge, View
-from planner.experience.leading import NEARBY, SEARCHING, Candidate, Guide, follow, go_on, usable
+from planner.experience.leading import SEARCHING, Candidate, Guide, follow, go_on, usable
 from planner.experience.lessons import rules_in
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import OpenRole, Template
@@ -177,7 +177,7 @@ def led(call: Call, guide: Guide) -> bool:
             return False
         segments.most = min(most, segments.expanded + SEARCHING + goals - len(guide.open))
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        call.ladder = [(call.program.levels[0], attempt) for attempt in (LONGER, NEARBY)]
+        call.ladder = [(call.program.levels[0], attempt) for attempt in (LONGER,)]
         return call.serialise()
     except LimitError:
         if segments.most == most or (segments.deadline is not None and perf_counter() > segments.deadline):

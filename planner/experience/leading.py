@@ -19,7 +19,6 @@ from planner.experience.regression import Course, ordered
 from planner.hierarchical.operators import Program
 from planner.hierarchical.serialization import EASY, LONGER, Call
 from planner.hierarchical.subplans import LimitError
-from planner.hierarchical.subproblem import Width
 from planner.transitions import Cell, Change, arguments_of
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
@@ -31,8 +30,6 @@ PATIENCE = 6
 """So many steps, and twice what was promised, may bring no new least number of open goals."""
 SEARCHING = 10
 """Expansions of search between rules, and again after them, beside one for each goal that was reached."""
-NEARBY = (Width(10, 0, 20_000),)
-"""The small world in which a goal is searched for between rules."""
 GOALS = 8
 """So many goals are searched for where rules run out."""
 TRIES = 3
@@ -258,7 +255,7 @@ def searched(guide: Guide, level: int, budget: int) -> bool:
     most = call.segments.most
     call.segments.most = min(most, began + budget)
     try:
-        cell = next(c for a in (EASY, LONGER, NEARBY) for c in ready[:GOALS] if call.achieve(level, c, a))
+        cell = next(c for a in (EASY, LONGER) for c in ready[:GOALS] if call.achieve(level, c, a))
     except StopIteration:
         return False
     except LimitError:
