@@ -113,14 +113,19 @@ class Call:
             if self.segments.rest.get(symbol.situation) == value
         }
         first = self.program.levels[0]
-        self.unseen = {cell: value for cell, value in self.goal.items() if not self.segments.visible(first, cell)}
-        """Goals that the most abstract level knows nothing of: its steps don't keep them, and the last one brings them about."""
+        rests = {s.name: s.rest for s in problem.domain.situations.values()}
+        self.unseen = {
+            cell: value
+            for cell, value in self.goal.items()
+            if not self.segments.visible(first, cell) and rests[cell[0]] in (None, value)
+        }
+        """Goals of which the most abstract level knows nothing and no refinement has to restore anything: the last step brings them about."""
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
         self.doubted = self.proved = False
-        self.restarts = 0
+        self.restarts = self.finished = 0
         self.gone_back = False
         self.wary = False
         self.tried: dict[int, int] = {}
@@ -210,6 +215,7 @@ class Call:
             if reason:
                 raise UnsolvableError(reason)
         if self.unseen.keys() >= asleep.keys() and self.finish():
+            self.restarts += 1
             return True
         for level, attempt in self.ladder:
             if attempt is not LONGER and len(self.goal) - len(self.kept) >= COSTLY:
@@ -240,8 +246,9 @@ class Call:
     def finish(self) -> bool:
         """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""
         steps = self.steps
-        if not steps or steps[-1].level != self.program.levels[0]:
+        if not steps or steps[-1].level != self.program.levels[0] or self.finished > len(self.goal):
             return False
+        self.finished += 1  # what is done after that may undo it, but not for ever
         self.redo(steps[:-1])
         self.refiner.besides = self.unseen
         last = self.refiner.do(*steps[-1][:3])
