@@ -119,7 +119,7 @@ class Call:
             for cell, value in self.goal.items()
             if not self.segments.visible(first, cell) and rests[cell[0]] in (None, value)
         }
-        """Goals of which the most abstract level knows nothing and no refinement has to restore anything: the last step brings them about."""
+        """Goals unknown to the most abstract level, and free of rest values: its last step brings them about."""
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
