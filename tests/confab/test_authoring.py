@@ -76,41 +76,43 @@ def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -
     assert str(same) == "the plan is the same: 2 steps"
 
 
-MEMORY = """@prefix : <https://w3id.org/confab/core#> . @prefix m: <https://w3id.org/confab/memory#> .
-@prefix owl: <http://www.w3.org/2002/07/owl#> .
-<urn:uuid:me> a owl:Ontology ; owl:imports <https://example.org/tearoom-scene> ; :memoryFormat 2 ; :learnsAs "me" .
-m:one :behavior <https://example.org/tearoom#B1_WASH> ; :about <https://example.org/tearoom-scene#plate1> ;
-  :situationType <https://example.org/tearoom#CLEANLINES> ; :facts "item is: Plate | where is: Sink" .
-"""
-
-
-def test_a_renamed_term_takes_its_memory_along(tmp_path: Path) -> None:
+@pytest.fixture
+def memory(tmp_path: Path) -> Path:
+    """A memory of one lesson in the tearoom."""
     new_domain("tearoom", tmp_path)
-    memory = tmp_path / "memory.ttl"
-    memory.write_text(MEMORY)
-    graph = confab.load(tmp_path / "tearoom-scene.ttl").knowledge
+    scene = confab.load(tmp_path / "tearoom-scene.ttl")
+    remembered = confab.Memory.of(scene)
+    remembered.teach(scene, scene.plan())
+    return remembered.save(tmp_path / "memory.ttl")
+
+
+def test_a_renamed_term_takes_its_memory_along(memory: Path) -> None:
+    graph = confab.load(memory.with_name("tearoom-scene.ttl")).knowledge
+    assert unknown_terms(memory_lines(memory), graph) == []
+    memory.write_text(memory.read_text().replace("tearoom#CLEANLINESS", "tearoom#CLEANLINES"))
     assert unknown_terms(memory_lines(memory), graph) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
-    assert migrate(memory, ["CLEANLINES=CLEANLINESS"]) == 1
+    assert migrate(memory, ["CLEANLINES=CLEANLINESS"]) > 3
     assert unknown_terms(memory_lines(memory), graph) == []
 
 
-def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(tmp_path: Path) -> None:
-    memory = tmp_path / "memory.ttl"
-    memory.write_text(MEMORY + 'm:two :about <https://example.org/tearoom#Plate> ; :facts "are: Plates" .')
-    assert migrate(memory, ["Plate=Saucer"]) == 2
+def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(memory: Path) -> None:
+    assert ':asks "CLEANLINESS of item"' in memory.read_text()
+    migrate(memory, ["CLEANLINESS=CLEAN"])
     text = memory.read_text()
-    assert "item is: Saucer" in text
-    assert '"are: Plates"' in text
-    assert "https://example.org/tearoom#Saucer" in text or ":Saucer" in text
+    assert ':asks "CLEAN of item"' in text
+    assert "tearoom#CLEAN>" in text or ":CLEAN " in text
+    assert ':asks "CLEANLINESS' not in text
+    migrate(memory, ["CLEAN=CLEANER"])
+    migrate(memory, ["CLEANER=CLEAN"])
+    assert memory.read_text().count(':asks "CLEAN of item"') == text.count(':asks "CLEAN of item"')
 
 
 @pytest.mark.parametrize(("rename", "said"), [("Cup=Mug", "isn't in the memory"), ("Cup", "wanted OLD=NEW")])
-def test_a_rename_that_means_nothing_is_refused(tmp_path: Path, rename: str, said: str) -> None:
-    memory = tmp_path / "memory.ttl"
-    memory.write_text(MEMORY)
+def test_a_rename_that_means_nothing_is_refused(memory: Path, rename: str, said: str) -> None:
+    before = memory.read_bytes()
     with pytest.raises(KnowledgeError, match=said):
         migrate(memory, [rename])
-    assert memory.read_text() == MEMORY
+    assert memory.read_bytes() == before
 
 
 def test_the_commands_convert_a_file_and_show_a_behavior(tmp_path: Path) -> None:
