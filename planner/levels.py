@@ -242,6 +242,7 @@ def said(condition: Condition, words: Words = str) -> str:
 def counted(expression: Expression, words: Words = str) -> str:
     """Return an amount as people write it.
 
+    >>> from fractions import Fraction
     >>> counted(Calculation("-", Amount("SERVINGS", ("bottle1",)), Fraction(1, 2)))
     '(bottle1 SERVINGS - 0.5)'
     """

@@ -105,7 +105,7 @@ def test_what_cannot_be_read_again_replaces_nothing(
         [good.decode().replace(":chosen 1", ":chosen 2")],
         [good.decode().replace('"me"', '"you"')],
     ):
-        monkeypatch.setattr("confab.memory.turtle", lambda *_, lines=broken: iter(lines))
+        monkeypatch.setattr("confab.memory.turtle", lambda *_, lines=broken, **__: iter(lines))
         with pytest.raises(KnowledgeError):
             memory.save(file)
         assert file.read_bytes() == good
