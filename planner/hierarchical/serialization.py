@@ -416,7 +416,9 @@ class Call:
     def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
         """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
         first = level == self.program.levels[0]
-        keep = self.segments.keeping({c: v for c, v in self.kept.items() if not first or c not in self.unseen})
+        hidden = self.unseen if first else {}  # seldom any: no copy of all goals for each of them
+        kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
+        keep = self.segments.keeping(kept)
         mark = len(self.table.trail)
         steps = self.refiner.achieve(level, targets, keep, (), attempt)
         if steps is not None and self.wary and not self.hopeful():
