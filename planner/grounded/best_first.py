@@ -30,7 +30,7 @@ from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
-from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks, successors
+from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
@@ -133,12 +133,11 @@ def search(
         often, quick = (_on_bits(task, dense(bits)), by_arrays) if arrays else (evaluate, work)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
-    tree = successors(task)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (6, by_novelty(task, tree, evaluate, work, counts)),
+        (6, by_novelty(task, evaluate, work, counts)),
         (4, _best_first(task, often, quick, counts, lookahead)),
-        (3, by_novelty(task, tree, evaluate, work, counts, marks)),
+        (3, by_novelty(task, evaluate, work, counts, marks)),
         (1, _best_first(task, often, quick, counts, lookahead, marks)),
         (1, _best_first(task, often, quick, counts)),
     ]

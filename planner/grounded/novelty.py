@@ -9,7 +9,7 @@ A relaxed plan is made only for states that reach a goal and are expanded, so th
 looked at. No state is dropped: where the queue runs empty, there is no plan.
 
 Lipovetzky and Geffner, "Best-first width search: exploration and exploitation in classical planning", AAAI 2017, with novelty
-cut off at one. Successors are found by a decision tree over symbols: Helmert, "The Fast Downward planning system", JAIR 26 (2006).
+cut off at one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from __future__ import annotations
 import heapq
 from collections import defaultdict
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
 
 from planner.grounded.hff import Evaluate
 from planner.grounded.task import Task
@@ -39,7 +38,6 @@ class OutOfMemoryError(Exception):
 
 def by_novelty(
     task: Task,
-    tree: Tree,
     evaluate: Evaluate,
     relaxing: int,
     counts: Counts,
@@ -87,7 +85,7 @@ def by_novelty(
                 for _, _, set_ in task.known(operator)[1]:
                     wanted |= set_
             wanted &= ~state
-        operators, visited = tree.of(state)
+        operators, visited = task.applicable(state)
         work += child * len(operators) + VISIT * visited
         counts.generated += len(operators)
         for operator in operators:
@@ -150,61 +148,3 @@ def _plain(task: Task, operator: int) -> tuple[int, int] | None:
         return (-1, 0) if not changes else None
     _, cleared, set_ = changes[0]
     return ~cleared, set_
-
-
-@dataclass
-class Tree:
-    """Operators by the values that they need, symbol by symbol.
-
-    `mask` are the bits of a symbol; `by_value` leads on for each of its values, `otherwise` for operators that don't need it.
-    """
-
-    mask: int = 0
-    by_value: dict[int, Tree] = field(default_factory=dict)
-    otherwise: Tree | None = None
-    operators: list[int] = field(default_factory=list)
-
-    def of(self, state: int) -> tuple[list[int], int]:
-        """Return the operators that are applicable in a state, and how many nodes were visited."""
-        found: list[int] = []
-        visited = 0
-        waiting = [self]
-        for root in waiting:  # which grows
-            node: Tree | None = root
-            while node is not None:
-                visited += 1
-                if node.operators:
-                    found += node.operators
-                if not node.mask:
-                    break
-                fitting = node.by_value.get(state & node.mask)
-                if fitting is not None:
-                    waiting.append(fitting)
-                node = node.otherwise
-        return found, visited
-
-
-def successors(task: Task) -> Tree:
-    """Return the tree of a task's operators; symbols that many operators need are asked first."""
-    of_symbol: defaultdict[object, int] = defaultdict(int)
-    for bit, fact in enumerate(task.facts):
-        of_symbol[fact.symbol] |= 1 << bit
-    masks = [of_symbol[fact.symbol] for fact in task.facts] + [1 << bit for bit in range(len(task.facts), task.size)]
-    needs = task.needs.lists()[: len(task)]
-    often: defaultdict[int, int] = defaultdict(int)
-    for bits in needs:
-        for bit in bits:
-            often[masks[bit]] += 1
-    rank = {mask: i for i, mask in enumerate(sorted(often, key=lambda mask: (-often[mask], mask)))}
-    root = Tree()
-    for operator, bits in enumerate(needs):
-        node = root
-        for bit in sorted(bits, key=lambda bit: rank[masks[bit]]):
-            mask = masks[bit]
-            while node.mask not in (0, mask):
-                node.otherwise = node.otherwise or Tree()
-                node = node.otherwise
-            node.mask = mask
-            node = node.by_value.setdefault(1 << bit, Tree())
-        node.operators.append(operator)
-    return root

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import TypeAlias
 
-from planner.grounded.novelty import successors
-from planner.grounded.task import Task
+from planner.grounded.task import Task, bits_of
 from planner.plan import Counts
 
 Bound: TypeAlias = "Callable[[int], float]"
@@ -62,7 +61,7 @@ def shortest(
         Grows by what is generated and expanded.
     """
     counts = counts or Counts()
-    tree, goal, costs = successors(task), task.goal, task.costs
+    goal, costs = task.goal, task.costs
     g = {task.initial: 0.0}
     came_from: dict[int, tuple[int, int]] = {}
     estimate = bound(task.initial)
@@ -86,7 +85,7 @@ def shortest(
         expanded += 1
         counts.expanded += 1
         so_far = g[state]
-        for operator in tree.of(state)[0]:
+        for operator in task.applicable(state)[0]:
             after = task.applied(state, operator)
             if after is None:
                 continue
@@ -113,24 +112,26 @@ def ways(task: Task) -> Bound:
         of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
     wanted = [(mask, mask & task.goal) for mask in of_symbol.values() if mask & task.goal and mask.bit_count() > 1]
     wanted.sort(key=lambda pair: -pair[0].bit_count())
-    setting: list[list[tuple[int, int, set[int]]]] = [[] for _ in wanted]
+    which = {bit: i for i, (mask, _) in enumerate(wanted) for bit in bits_of(mask)}
+    cheapest: list[dict[tuple[int, int], float]] = [
+        {} for _ in wanted
+    ]  # (value before, or 0 for any; value after): cost
     for operator in range(len(task)):
         needed, changes = task.known(operator)
-        for i, (mask, _) in enumerate(wanted):
-            after = {set_ & mask for _, _, set_ in changes if set_ & mask}
-            if after:
-                setting[i].append((operator, needed & mask, after))
-    counted: set[int] = set()
+        touched = {(which[bit], 1 << bit) for _, _, set_ in changes for bit in bits_of(set_) if bit in which}
+        counted = min((i for i, _ in touched), default=0)
+        for i, after in touched:
+            step = needed & wanted[i][0], after
+            cost = task.costs[operator] if i == counted else 0.0
+            cheapest[i][step] = min(cost, cheapest[i].get(step, math.inf))
     tables: list[tuple[int, dict[int, float]]] = []
-    for (mask, value), moves in zip(wanted, setting, strict=True):
+    for (mask, value), steps in zip(wanted, cheapest, strict=True):
         away = {value: 0.0}
-        steps = [(before, after, task.costs[o] if o not in counted else 0.0) for o, before, after in moves]
-        counted.update(operator for operator, _, _ in moves)
         for _ in range(mask.bit_count()):
             old = dict(away)
-            for before, afters, cost in steps:
-                least = min((away[after] for after in afters if after in away), default=math.inf) + cost
-                for source in (before,) if before else _single(mask):
+            for (before, after), cost in steps.items():
+                least = away.get(after, math.inf) + cost
+                for source in (before,) if before else (1 << bit for bit in bits_of(mask)):
                     if least < away.get(source, math.inf):
                         away[source] = least
             if old == away:
@@ -144,8 +145,3 @@ def ways(task: Task) -> Bound:
         return total
 
     return bound
-
-
-def _single(mask: int) -> list[int]:
-    """Return the bits of a mask, each as a mask."""
-    return [1 << bit for bit in range(mask.bit_length()) if mask >> bit & 1]

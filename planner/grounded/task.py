@@ -17,10 +17,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from planner.grounded.amounts import Amounts
 from planner.grounded.derived import Derived
 from planner.grounded.joins import Ints
+from planner.grounded.successors import tree
 from planner.plan import Step
 from reasoner.symbols import FALSE, Fact, Problem, Symbol
 
@@ -120,6 +122,16 @@ class Task:
                 return None
             after = moved
         return self.derived.after(after, state) if self.derived.parts else after
+
+    @cached_property
+    def applicable(self) -> Callable[[int], tuple[list[int], int]]:
+        """To the operators whose preconditions a state fulfils, and the work of finding them, in nodes of a tree."""
+        of_symbol: dict[Symbol, int] = {}
+        for bit, fact in enumerate(self.facts):
+            of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
+        masks = [of_symbol[fact.symbol] for fact in self.facts]
+        masks += [1 << bit for bit in range(len(self.facts), self.size)]
+        return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
 
     def known(self, operator: int) -> tuple[int, tuple[Change, ...]]:
         """Return an operator's precondition and changes, worked out once."""

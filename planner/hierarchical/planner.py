@@ -37,7 +37,7 @@ IMPROVEMENTS = 2
 DETOURS = 1.25
 """A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 REORDERING = 1_000_000
-"""The work that another order of goals may cost, in states of small worlds times operators; or as much as the first plan took."""
+"""The work that each of two other orders may cost, in states of small worlds times operators; or half that of the first plan."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -167,7 +167,7 @@ def reordered(call: Call) -> list[RefinedStep]:
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
-        other.segments.most_work = max(call.segments.worked, REORDERING)
+        other.segments.most_work = max(call.segments.worked / 2, REORDERING)
         other.doubted = other.proved = other.gone_back = True  # there is a plan
         other.ladder = other.ladder[:2]
         with suppress(LimitError):

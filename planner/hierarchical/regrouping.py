@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from planner.grounded.grounding import ground
-from planner.grounded.novelty import successors
 from planner.grounded.task import Task
 from planner.plan import OutOfTimeError, Plan, Step, TooLargeError, renumbered
 from planner.validation import successor
@@ -42,13 +41,13 @@ def _grouped(problem: Problem, steps: Sequence[Step], level: int) -> list[Step] 
             return None
         values.append(after)
     states = [_state(task, value) for value in values]
-    tree, situations = successors(task), problem.domain.situations
+    situations = problem.domain.situations
     best: list[tuple[int, int, int] | None] = [(0, 0, -1), *[None] * len(steps)]  # number of steps, begin, operator
     for i, state in enumerate(states[:-1]):
         here = best[i]
         if here is None:
             continue
-        ways = {task.applied(state, operator): operator for operator in tree.of(state)[0]}
+        ways = {task.applied(state, operator): operator for operator in task.applicable(state)[0]}
         touched: set[object] = set()
         for j in range(i + 1, min(i + LONGEST, len(steps)) + 1):
             touched |= {s for s, value in values[j].items() if values[j - 1].get(s, FALSE) != value}

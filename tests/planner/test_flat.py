@@ -14,7 +14,7 @@ from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
 from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
-from planner.grounded.novelty import AT_ONCE, Seen, by_novelty, landmarks, successors
+from planner.grounded.novelty import AT_ONCE, Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
 from planner.plan import Counts, Limits, Plan, Reason, Status, TooLargeError
@@ -123,7 +123,7 @@ def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
     task = ground(carrier(3))
     assert isinstance(task, Task)
     marks = partial(landmarks, task) if deep else None
-    seen, state = finished(by_novelty(task, successors(task), heuristic(task), 1, Counts(), marks)) or ({}, 0)
+    seen, state = finished(by_novelty(task, heuristic(task), 1, Counts(), marks)) or ({}, 0)
     assert state & task.goal == task.goal
     while state != task.initial:
         before, operators = seen[state]
@@ -132,7 +132,7 @@ def test_novelty_finds_plans_and_proves_that_there_are_none(deep: bool) -> None:
         state = before
     me = sum(1 << bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == "ME")
     nowhere = replace(task, goal=task.goal | me)  # here and there at once: relaxed, that can be
-    assert finished(by_novelty(nowhere, successors(nowhere), heuristic(nowhere), 1, Counts(), marks)) is None
+    assert finished(by_novelty(nowhere, heuristic(nowhere), 1, Counts(), marks)) is None
 
 
 def finished(search: Generator[int, None, tuple[Seen, int] | None]) -> tuple[Seen, int] | None:
@@ -148,9 +148,9 @@ def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> 
     for problem in (tabletop, corridor(12), carrier(4)):
         task = ground(problem)
         assert isinstance(task, Task)
-        tree, evaluate, choice, state = successors(task), heuristic(task), random.Random(1), task.initial
+        evaluate, choice, state = heuristic(task), random.Random(1), task.initial
         for _ in range(60):
-            operators = sorted(tree.of(state)[0])
+            operators = sorted(task.applicable(state)[0])
             assert operators == [o for o in range(len(task)) if task.applied(state, o) is not None]
             evaluation = evaluate(state)
             assert evaluation is None or operators == evaluation[2]

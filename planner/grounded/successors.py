@@ -1,0 +1,96 @@
+"""Which operators are applicable in a state: a decision tree over symbols, whose branches are made where a state leads there.
+
+Helmert, "The Fast Downward planning system", JAIR 26 (2006), section 5.3.1. A search looks at few of the branches, which is why the
+others aren't made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.grounded.joins import Ints
+
+Waiting = tuple[int, list[int], int]
+"""An operator, the bits that it needs in the order in which they are asked for, and how many were."""
+
+
+class Tree:
+    """Operators by the values that they need, symbol by symbol.
+
+    `mask` are the bits of a symbol; `by_value` leads on for each of its values, `otherwise` for operators that don't need it;
+    `waiting` are the operators that no branch was made for yet.
+    """
+
+    __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")
+
+    def __init__(self, masks: Sequence[int], waiting: list[Waiting]) -> None:
+        self.masks, self.waiting = masks, waiting
+        self.mask = 0
+        self.by_value: dict[int, Tree] = {}
+        self.otherwise: Tree | None = None
+        self.operators: list[int] = []
+
+    def of(self, state: int) -> tuple[list[int], int]:
+        """Return the operators that are applicable in a state, and how many nodes were visited."""
+        found: list[int] = []
+        visited = 0
+        heads = [self]
+        for head in heads:  # which grows
+            node: Tree | None = head
+            while node is not None:
+                visited += 1
+                if node.waiting:
+                    node._branch()
+                if node.operators:
+                    found += node.operators
+                if not node.mask:
+                    break
+                fitting = node.by_value.get(state & node.mask)
+                if fitting is not None:
+                    heads.append(fitting)
+                node = node.otherwise
+        return found, visited
+
+    def _branch(self) -> None:
+        """Send each operator that waits here on, by the value of the symbol that the first of them asks for."""
+        masks, others = self.masks, []
+        by_value: dict[int, list[Waiting]] = {}
+        for one in self.waiting:
+            operator, bits, asked = one
+            if asked == len(bits):
+                self.operators.append(operator)
+                continue
+            bit = bits[asked]
+            self.mask = self.mask or masks[bit]
+            if masks[bit] == self.mask:
+                by_value.setdefault(1 << bit, []).append((operator, bits, asked + 1))
+            else:
+                others.append(one)
+        self.by_value = {value: Tree(masks, waiting) for value, waiting in by_value.items()}
+        self.otherwise = Tree(masks, others) if others else None
+        self.waiting = []
+
+
+def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> Tree:
+    """Return the tree of operators that need bits; symbols that many operators need are asked first.
+
+    Parameters
+    ----------
+    starts, items : array of int
+        Operator `i` needs the bits ``items[starts[i]:starts[i + 1]]``.
+    masks : sequence of int
+        Per bit, all bits of its symbol.
+    """
+    numbers = {mask: i for i, mask in enumerate(dict.fromkeys(masks))}
+    symbol_of = np.array([numbers[mask] for mask in masks], np.int64)
+    items = items[: starts[-1]]
+    often = np.bincount(symbol_of[items], minlength=len(numbers)).tolist()
+    first = sorted(numbers, key=lambda mask: (-often[numbers[mask]], mask))
+    place = np.empty(len(numbers), np.int64)
+    place[[numbers[mask] for mask in first]] = np.arange(len(first))
+    owners = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    bits = items[np.lexsort((place[symbol_of[items]], owners))].tolist()
+    ends = starts.tolist()
+    return Tree(masks, [(i, bits[ends[i] : ends[i + 1]], 0) for i in range(len(ends) - 1)])
