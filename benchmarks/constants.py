@@ -1,7 +1,8 @@
 """What each tuned constant of the planner is worth: halved and doubled, what becomes of lengths, expansions and time.
 
-CONFAB_ROOMS names the rooms in `planner/` whose constants are tried (hierarchical if left out), CONFAB_SEEDS how many random worlds
-of levels. Each run is a process of its own on a copy of the planner in which the one number is another, so that nothing is patched.
+Each run is a process of its own on a copy of the planner in which the one number is another, so that nothing is patched. It plans
+what its room is there for (`INSTRUMENTS`). CONFAB_ROOMS names the rooms in `planner/` that are tried, all if left out; with
+CONFAB_ROWS=FILE what was measured is kept there, and what is there already isn't measured again.
 """
 
 from __future__ import annotations
@@ -9,25 +10,34 @@ from __future__ import annotations
 import ast
 import json
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from random import Random
+from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 from time import process_time
+from typing import TypeAlias
 
+from benchmarks.execution import KINDS, Trial, after_intervention, random_intervention, rest_after, served
+from planner.acting.repair import mend
+from planner.experience import advice
+from planner.grounded.best_first import plan_level
 from planner.hierarchical.planner import plan
-from planner.plan import Limits
+from planner.hierarchical.serialization import compiled
+from planner.hierarchical.unsolvability import impossible
+from planner.paper.hierarchy import plan as paper_plan
+from planner.plan import Limits, Outcome
 from worlds.families import FAMILIES, family, random_table
 from worlds.hierarchies import hierarchy
+from worlds.lessons import taught
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("ontology", "reasoner", "planner", "worlds", "benchmarks")
-SIZES = (4, 10, 16)
+SIZES = (4, 10, 16, 40)
 FIRST = 4_000_000
-LENGTH, EFFORT, TIME = 0.002, 0.05, 0.25
+LENGTH, EFFORT, TIME = 0.002, 0.05, 0.4
 """A change of so much, as a share, counts: of primitives, of expansions, and (which is noisy) of CPU seconds."""
 
 
@@ -45,95 +55,182 @@ class Constant:
         room = self.path.relative_to(ROOT / "planner")
         return f"{room}: {self.name}" + (f" [{self.number}]" if self.number else "")
 
+    def times(self, factor: float) -> float:
+        """Return the number halved or doubled; a whole number stays one, and doesn't become nothing."""
+        old = self.node.value
+        assert isinstance(old, int | float)
+        return max(1, round(old * factor)) if isinstance(old, int) and old else old * factor
+
 
 def constants(room: Path) -> Iterator[Constant]:
     """Yield the numbers that the modules of a room give names in capitals."""
     for path in sorted(room.glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            targets = node.targets if isinstance(node, ast.Assign) else []
-            for target in targets:
+            if not isinstance(node, ast.Assign):
+                continue
+            for target in node.targets:
                 names = (
                     [ast.unparse(e) for e in target.elts] if isinstance(target, ast.Tuple) else [ast.unparse(target)]
                 )
-                values = node.value.elts if isinstance(node.value, ast.Tuple) and len(names) > 1 else [node.value]  # type: ignore[attr-defined]
+                value = node.value
+                values = value.elts if isinstance(value, ast.Tuple) and len(names) > 1 else [value]
                 if not all(name.isupper() for name in names):
                     continue
-                for name, value in zip(names, values, strict=False):
+                for name, given in zip(names, values, strict=False):
                     found = [
-                        n for n in ast.walk(value) if isinstance(n, ast.Constant) and type(n.value) in (int, float)
+                        n for n in ast.walk(given) if isinstance(n, ast.Constant) and type(n.value) in (int, float)
                     ]
                     yield from (Constant(path, name, i, n) for i, n in enumerate(found))
 
 
-def changed(text: str, node: ast.Constant, factor: float) -> str:
-    """Return a module's text with another number; a whole number stays one, and doesn't become nothing."""
-    old = node.value
-    assert isinstance(old, int | float)
-    new = max(1, round(old * factor)) if isinstance(old, int) else old * factor
-    lines = text.splitlines(keepends=True)
+def changed(text: str, constant: Constant, factor: float) -> str:
+    """Return a module's text with another number."""
+    lines, node = text.splitlines(keepends=True), constant.node
     line = lines[node.lineno - 1].encode()
-    lines[node.lineno - 1] = (line[: node.col_offset] + str(new).encode() + line[node.end_col_offset :]).decode()
+    new = str(constant.times(factor)).encode()
+    lines[node.lineno - 1] = (line[: node.col_offset] + new + line[node.end_col_offset :]).decode()
     return "".join(lines)
 
 
-def measured() -> dict[str, float]:
-    """Return what planning of all worlds comes to."""
-    seeds = int(os.environ.get("CONFAB_SEEDS", "200"))
+# ---------------------------------------------------------------------------------------------------------- what is planned
+
+Row: TypeAlias = "tuple[str, int, int]"
+"""How a call ended, its primitives and its expansions."""
+
+
+def row(outcome: Outcome) -> Row:
+    """Return what counts of an outcome."""
+    primitives = len(outcome.plan.primitives) if outcome.plan else 0
+    return outcome.status.value, primitives, sum(counts.expanded for counts in outcome.search.values())
+
+
+def planned() -> Iterator[Row]:
+    """Plan families, tables and worlds of levels in the default mode."""
     problems = [family(name, n) for name in FAMILIES for n in SIZES if name != "packed" or n < 16]
     problems += [random_table(seed) for seed in range(FIRST, FIRST + 20)]
-    problems += [hierarchy(seed) for seed in range(FIRST, FIRST + seeds)]
-    found = {"solved": 0, "unsolvable": 0, "primitives": 0, "expansions": 0}
-    begin = process_time()
+    problems += [hierarchy(seed) for seed in range(FIRST, FIRST + 200)]
     for problem in problems:
-        outcome = plan(problem, limits=Limits(expansions=20_000))
-        found[outcome.status.value] = found.get(outcome.status.value, 0) + 1
-        found["primitives"] += len(outcome.plan.primitives) if outcome.plan else 0
-        found["expansions"] += sum(counts.expanded for counts in outcome.search.values())
+        yield row(plan(problem, limits=Limits(expansions=20_000)))
+
+
+def flat() -> Iterator[Row]:
+    """Plan the lowest level of some of them alone."""
+    problems = [family(name, 4) for name in FAMILIES if name != "packed"]
+    problems += [hierarchy(seed) for seed in range(FIRST, FIRST + 40)]
+    for problem in problems:
+        yield row(plan_level(problem, limits=Limits(expansions=3_000)))
+
+
+def led() -> Iterator[Row]:
+    """Plan tables with a memory of smaller ones."""
+    memory = taught(("served", "swap", "handover"))
+    for name in ("served", "swap", "handover", "full", "blocked"):
+        for n in (8, 16):
+            for mode in ("guarded", "strict"):
+                yield row(advice.plan(family(name, n, 1), memory, mode, Limits(expansions=20_000)))
+
+
+def mended() -> Iterator[Row]:
+    """Repair a plan after interventions of all kinds; what counts of a repair is its cost, and whether all was planned anew."""
+    trial = Trial.of(served(10))
+    for seed in range(80):
+        random, kind = Random(seed), KINDS[seed % len(KINDS)]
+        position = random.randrange(len(trial.plan.primitives))
+        happening = random_intervention(trial.problem, trial.states[position], random, kind)
+        assert happening is not None
+        before = replace(trial.problem, initial=trial.states[position])
+        now, rest = after_intervention(before, happening), rest_after(trial.plan, position)
+        done = mend(now, rest, before, None, compiled(now), True, Limits(expansions=20_000))
+        yield ("gave-up" if done.steps is None else "solved"), round(done.cost), int(done.kind == "replan")
+
+
+def on_paper() -> Iterator[Row]:
+    """Plan small worlds in the paper's mode."""
+    for seed in range(FIRST, FIRST + 40):
+        yield row(paper_plan(hierarchy(seed), limits=Limits(expansions=5_000), proof=impossible))
+
+
+INSTRUMENTS: Mapping[str, tuple[Callable[[], Iterator[Row]], ...]] = {
+    "hierarchical": (planned,),
+    "grounded": (planned, flat),
+    "experience": (led,),
+    "acting": (mended,),
+    "paper": (on_paper,),
+    "": (planned,),
+}
+"""What is planned to see what a room's constants do."""
+
+
+def measured(room: str) -> dict[str, float]:
+    """Return what planning all that a room is there for comes to."""
+    found: dict[str, float] = {"solved": 0, "unsolvable": 0, "gave-up": 0, "primitives": 0, "expansions": 0}
+    begin = process_time()
+    for instrument in INSTRUMENTS[room]:
+        for status, primitives, expansions in instrument():
+            found[status] += 1
+            found["primitives"] += primitives
+            found["expansions"] += expansions
     return {**found, "seconds": process_time() - begin}
 
 
-def with_change(constant: Constant | None, factor: float) -> dict[str, float]:
-    """Return what is measured with a constant multiplied by a factor."""
+def with_change(room: str, constant: Constant | None, factor: float) -> dict[str, float]:
+    """Return what is measured with a constant multiplied by a factor; nothing if that fails."""
     with TemporaryDirectory() as folder:
-        for name in COPIED:
-            shutil.copytree(ROOT / name, Path(folder, name), ignore=shutil.ignore_patterns("__pycache__"))
+        for path in ROOT.iterdir():
+            if path.is_dir() and not path.name.startswith(".") and path.name != "planner":
+                Path(folder, path.name).symlink_to(path)
+        copytree(ROOT / "planner", Path(folder, "planner"), ignore=ignore_patterns("__pycache__"))
         if constant is not None:
             path = Path(folder) / constant.path.relative_to(ROOT)
-            path.write_text(changed(path.read_text(encoding="utf-8"), constant.node, factor), encoding="utf-8")
-        code = "import json; from benchmarks.constants import measured; print(json.dumps(measured()))"
+            path.write_text(changed(path.read_text(encoding="utf-8"), constant, factor), encoding="utf-8")
+        code = f"import json; from benchmarks.constants import measured; print(json.dumps(measured({room!r})))"
         done = subprocess.run(
             [sys.executable, "-c", code],
             cwd=folder,
-            env={**os.environ, "PYTHONPATH": folder},
+            env={**os.environ, "PYTHONPATH": folder, "PYTHONDONTWRITEBYTECODE": "1"},
             capture_output=True,
             text=True,
         )
-    if done.returncode:
-        return {}
-    result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    result: dict[str, float] = {} if done.returncode else json.loads(done.stdout.splitlines()[-1])
     return result
 
 
-def verdict(base: dict[str, float], found: dict[str, float]) -> str:
+def verdict(base: Mapping[str, float], found: Mapping[str, float]) -> str:
     """Return what a change does, in a few words; nothing if that can't be measured."""
     if not found:
         return "fails"
     said = []
-    if (found["solved"], found["unsolvable"]) != (base["solved"], base["unsolvable"]):
-        said.append(f"{found['solved']:.0f} solved, {found['unsolvable']:.0f} unsolvable")
+    if any(found[status] != base[status] for status in ("solved", "unsolvable")):
+        said.append(
+            f"{found['solved'] - base['solved']:+.0f} solved, {found['unsolvable'] - base['unsolvable']:+.0f} proved"
+        )
     for what, least in (("primitives", LENGTH), ("expansions", EFFORT), ("seconds", TIME)):
-        ratio = found[what] / base[what]
+        ratio = found[what] / base[what] if base[what] else 1.0
         if abs(ratio - 1) > least:
             said.append(f"{what} × {ratio:.3f}" if what == "primitives" else f"{what} × {ratio:.2f}")
-    return ", ".join(said)
+    return ", ".join(said) or "nothing"
 
 
 def main() -> None:
-    """Print the table: each constant, and what halving and doubling it changes."""
-    base = with_change(None, 1.0)
-    print(", ".join(f"{what} {value:.0f}" for what, value in base.items()), "\n")
-    print("| constant | value | halved | doubled |\n|---|---|---|---|")
-    for room in os.environ.get("CONFAB_ROOMS", "hierarchical").split(","):
+    """Print a table for each room: each constant, what it trades, and what halving and doubling it changes."""
+    file = Path(os.environ["CONFAB_ROWS"]) if "CONFAB_ROWS" in os.environ else None
+    known: dict[str, dict[str, float]] = json.loads(file.read_text()) if file is not None and file.exists() else {}
+
+    def asked(room: str, constant: Constant | None, factor: float) -> dict[str, float]:
+        key = f"{room}; {constant} = {constant.node.value!r} × {factor}" if constant else room
+        if key not in known:
+            known[key] = with_change(room, constant, factor)
+            if file is not None:
+                file.write_text(json.dumps(known, indent=0))
+        return known[key]
+
+    for room in os.environ.get("CONFAB_ROOMS", ",".join(INSTRUMENTS)).split(","):
+        base = asked(room, None, 1.0)
+        print(f"\nplanner/{room}: " + ", ".join(f"{what} {value:.0f}" for what, value in base.items()), "\n")
+        print("| constant | value | halved | doubled |\n|---|---|---|---|")
         for constant in constants(ROOT / "planner" / room):
-            half, double = (verdict(base, with_change(constant, factor)) for factor in (0.5, 2.0))
-            print(f"| {constant} | {constant.node.value!r} | {half or 'nothing'} | {double or 'nothing'} |", flush=True)
+            said = [
+                verdict(base, asked(room, constant, factor)) if constant.times(factor) != constant.node.value else "–"
+                for factor in (0.5, 2.0)
+            ]
+            print(f"| {constant} | {constant.node.value!r} | {' | '.join(said)} |", flush=True)

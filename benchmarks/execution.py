@@ -236,9 +236,9 @@ def _repair_row(objects: int, count: int) -> None:
         position = random.randrange(len(trial.plan.primitives))
         intervention = random_intervention(problem, trial.states[position], random, kind)
         assert intervention is not None
-        rest = _rest_after(trial.plan, position)
+        rest = rest_after(trial.plan, position)
         before = replace(problem, initial=trial.states[position])
-        now = _changed(before, intervention)
+        now = after_intervention(before, intervention)
         ours, theirs = (compiled(now), compiled(now)) if kind == "add" else (own, other)
         begin = process_time()
         mended = mend(now, rest, before, None, ours, True, limits)
@@ -266,7 +266,7 @@ def _repair_row(objects: int, count: int) -> None:
     )
 
 
-def _changed(before: Problem, intervention: Intervention) -> Problem:
+def after_intervention(before: Problem, intervention: Intervention) -> Problem:
     """Return the situation and the goal after an intervention; of what is taken away nothing is wanted any more."""
     goal = dict(before.goal)
     if intervention.change is Change.GOAL:
@@ -285,7 +285,7 @@ def _changed(before: Problem, intervention: Intervention) -> Problem:
     )
 
 
-def _rest_after(plan: Plan, count: int) -> list[Step]:
+def rest_after(plan: Plan, count: int) -> list[Step]:
     """Return what is left of a plan after so many primitives."""
     gone = {step.path for step in plan.primitives[:count]}
 

@@ -42,8 +42,8 @@ from planner.grounded.best_first import plan_level
 from planner.hierarchical import serialization as serialise
 from planner.hierarchical.planner import Compiled, compiled, plan
 from planner.hierarchical.refinement_cache import Template
-from planner.hierarchical.subplans import Ground, LimitError, Segments
-from planner.plan import Limits, Outcome, Reason, Status
+from planner.hierarchical.subplans import Ground, Segments
+from planner.plan import LimitError, Limits, Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import load

@@ -162,11 +162,23 @@ class Limits:
     seconds: float | None = None
 
 
+class UnsolvableError(Exception):
+    """A proof that there is no plan came up; the reason is its argument."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
+
+
 class TooLargeError(Exception):
     """What would be grounded is larger than allowed; the message says how large."""
 
 
-class OutOfTimeError(Exception):
+class LimitError(Exception):
+    """A limit of the planning call has been reached; the message says which."""
+
+
+class OutOfTimeError(LimitError):
     """The deadline came before grounding was done."""
 
 

@@ -20,11 +20,12 @@ from difflib import SequenceMatcher
 from time import perf_counter
 
 from planner.hierarchical.planner import plan as fast_plan
+from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.serialization import EASY, Call, Compiled, UnsolvableError, compiled
-from planner.hierarchical.subplans import Effort, LimitError
-from planner.hierarchical.unsolvability import unattainable
-from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
+from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
+from planner.hierarchical.subplans import Effort
+from planner.hierarchical.unsolvability import refuted
+from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
 from reasoner.amounts import meets
@@ -112,8 +113,8 @@ def repair(
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
     call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
-    call.proved = True  # what is impossible is proved by replanning
-    call.gone_back = True  # nor is anything kept undone here: beginning anew is replanning, too
+    # What is impossible is proved by replanning; nor is anything kept undone here: beginning anew is replanning, too.
+    recovery = Recovery(call, solvable=True, forward=True)
     pending = list(rest)
     try:
         if not _at_rest(call):
@@ -130,7 +131,7 @@ def repair(
         kept = range(restored, len(call.steps)) if whole else ()  # where nothing is dropped, all has its purpose
         begun = begun if whole else 0
         settle(call)
-        solved = not unattainable(call.segments) and call.serialise()
+        solved = not refuted(call.segments) and call.serialise(recovery.harder)
     except (LimitError, UnsolvableError):
         solved = False
     if not solved:

@@ -24,10 +24,10 @@ from planner.experience.evidence import Judge, View
 from planner.experience.leading import SEARCHING, Candidate, Guide, follow, go_on, usable
 from planner.experience.lessons import rules_in
 from planner.hierarchical import planner as fast
+from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import OpenRole, Template
-from planner.hierarchical.serialization import LONGER, Call, Compiled
-from planner.hierarchical.subplans import LimitError
-from planner.plan import Limits, Outcome, Status
+from planner.hierarchical.serialization import Call, Compiled
+from planner.plan import LimitError, Limits, Outcome, Status
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
@@ -177,8 +177,7 @@ def led(call: Call, guide: Guide) -> bool:
             return False
         segments.most = min(most, segments.expanded + SEARCHING + goals - len(guide.open))
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        call.ladder = [(call.program.levels[0], attempt) for attempt in (LONGER,)]
-        return call.serialise()
+        return call.serialise(Recovery(call, levels=call.program.levels[:1], attempts=1).harder)
     except LimitError:
         if segments.most == most or (segments.deadline is not None and perf_counter() > segments.deadline):
             raise

@@ -18,7 +18,7 @@ from planner.experience.matching import Find, finder, known
 from planner.experience.regression import Course, ordered
 from planner.hierarchical.operators import Program
 from planner.hierarchical.serialization import EASY, LONGER, Call
-from planner.hierarchical.subplans import LimitError
+from planner.plan import LimitError
 from planner.transitions import Cell, Change, arguments_of
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally

@@ -19,9 +19,8 @@ from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner
 from planner.hierarchical.serialization import Call, Compiled, compiled
-from planner.hierarchical.subplans import LimitError
 from planner.paper.learning import LearningError
-from planner.plan import Limits, Plan, Step
+from planner.plan import LimitError, Limits, Plan, Step
 from planner.transitions import Cell
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, OpenRole, Rule, Tally
 from reasoner.symbols import Problem

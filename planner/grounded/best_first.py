@@ -85,7 +85,9 @@ def plan_level(
     try:
         task = ground(problem, level, initial, goal, deadline=deadline)
     except (TooLargeError, OutOfTimeError) as error:
-        return Outcome(Status.GAVE_UP, reason=Reason(f"grounding: {error}"), seconds=perf_counter() - began)
+        return Outcome(
+            Status.GAVE_UP, reason=Reason(f"grounding stopped at a limit: {error}"), seconds=perf_counter() - began
+        )
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
     found = search(task, limits, deadline)

@@ -193,7 +193,7 @@ class Reached:
     def check_time(self) -> None:
         """Raise `OutOfTimeError` when the deadline has passed."""
         if self.deadline is not None and perf_counter() > self.deadline:
-            raise OutOfTimeError("the time limit came first")
+            raise OutOfTimeError("the time limit")
 
     def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
         """Estimate how many rows of the atom's table match one row of `columns`."""

@@ -21,7 +21,7 @@ from planner.grounded.shortest import Bound, shortest, ways
 from planner.grounded.task import Task
 from planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
-from planner.hierarchical.serialization import closed, refusal
+from planner.hierarchical.unsolvability import closed, refusal
 from planner.plan import Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from planner.validation import validate
 from reasoner.symbols import Problem

@@ -7,6 +7,7 @@ never that there is no plan.
 stage                   decides                                         module
 ======================  ==============================================  ==============================
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
+more effort             where these get stuck                           `planner.hierarchical.recovery`
 static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
 relaxed reachability    that a goal can't be reached                    `planner.grounded.reachability`
 flat search             the rest, both ways, until a limit comes        `planner.grounded.best_first`
@@ -22,11 +23,12 @@ from time import perf_counter
 
 from planner.hierarchical.concerns import concerns, put_aside
 from planner.hierarchical.postoptimization import Improver, length
+from planner.hierarchical.recovery import SOME, Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.serialization import EASY, SOME, Call, Compiled, UnsolvableError, compiled
-from planner.hierarchical.subplans import LimitError, Watch, nobody
+from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
+from planner.hierarchical.subplans import Watch, nobody
 from planner.levels import levels_left
-from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection
+from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem
 
@@ -94,8 +96,6 @@ def _plan(
     def begun() -> Call:
         call = Call(problem, using, deadline, limits.expansions)
         call.segments.watch = watch
-        if not leave_levels:
-            call.ladder = [(level, attempt) for level, attempt in call.ladder if level == call.program.levels[0]]
         return call
 
     call = begun()
@@ -108,7 +108,9 @@ def _plan(
         if ahead is not None and not led:
             spent, call = call.segments, begun()
             call.segments.counts, call.segments.expanded = spent.counts, spent.expanded
-        if led or call.serialise() or call.anew(list(dict(call.ladder))):
+        levels = call.program.levels if leave_levels else call.program.levels[:1]
+        recovery = Recovery(call, levels)
+        if led or call.serialise(recovery.harder) or recovery.anew(levels):
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
                     shorten(call, improve, leave_levels)
@@ -125,13 +127,13 @@ def _plan(
         call.given_up.append(
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
         )
-    if call.too_large is not None:
-        text = f"goals in series found no plan, and {call.too_large.text}"
+    if recovery.too_large is not None:
+        text = f"goals in series found no plan, and {recovery.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
     from planner.grounded.best_first import plan_level
 
     left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-    flat = plan_level(call.at_rest_in_the_end(), limits=Limits(limits.expansions, left))
+    flat = plan_level(problem, limits=Limits(limits.expansions, left))
     return outcome(flat.status, flat.plan, flat.reason)
 
 
@@ -168,10 +170,9 @@ def reordered(call: Call) -> list[RefinedStep]:
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
         other.segments.most_work = max(call.segments.worked / 2, REORDERING)
-        other.doubted = other.proved = other.gone_back = True  # there is a plan
-        other.ladder = other.ladder[:2]
+        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
-            done = other.together(first, SOME) if at_once else other.serialise()
+            done = recovery.together(first, SOME) if at_once else other.serialise(recovery.harder)
             if done and length(other.steps) < length(best):
                 best = other.steps
     return best

@@ -20,9 +20,9 @@ from typing import TypeAlias
 from planner.hierarchical.concerns import Concern, concerns, put_aside
 from planner.hierarchical.inherited_preconditions import binding
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
-from planner.hierarchical.subplans import Ground, LimitError
+from planner.hierarchical.subplans import Ground
 from planner.hierarchical.subproblem import FEW, problem_of
-from planner.plan import OutOfTimeError, Reason, TooLargeError
+from planner.plan import Reason, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import Domain, Problem, Symbol
 
@@ -167,8 +167,6 @@ class Improver:
         problem = replace(problem, domain=self._binding(level))
         try:
             task = ground(problem, level, most=MOST_ROWS, deadline=self.segments.deadline)
-        except OutOfTimeError as error:
-            raise LimitError("the time limit") from error
         except TooLargeError:
             return None
         if isinstance(task, Reason) or len(task) > OPERATORS:

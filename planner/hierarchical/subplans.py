@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Want, Wants
-from planner.plan import Counts
+from planner.plan import Counts, LimitError
 from planner.transitions import Cell, Change, Key, Table, arguments_of
 from reasoner.amounts import meets
 from reasoner.symbols import FALSE, TRUE
@@ -38,10 +38,6 @@ Watch: TypeAlias = "Callable[[int | None], object]"
 
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
 """Says what a touched symbol must be in the end, given what it was in the beginning; None: whatever it came to be."""
-
-
-class LimitError(Exception):
-    """A limit of the planning call has been reached; the message says which."""
 
 
 def nobody(level: int | None) -> None:

@@ -6,15 +6,34 @@ otherwise. A proof here is sound and seldom complete; what is left is decided by
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from planner.hierarchical.operators import Achieve, Achiever, Program
 from planner.hierarchical.subplans import Segments
-from planner.plan import Reason
+from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
-from reasoner.symbols import FALSE, Behavior, Fact, Problem, RelationCondition, Symbol, ValueCondition, Witness
+from reasoner.symbols import (
+    FALSE,
+    Behavior,
+    Fact,
+    Problem,
+    RelationCondition,
+    State,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+
+if TYPE_CHECKING:
+    from planner.grounded.reachability import Reached
+
+FEW_OPERATORS, FEW_STATES = 300, 6_000
+"""The smallest problems, of which every state is looked at."""
+MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
+"""The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
 Achievers: TypeAlias = "Mapping[tuple[str, int], Achieve]"
 Asked: TypeAlias = "dict[tuple[Cell, str], bool]"
@@ -26,7 +45,12 @@ def impossible(problem: Problem, program: Program | None = None) -> Reason | Non
     goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
     table = Table(problem.domain.situations, problem.initial)
     start = Segments(program or Program(problem), table, goal)
-    return unattainable(start) or contested(start)
+    return refuted(start)
+
+
+def refuted(segments: Segments) -> Reason | None:
+    """Return why the goals can't be reached from a situation, or None if that can't be shown at once."""
+    return unattainable(segments) or contested(segments)
 
 
 def unattainable(segments: Segments) -> Reason | None:
@@ -178,3 +202,63 @@ def _exclusive(segments: Segments, situation: str, value: str) -> bool:
             ):
                 return False
     return True
+
+
+# ---------------------------------------------------------------------------------------- on the lowest level, grounded
+
+
+def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
+    """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
+    from planner.grounded import reachability
+
+    reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
+    reached.close()
+    return reached
+
+
+def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
+    """Return why a level isn't to be grounded, if it would take too much memory: an effect on a symbol touches all its values."""
+    values = {}
+    for name, situation in reached.situations.items():
+        rows = len(reached.tables["situation", name])
+        values[name] = 1 if situation.boolean else 1 + rows // max(len(reached.symbols[name]), 1)
+    changes = sum(
+        len(rows) * sum(values[effect.situation] for _, effect in schema.effects)
+        for schema, rows in zip(reached.schemas, reached.rows, strict=True)
+    )
+    if changes <= most:
+        return None
+    return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
+
+
+def proved(problem: Problem, segments: Segments) -> Reason | None:
+    """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
+
+    Of the smallest problems every state is looked at. Returned is why the level is too large for a proof, if it is.
+    """
+    from planner.grounded.grounding import ground
+    from planner.grounded.shortest import shortest
+    from planner.grounded.unreachable import unreachable
+
+    level, deadline = segments.program.levels[-1], segments.deadline
+    try:
+        reached = closed(problem, level, deadline)
+        for symbol, value in sorted(problem.goal.items()):
+            if not reached.possible(symbol, value):
+                raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
+        segments.watch(None)
+        too_large = refusal(reached)
+        if too_large is not None:
+            return too_large
+        task = ground(problem, level, deadline=deadline)
+    except TooLargeError as error:
+        return Reason(f"level {level} is too large to be grounded: {error}")
+    if isinstance(task, Reason):
+        raise UnsolvableError(task)
+    if len(task) <= FEW_OPERATORS:
+        most = FEW_STATES // (1 + len(task.derived.parts) // 10)  # a state costs what follows from it, too
+        found = shortest(task, most=most, deadline=deadline)
+        if found.plan is None and found.bound == math.inf:
+            text = f"all {found.states} states of level {level} that can be reached were looked at"
+            raise UnsolvableError(Reason(text))
+    return None

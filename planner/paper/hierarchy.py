@@ -17,7 +17,7 @@ from typing import TypeAlias
 from planner.paper.astar import Found, Goal, a_star, mismatches
 from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, renumbered
+from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from reasoner.memory.links import Links
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -49,14 +49,6 @@ class Call:
     known: dict[tuple[Values, GroundBehavior], Refined] = field(default_factory=dict)
     fallbacks: int = 0
     gave_up: bool = False
-
-
-class UnsolvableError(Exception):
-    """A proof that there is no plan came up; the reason is its argument."""
-
-    def __init__(self, reason: Reason) -> None:
-        super().__init__(reason.text)
-        self.reason = reason
 
 
 def unproved(problem: Problem) -> None:

@@ -1,0 +1,254 @@
+"""What is tried where goals in series get stuck: more steps, lower levels, all goals at once, going back to where it went astray.
+
+Each attempt is dearer than the one before; those that nothing has changed for aren't made again. When all are made, no plan was
+found, and what is left is the lowest level alone (`planner.hierarchical.planner`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar
+
+from planner.hierarchical.serialization import LONGER, Asleep, Attempt, Before, Call
+from planner.hierarchical.subplans import Effort
+from planner.hierarchical.subproblem import Width
+from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, proved
+from planner.plan import Reason, TooLargeError, UnsolvableError
+from planner.transitions import Cell
+from reasoner.symbols import State
+
+MOST_TOGETHER = 20_000
+"""The largest level, in quantified behaviours, on which all goals are searched at once."""
+ALL, SOME = (Width(None, 1, 10_000_000),), (Width(None, 1, 100_000),)
+"""All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
+ANEW = (Width(None, 1, 1_500_000),)
+"""All goals at once from the beginning, on the most abstract level: the goals reached so far may be in the way for good."""
+COSTLY = 4
+"""From so many goals that need more than a few steps on, the observer is told."""
+Done = TypeVar("Done")
+
+
+@dataclass
+class Recovery:
+    """What was tried in one call to get on where goals in series got stuck.
+
+    Attributes
+    ----------
+    call : Call
+    levels : tuple of int, optional
+        The levels whose steps may be done; all if left out.
+    attempts : int, optional
+        How many of the attempts on each level are made; all if left out.
+    solvable : bool
+        Whether it is known that there is a plan, so that nothing is to be proved.
+    forward : bool
+        Whether what was done stays done: nothing is begun anew, nor gone back to.
+    """
+
+    call: Call
+    levels: tuple[int, ...] | None = None
+    attempts: int | None = None
+    solvable: bool = False
+    forward: bool = False
+    too_large: Reason | None = None
+    _doubted: bool = False
+    _proved: bool = False
+    _finished: int = 0
+    _tried: dict[int, int] = field(default_factory=dict)
+
+    @cached_property
+    def ladder(self) -> list[tuple[int, Attempt]]:
+        """The attempts, each with its level."""
+        found: list[tuple[int, Attempt]] = []
+        for level in self.levels or self.call.program.levels:
+            *small, large = self.call.refiner.worlds(level)
+            found += [(level, attempt) for attempt in (LONGER, (*small,), (large,), ALL)[: self.attempts]]
+        return found
+
+    def harder(self, asleep: Asleep, before: Before) -> bool:
+        """Achieve one of the sleeping goals by a longer segment, or by one on a lower level; whether that succeeded."""
+        call = self.call
+
+        def candidates() -> Iterator[Cell]:
+            none = True
+            for cell in asleep:
+                if all(other in call.kept for other in before.get(cell, ())):
+                    none = False
+                    yield cell
+            if none:  # where goals wait for each other, none waits
+                yield from asleep
+
+        if not self.solvable:
+            self._doubt()
+        if call.unseen.keys() >= asleep.keys() and self.finish():
+            call.restarts += 1
+            return True
+        for level, attempt in self.ladder:
+            if attempt is not LONGER and len(call.goal) - len(call.kept) >= COSTLY:
+                call.segments.watch(None)
+            if attempt is ALL:
+                if self.together(level):
+                    return True
+                continue
+            for cell in candidates():
+                if (level, attempt) in call.failed.get(cell, ()):
+                    continue
+                if call.achieve(level, cell, attempt):
+                    return True
+                call.failed.setdefault(cell, set()).add((level, attempt))
+                if not isinstance(attempt, Effort):
+                    if not self.solvable:
+                        self._prove()
+                    if not self.forward:
+                        self.forward = True
+                        if self.retreat() or self.anew(call.program.levels[:1], ANEW):
+                            call.restarts += 1
+                            return True
+        if call.moved:  # something was done since some of these attempts failed
+            call.failed.clear()
+            call.moved = False
+            return self.harder(asleep, before)
+        return False
+
+    def _doubt(self) -> None:
+        """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
+        if not self._doubted:
+            self._doubted = True
+            reason = impossible(self.call.problem, self.call.program)
+            if reason:
+                raise UnsolvableError(reason)
+
+    def _prove(self) -> None:
+        """Raise `UnsolvableError` if it can be shown on the lowest level that there is no plan."""
+        if not self._proved:
+            self._proved = True
+            self.too_large = proved(self.call.problem, self.call.segments)
+
+    def finish(self) -> bool:
+        """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""
+        call = self.call
+        steps = call.steps
+        if not steps or steps[-1].level != call.program.levels[0] or self._finished > len(call.goal):
+            return False
+        self._finished += 1  # what is done after that may undo it, but not for ever
+        call.redo(steps[:-1])
+        call.refiner.besides = call.unseen
+        last = call.refiner.do(*steps[-1][:3])
+        call.refiner.besides = {}
+        if last is None:
+            call.redo(steps)
+            return False
+        call.steps = [*steps[:-1], last]
+        call.kept.update(call.unseen)
+        return True
+
+    def anew(self, levels: Sequence[int], width: Attempt = ALL) -> bool:
+        """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was."""
+        call = self.call
+        if not call.steps:
+            return False  # nothing has led anywhere
+        steps, given_up, kept, tried = call.steps, call.given_up, call.kept, self._tried
+        call.table.undo(0)
+        call.steps, call.given_up, self._tried = [], [], {}
+        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        if any(self.together(level, width) for level in levels):
+            return True
+        call.redo(steps)
+        call.steps, call.given_up, call.kept, self._tried = steps, given_up, kept, tried
+        return False
+
+    def retreat(self) -> bool:
+        """Go back to where all goals could still be reached, and do the step that led astray so that they can be from there, too.
+
+        A key that lies in the room that it unlocks: no level above sees that. Whether all can be reached from there on; else all
+        is as it was.
+        """
+        call = self.call
+        if not call.refiner.drifting or not call.steps or hopeful(call):
+            return False
+        steps = call.steps
+        low, high = 0, len(steps)
+        while high - low > 1:
+            middle = (low + high) // 2
+            call.redo(steps[:middle])
+            low, high = (middle, high) if hopeful(call) else (low, middle)
+        call.redo(steps[:low])
+        mark = len(call.table.trail)
+        call.refiner.again(steps[low])
+        step = tidily(call, mark, lambda: call.refiner.do(*steps[low][:3]))
+        if step is None:
+            call.redo(steps)
+            return False
+        call.wary = lambda done, mark, do: done if hopeful(call) else tidily(call, mark, do)
+        call.steps = [*steps[:low], step]
+        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        return True
+
+    def together(self, level: int, width: Attempt = ALL) -> bool:
+        """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
+        call = self.call
+        if call.program.size(level) > MOST_TOGETHER or self._tried.get(level) == len(call.steps):
+            return False
+        self._tried[level] = len(call.steps)
+        return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, width)
+
+
+# ------------------------------------------------------------------------------------ whether all can still be reached
+
+
+def hopeful(call: Call) -> bool:
+    """Whether every goal could be reached from here on the lowest level if nothing ever became false."""
+    initial = {**call.problem.initial, **call.table.state()}
+    if any(s.quantity is not None for s in call.problem.domain.situations.values()):
+        return sufficient(call, initial)
+    try:
+        reached = closed(call.problem, call.program.levels[-1], call.segments.deadline, initial)
+    except TooLargeError:
+        return True
+    return all(reached.possible(symbol, value) for symbol, value in call.problem.goal.items())
+
+
+def sufficient(call: Call, initial: State) -> bool:
+    """Whether every goal could be reached from a state if nothing became false and no amount were in the way of another."""
+    from planner.grounded.grounding import ground
+    from planner.grounded.hff_amounts import heuristic
+
+    level, deadline = call.program.levels[-1], call.segments.deadline
+    try:
+        task = ground(call.problem, level, initial, most=MOST_ROWS, deadline=deadline)
+    except TooLargeError:
+        return True
+    if isinstance(task, Reason) or task.amounts is None:
+        return not isinstance(task, Reason)
+    return heuristic(task)(task.initial) is not None
+
+
+def tidily(call: Call, mark: int, do: Callable[[], Done | None]) -> Done | None:
+    """Do once more what was done since a mark, so that all goals can be reached; None, and the table as at the mark, if not.
+
+    Of what was left in another state than at the mark, and might be anything, only that is left as it was which has to be.
+    """
+    table = call.table
+    after = table.since(mark)
+    table.undo(mark)
+    free = [cell for cell in after if not call.segments.visible(call.program.levels[0], cell)]
+    needed = set(free)
+    for cell in free:
+        table_mark = len(table.trail)
+        for other, value in after.items():
+            if other == cell or other not in needed:
+                table.put(*other, value)
+        if hopeful(call):
+            needed.discard(cell)
+        table.undo(table_mark)
+    call.segments.tidy = frozenset(needed)
+    try:
+        done = do()
+    finally:
+        call.segments.tidy = frozenset()
+    if done is None or hopeful(call):
+        return done
+    table.undo(mark)
+    return None
