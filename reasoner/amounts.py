@@ -7,6 +7,7 @@ have no end. What is wanted of an amount may be bounds, written ``>=2`` or ``>=2
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -133,6 +134,18 @@ def written(amount: Fraction) -> str:
         return str(amount)
     digits = str(abs(amount.numerator) * 10**places // amount.denominator).rjust(places + 1, "0")
     return f"{'-' * (amount < 0)}{digits[:-places]}.{digits[-places:]}"
+
+
+DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})?")
+
+
+def exact(text: str) -> Fraction | None:
+    """Return the number that somebody wrote, exact; None if it is none.
+
+    >>> exact("1.50"), exact("many")
+    (Fraction(3, 2), None)
+    """
+    return Fraction(text) if DECIMAL.fullmatch(text) else None
 
 
 def divided(left: Number, right: Number) -> Number:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from reasoner.symbols import FALSE, AnyOf, Condition, Rule, ValueCondition, Witness
+from reasoner.amounts import situations_in
+from reasoner.symbols import FALSE, AnyOf, Comparison, Condition, Rule, ValueCondition, Witness
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
@@ -27,6 +28,9 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
             case AnyOf(alternatives):
                 for group in alternatives:
                     yield from needed(group, flipped)
+            case Comparison(left, _, right):
+                for situation in sorted(situations_in(left) | situations_in(right)):
+                    yield situation, flipped
 
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:

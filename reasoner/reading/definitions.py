@@ -14,22 +14,27 @@ in OWL                                      in `reasoner.symbols`
 ``p only C``, p a value property            negated `Witness`: no value is outside C
 the same with a static relation             `RelationCondition` in place of the `ValueCondition`
 ``inverse p some C``                        `Witness`: some C has the individual as its value
+``p min 2 C``, ``max``, ``exactly``         `Witness` in `Witness`: another one, and so on; negated for at most
+``p Self``                                  the condition of the individual and itself
 ``{a, b}``                                  `AnyOf` of `EqualityCondition`
+``p some decimal[>= 2]``, p an amount       `Comparison`s of the amount with the bounds
 =========================================  =======================================================
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from reasoner.amounts import Amount, Expression, Measure, exact
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import Names, local_name
 from reasoner.symbols import (
     TRUE,
     AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Parameter,
@@ -41,23 +46,43 @@ from reasoner.symbols import (
 from reasoner.vocabulary import OWL, RDF, RDFS
 
 THING = OWL + "Thing"
-EXPRESSIONS = """{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(isBlank(?value)) } UNION
-    { ?class owl:equivalentClass ?expression .
-      ?expression (owl:intersectionOf|owl:unionOf|owl:complementOf|owl:oneOf|owl:onProperty|owl:someValuesFrom
-                   |owl:allValuesFrom|rdf:first|rdf:rest)* ?node .
-      ?node ?property ?value . FILTER(isBlank(?node)) }"""
+INSIDE = "|".join(
+    f"<{OWL}{name}>"
+    for name in (
+        *(
+            "intersectionOf",
+            "unionOf",
+            "complementOf",
+            "oneOf",
+            "onProperty",
+            "someValuesFrom",
+            "allValuesFrom",
+            "onClass",
+        ),
+        *("onDataRange", "withRestrictions", "datatypeComplementOf"),
+    )
+)
+"""What leads from a class expression to what is nested inside, but for lists."""
+EXPRESSIONS = f"""{{ ?node owl:equivalentClass ?value . BIND(owl:equivalentClass AS ?property) FILTER(!isLiteral(?value)) }} UNION
+    {{ ?class owl:equivalentClass ?expression . ?expression ({INSIDE}|rdf:first|rdf:rest)* ?node .
+      ?node ?property ?value . FILTER(isBlank(?node)) }}"""
 """The part of a SPARQL query that yields every definition with what is nested inside, as (node, property, value)."""
 
 AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
-      FILTER(?property IN (owl:propertyChainAxiom, owl:inverseOf)
-        || (?property = rdf:type && ?value IN (owl:TransitiveProperty, owl:SymmetricProperty))) } UNION
-    { ?situation :valueProperty ?value . ?node ?property ?value . FILTER(?property IN (rdfs:subPropertyOf, owl:inverseOf))
+      FILTER(?property IN (owl:propertyChainAxiom, owl:inverseOf, owl:equivalentProperty)
+        || (?property = rdf:type && ?value IN (owl:TransitiveProperty, owl:SymmetricProperty, owl:ReflexiveProperty))) } UNION
+    { ?situation :valueProperty ?value . ?node ?property ?value .
+      FILTER(?property IN (rdfs:subPropertyOf, owl:equivalentProperty, owl:inverseOf))
       FILTER(isIRI(?node)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest* ?node . ?node ?property ?value .
       FILTER(?property IN (rdf:first, rdf:rest)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest*/rdf:first ?node . ?node ?property ?value .
       FILTER(?property = owl:inverseOf && isBlank(?node)) }"""
 """The part of a SPARQL query that yields what axioms say of value properties, as (node, property, value)."""
+
+MOST = 5
+"""How far a cardinality counts: trying who is who of more would take longer than any plan."""
+FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
 
 
 @dataclass(frozen=True)
@@ -69,11 +94,19 @@ class Definitions:
     nodes : mapping of node to property to values
     situations : mapping of value property to its situation type, and whether it is functional
     names : Names
+    numbers : set of properties that lead to numbers
+    kinds : mapping of property to the classes of subject and value, as names; "" where nothing says it
+    concluded : mapping of class to situation type and owner
+        Classes that SWRL rules conclude, the situation type that holds of each, and the class that has it, "" if several do
+        (`reasoner.reading.swrl`).
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
     situations: Mapping[str, tuple[str, bool]]
     names: Names
+    numbers: frozenset[str] = frozenset()
+    kinds: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
         """Tell whether a class is defined by situations, so that its individuals change."""
@@ -83,7 +116,7 @@ class Definitions:
     def _changing(self) -> frozenset[str]:
         """The named classes whose definition speaks of a value property, or of a class that does."""
         defined = {iri for iri, node in self.nodes.items() if not _blank(iri) and OWL + "equivalentClass" in node}
-        found: set[str] = set()
+        found: set[str] = set(self.concluded)
         while True:
             more = {iri for iri in defined - found if self._mentioned(iri) & (found | self.situations.keys())}
             if not more:
@@ -111,6 +144,14 @@ class Definitions:
         """Return the class that bounds a changing one: the first static class that its definition names as a part."""
         if not self.changes(iri):
             return iri
+        if iri in self.concluded:
+            situation, owner = self.concluded[iri]
+            if not owner:
+                raise KnowledgeError(
+                    f"{local_name(iri)} is used as a type, but {local_name(situation)} is a situation type of several classes or "
+                    "of none; let one class have it"
+                )
+            return owner
         expression = self._one_definition(iri)
         parts = self._list(expression, "intersectionOf") or [expression]
         for part in parts:
@@ -125,8 +166,18 @@ class Definitions:
         """Return what it takes for a term to be in a class: one class condition, or the definition of a changing class."""
         if not self.changes(iri):
             return (ClassCondition(term, self.names.short(iri), negated),)
-        found = tuple(self._expression(term, self._one_definition(iri)))
+        if iri in self.concluded:
+            return (ValueCondition(self.names.short(self.concluded[iri][0]), (term,), TRUE, negated),)
+        found = tuple(self.expression(term, self._one_definition(iri)))
         return (_negation(found),) if negated else found
+
+    def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
+        """Return what makes a situation type hold of a class's individuals, besides what SWRL rules conclude of them."""
+        if iri not in self.concluded:
+            return self.conditions(term, iri)
+        if self._definitions(iri):
+            return tuple(self.expression(term, self._one_definition(iri)))
+        return (ClassCondition(term, self.names.short(iri)),)
 
     def condition(self, term: str, iri: str, negated: bool = False) -> Condition:
         """Return the same as one condition."""
@@ -164,13 +215,16 @@ class Definitions:
         inverses += [prop] if OWL + "SymmetricProperty" in types and (found or more) else []
         for other in dict.fromkeys(inverses):
             if other != prop or found or more:
-                found.append(self._rule(situation, kinds, (self._related(other, "?to", "?from"),), ()))
+                found.append(self._rule(situation, kinds, (self.related(other, "?to", "?from"),), ()))
+        if OWL + "ReflexiveProperty" in types:
+            found.append(self._rule(situation, kinds, (EqualityCondition("?from", "?to"),), ()))
         return found
 
     def _below(self, prop: str) -> list[str]:
-        """Return the properties that are said to be sub-properties of one."""
-        nodes = self.nodes.items()
-        return sorted(iri for iri, node in nodes if iri != prop and prop in node.get(RDFS + "subPropertyOf", ()))
+        """Return the properties that are said to be sub-properties of one, or equivalent to it."""
+        nodes, said = self.nodes.items(), (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+        found = {iri for iri, node in nodes for name in said if prop in node.get(name, ())}
+        return sorted((found | {*self.nodes.get(prop, {}).get(said[1], ())}) - {prop})
 
     def _inverses(self, prop: str) -> list[str]:
         return sorted(
@@ -183,9 +237,9 @@ class Definitions:
 
         def rest(place: int, one: str) -> tuple[Condition, ...]:
             if place == len(way) - 1:
-                return (self._related(way[place], one, "?to"),)
+                return (self.related(way[place], one, "?to"),)
             middle, kind = f"?middle{place}", self._between(way[place], way[place + 1])
-            link = self._related(way[place], one, middle)
+            link = self.related(way[place], one, middle)
             inner = rest(place + 1, middle)
             if isinstance(link, ValueCondition) and link.value == middle:
                 variables.append(Parameter(middle, kind))
@@ -202,10 +256,10 @@ class Definitions:
 
     def _between(self, one: str, other: str) -> str:
         """Return the class of what stands between two properties of a chain: the values of the first one."""
-        for prop in (one, other):
+        for prop, at_its_end in ((one, True), (other, False)):
             iri, inverse = self._named(prop)
-            if iri in self.situations and inverse is (prop == other):
-                return self.names.short(self.situations[iri][0])
+            if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
+                return kind
         raise KnowledgeError(
             f"the chain of {local_name(self._named(one)[0])} and {local_name(self._named(other)[0])} leads over individuals of "
             "which nothing says the class; write it as a :Rule with a :Witness"
@@ -213,7 +267,7 @@ class Definitions:
 
     # -------------------------------------------------------------------------------------------------- class expressions
 
-    def _expression(self, term: str, node: str) -> Iterator[Condition]:
+    def expression(self, term: str, node: str) -> Iterator[Condition]:
         """Yield the conditions, all of which must hold, that a class expression stands for."""
         if not _blank(node):
             if node != THING:
@@ -222,16 +276,22 @@ class Definitions:
         said = self.nodes.get(node, {})
         if OWL + "intersectionOf" in said:
             for part in self._list(node, "intersectionOf"):
-                yield from self._expression(term, part)
+                yield from self.expression(term, part)
         elif OWL + "unionOf" in said:
-            yield AnyOf(tuple(tuple(self._expression(term, part)) for part in self._list(node, "unionOf")))
+            yield AnyOf(tuple(tuple(self.expression(term, part)) for part in self._list(node, "unionOf")))
         elif OWL + "complementOf" in said:
-            yield _negation(tuple(self._expression(term, said[OWL + "complementOf"][0])))
+            yield _negation(tuple(self.expression(term, said[OWL + "complementOf"][0])))
         elif OWL + "oneOf" in said:
             members = [self.names.short(member) for member in self._list(node, "oneOf")]
             yield AnyOf(tuple((EqualityCondition(term, member),) for member in members))
+        elif self._named(said.get(OWL + "onProperty", [""])[0])[0] in self.numbers:
+            yield self._numbers(said, term)
         elif OWL + "hasValue" in said:
-            yield self._related(said[OWL + "onProperty"][0], term, self.names.short(said[OWL + "hasValue"][0]))
+            yield self.related(said[OWL + "onProperty"][0], term, self.names.short(said[OWL + "hasValue"][0]))
+        elif OWL + "hasSelf" in said:
+            yield self.related(said[OWL + "onProperty"][0], term, term)
+        elif bounds := self._cardinality(said):
+            yield from self._counted(said[OWL + "onProperty"][0], term, said.get(OWL + "onClass", [THING])[0], *bounds)
         elif OWL + "someValuesFrom" in said:
             yield self._some(said[OWL + "onProperty"][0], term, said[OWL + "someValuesFrom"][0], outside=False)
         elif OWL + "allValuesFrom" in said:
@@ -239,13 +299,99 @@ class Definitions:
         else:
             raise KnowledgeError(
                 "a class defined by situations uses a kind of OWL expression that doesn't become a condition; "
-                "use and, or, not, value, some, only and {…}"
+                "use and, or, not, value, some, only, min, max, exactly, Self and {…}"
             )
 
-    def _some(self, prop: str, term: str, filler: str, outside: bool) -> Witness:
-        """Return that some value is in a class, or (`outside`) that none is outside it."""
+    @staticmethod
+    def _cardinality(said: Mapping[str, Sequence[str]]) -> tuple[int, int | None] | None:
+        """Return how many values a restriction asks for, at least and at most; None if it isn't one of number."""
+        for name in ("cardinality", "qualifiedCardinality"):
+            capital = name[0].upper() + name[1:]
+            found = [said.get(OWL + one, [""])[0] for one in (name, f"min{capital}", f"max{capital}")]
+            if any(found):
+                exactly, least, most = (int(one) if one.isdigit() else None for one in found)
+                if exactly is not None:
+                    return exactly, exactly
+                return least or 0, most
+        return None
+
+    def _counted(self, prop: str, term: str, filler: str, least: int, most: int | None) -> Iterator[Condition]:
+        """Yield that so many values are in a class, at least and at most."""
+        if max(least, -1 if most is None else most) > MOST:
+            raise KnowledgeError(
+                f"a definition counts up to {max(least, most or 0)} values of {local_name(self._named(prop)[0])}; planning counts "
+                f"up to {MOST}: say it by an amount, which behaviours change"
+            )
+        if least:
+            yield self._some(prop, term, filler, outside=False, others=least - 1)
+        if most is not None:
+            yield replace(self._some(prop, term, filler, outside=False, others=most), negated=True)
+
+    def _numbers(self, said: Mapping[str, Sequence[str]], term: str) -> Condition:
+        """Return what a restriction says of an amount, or of the number that a relation gives."""
+        prop = said[OWL + "onProperty"][0]
+        amount = self.number(prop, term)
+        there = Comparison(amount, "=", amount)
+        if OWL + "hasValue" in said:
+            return Comparison(amount, "=", self._exact(prop, said[OWL + "hasValue"][0]))
+        if OWL + "someValuesFrom" in said:
+            within = self._data_range(prop, amount, said[OWL + "someValuesFrom"][0])
+            return within[0] if len(within) == 1 else AnyOf((within or (there,),))
+        if OWL + "allValuesFrom" in said:
+            within = self._data_range(prop, amount, said[OWL + "allValuesFrom"][0])
+            return AnyOf(((replace(there, negated=True),), within))
+        raise KnowledgeError(
+            f"a class is defined by how many numbers {local_name(prop)} leads to; an amount is one number: use some or value"
+        )
+
+    def _data_range(self, prop: str, amount: Expression, node: str) -> tuple[Condition, ...]:
+        """Return the conditions, all of which must hold, for an amount to be in a data range."""
+        said = self.nodes.get(node, {})
+        if not said:
+            return (Comparison(amount, "=", amount),)  # a datatype
+        if OWL + "withRestrictions" in said:
+            found: list[Condition] = []
+            for facet in self._items(*said[OWL + "withRestrictions"], name="withRestrictions"):
+                for name, values in self.nodes.get(facet, {}).items():
+                    if local_name(name) not in FACETS:
+                        raise KnowledgeError(
+                            f"{local_name(prop)}: the facet {local_name(name)} says nothing of a number"
+                        )
+                    found.append(Comparison(amount, FACETS[local_name(name)], self._exact(prop, values[0])))
+            return tuple(found)
+        if OWL + "intersectionOf" in said:
+            return tuple(c for part in self._list(node, "intersectionOf") for c in self._data_range(prop, amount, part))
+        if OWL + "unionOf" in said:
+            return (AnyOf(tuple(self._data_range(prop, amount, part) for part in self._list(node, "unionOf"))),)
+        if OWL + "oneOf" in said:
+            numbers = [self._exact(prop, one) for one in self._list(node, "oneOf")]
+            return (AnyOf(tuple((Comparison(amount, "=", one),) for one in numbers)),)
+        if OWL + "datatypeComplementOf" in said:
+            return (_negation(self._data_range(prop, amount, said[OWL + "datatypeComplementOf"][0])),)
+        raise KnowledgeError(
+            f"a definition says of {local_name(prop)} what no number is compared with; use decimal[>= 2]"
+        )
+
+    @staticmethod
+    def _exact(prop: str, said: str) -> Expression:
+        found = exact(said)
+        if found is None:
+            raise KnowledgeError(f"{local_name(prop)} is compared with '{said[:40]}'; wanted a number, like 2 or 1.5")
+        return found
+
+    def number(self, prop: str, term: str) -> Expression:
+        """Return the number that a property gives of a term."""
+        if prop not in self.situations:
+            return Measure(self.names.short(prop), (term,))
+        return Amount(self.names.short(self.situations[prop][0]), (term,))
+
+    def _some(
+        self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
+    ) -> Witness:
+        """Return that some value is in a class (so many `others` besides), or (`outside`) that none is outside it."""
         variable = f"{term if term.startswith('?') else '?' + term}_{local_name(self._named(prop)[0])}"
-        inside = tuple(self._expression(variable, filler))
+        variable += str(len(before) + 1) if before else ""
+        inside = tuple(self.expression(variable, filler))
         if outside:
             inside = (_negation(inside),)
             kind = self._range(prop)
@@ -253,18 +399,22 @@ class Definitions:
             kind = self.names.short(self.base(filler)) if not _blank(filler) and filler != THING else self._range(prop)
             if inside and inside[0] == ClassCondition(variable, kind):
                 inside = inside[1:]
-        return Witness(variable, kind, (self._related(prop, term, variable), *inside), negated=outside)
+        inside += tuple(EqualityCondition(variable, other, negated=True) for other in before)
+        if others:
+            inside += (self._some(prop, term, filler, outside, others - 1, (*before, variable)),)
+        return Witness(variable, kind, (self.related(prop, term, variable), *inside), negated=outside)
 
     def _range(self, prop: str) -> str:
         """Return the class of what a property leads to: the situation type, for a value property."""
         iri, inverse = self._named(prop)
-        if iri not in self.situations or inverse:
+        kind = self.kinds.get(iri, ("", ""))[not inverse]
+        if not kind:
             raise KnowledgeError(
                 f"'{local_name(iri)} some' and 'only' need a named class behind them here; name one in the definition"
             )
-        return self.names.short(self.situations[iri][0])
+        return kind
 
-    def _related(self, prop: str, term: str, value: str) -> Condition:
+    def related(self, prop: str, term: str, value: str) -> Condition:
         """Return that a property relates a term to a value."""
         iri, inverse = self._named(prop)
         one, other = (value, term) if inverse else (term, value)

@@ -27,6 +27,7 @@ import pyoxigraph as ox
 
 from reasoner.amounts import (
     COMPARING,
+    DECIMAL,
     OPERATIONS,
     Amount,
     Calculation,
@@ -34,12 +35,14 @@ from reasoner.amounts import (
     Measure,
     Quantity,
     bounds_written,
+    exact,
     inside,
     written,
 )
 from reasoner.derivation import circles, needed
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, Term, text
 from reasoner.names import Names, local_name, nearest
+from reasoner.reading import swrl
 from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
 from reasoner.symbols import (
     FALSE,
@@ -61,7 +64,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, OWL, TYPE
+from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, TYPE
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
@@ -98,6 +101,7 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   UNION {{ ?node a owl:Ontology . BIND("ontology" AS ?part) BIND(rdf:type AS ?property) BIND(owl:Ontology AS ?value) }}
   UNION {{ {EXPRESSIONS} BIND("expression" AS ?part) }}
   UNION {{ {AXIOMS} BIND("axiom" AS ?part) }}
+  UNION {{ {swrl.RULES} BIND("swrl" AS ?part) }}
 }}"""
 """What every planning call in a world needs, in one round trip; ``tuples`` says that there are facts with nodes of their own.
 
@@ -125,7 +129,6 @@ DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumb
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 """What the core says of its nodes in numbers, signs, truth values and text; all else that it says leads to other nodes."""
 SIGNS = ("+", "-", "*", "/")
-DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})?")
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """What is wanted of an amount, as people write it."""
 HIGHEST_LEVEL = 1_000
@@ -163,8 +166,8 @@ class Schema:
     `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
     property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
     facts are nodes of their own, and `facts` has those about nobody;
-    `expressions` are the definitions of classes, `axioms` what is said of value properties; `ontologies` the IRIs of what was
-    loaded.
+    `expressions` are the definitions of classes, `axioms` what is said of value properties, `swrl` the rules; `ontologies` the
+    IRIs of what was loaded.
     """
 
     nodes: Mapping[str, Node]
@@ -177,6 +180,7 @@ class Schema:
     tuples: bool
     expressions: Mapping[str, Node]
     axioms: Mapping[str, Node]
+    swrl: Mapping[str, Node]
     ontologies: Sequence[str]
 
     @cached_property
@@ -249,6 +253,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         tuples=bool(parts["tuples"]),
         expressions=_nodes(parts["expression"]),
         axioms=_nodes(parts["axiom"]),
+        swrl=_nodes(parts["swrl"]),
         ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
     )
 
@@ -315,7 +320,7 @@ def frame(
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
         }
     )
-    definitions = Definitions({**schema.expressions, **schema.axioms}, _value_properties(schema), names)
+    definitions = _definitions(schema, names)
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
     classes, parents = _classes(instances, supers, names)
@@ -490,9 +495,10 @@ def decimal(text: str, what: str) -> Fraction:
     KnowledgeError
         It is none.
     """
-    if not DECIMAL.fullmatch(text):
+    found = exact(text)
+    if found is None:
         raise KnowledgeError(f"{what} is '{text[:40]}'; wanted a number, like 2 or 1.5")
-    return Fraction(text)
+    return found
 
 
 def index_of(iri: str, index: str) -> int:
@@ -866,11 +872,12 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
     written: dict[str, list[str]] = defaultdict(list)
     for iri in schema.of_kind("Rule"):
         written[parts.one(iri, "situationType")].append(iri)
+    arguments = {iri: situations[parts.names.short(iri)].arguments for iri in schema.of_kind("SituationType")}
+    by_swrl = swrl.compiled(parts.definitions, arguments) if schema.swrl else {}
     found: dict[str, tuple[Rule, ...]] = {}
-    for iri in schema.of_kind("SituationType"):
-        name = parts.names.short(iri)
-        kinds, said = situations[name].arguments, parts.values(iri, "holdsOf")
-        if by := [*written[iri], *said]:
+    for iri, kinds in arguments.items():
+        name, said = parts.names.short(iri), parts.values(iri, "holdsOf")
+        if by := [*written[iri], *said, *(["SWRL"] if iri in by_swrl else [])]:
             if iri in changed:
                 who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
                 raise KnowledgeError(
@@ -881,10 +888,10 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
                     f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false: "
                     "make its value property not functional"
                 )
-        rules = [parts.rule(rule, kinds) for rule in written[iri]]
+        rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
-            rules.append(Rule(name, head, (), parts.definitions.conditions("?it", kind)))
+            rules.append(Rule(name, head, (), parts.definitions.holding("?it", kind)))
         if iri not in changed and iri in schema.pairs:
             for prop in parts.values(iri, "valueProperty"):
                 rules += parts.definitions.rules(prop, name, kinds, bool(rules))
@@ -911,6 +918,28 @@ def _on_their_levels(
             read = {s for rule in its for s, _ in needed(rule.conditions)} | {name}
             known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))
     yield from known.values()
+
+
+def _definitions(schema: Schema, names: Names) -> Definitions:
+    """Return what defines classes and situation types, with the kinds of what the properties in it lead from and to."""
+    properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
+    owners: dict[str, list[str]] = defaultdict(list)
+    for kind, situation in schema.owners:
+        owners[situation].append(kind)
+    for prop, (situation, _) in properties.items():
+        kinds[prop] = "|".join(map(names.short, owners[situation])), names.short(situation)
+    for iri in schema.of_kind("Relation", "ReachRelation"):
+        ends = (schema.nodes[iri].get(RDFS + end, ()) for end in ("domain", "range"))
+        one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] else "" for end in ends)
+        kinds[iri] = one, other
+    concluded = {}
+    of_rules = swrl.heads(schema.swrl) if schema.swrl else ()
+    for iri in schema.of_kind("SituationType") if of_rules else ():
+        for kind in schema.nodes[iri].get(CORE + "holdsOf", ()):
+            if kind in of_rules:
+                concluded[kind] = iri, owners[iri][0] if len(owners[iri]) == 1 else ""
+    nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
+    return Definitions(nodes, properties, names, schema.numbers, kinds, concluded)
 
 
 def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:

@@ -41,6 +41,7 @@ from reasoner.reading.problem import (
     stated,
     with_goals,
 )
+from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -525,6 +526,10 @@ def _constants(schema: Schema) -> set[str]:
     found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
     named = (OWL + "hasValue", RDF + "first")
     found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}
+    if schema.swrl:
+        known = {*schema.swrl, *schema.supers, *chain.from_iterable(schema.supers.values())}
+        said = (*named, *(SWRL + f"argument{place}" for place in (1, 2)))
+        found |= {v for node in schema.swrl.values() for name in said for v in node.get(name, ()) if ":" in v} - known
     return (found - set(schema.nodes)) | {CORE + "true", CORE + "false"}
 
 

@@ -1,0 +1,115 @@
+"""Definitions in random states: what search and checker derive, each by itself, beside what HermiT entails.
+
+python -m benchmarks entailed
+CONFAB_STATES=10000 …        how many states; 10,000 take an hour of one core
+CONFAB_SEED=0 …              the first one's seed
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from os import times
+from pathlib import Path
+from random import Random
+from time import process_time
+
+from planner.hierarchical.operators import Program
+from planner.transitions import Table, key_of
+from planner.validation import Facts
+from reasoner.amounts import written
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import decimal, read
+from reasoner.symbols import TRUE, Problem, Symbol
+from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, random_state
+
+BATCH = 500
+SITUATIONS = {"liesIn": "LIES_IN", "cleanliness": "CLEANLINESS", "holds": "HOLDS", "weight": "WEIGHT"}
+NAMES = {"INSIDE": "isInside", "CONTAINS": "contains", "ON_FLOOR": "onFloor", "SEES": "sees", "LINKED": "linked"}
+NAMES |= {situation: kind[1:] for situation, (kind, _) in DEFINED.items()}
+NAMES |= {situation: kind[1:] for situation, kind in CONCLUDED.items()}
+
+Derived = set[tuple[str, ...]]
+
+
+def first_problem() -> Problem:
+    """Return the world of `LOGIC` as planning reads it from a file, in some state."""
+    with tempfile.TemporaryDirectory() as folder:
+        said = [
+            f":{one} :{prop} {other if prop == 'weight' else ':' + other} ."
+            for one, prop, other in random_state(Random(0))
+        ]
+        path = Path(folder) / "yard.ttl"
+        path.write_text("\n".join([domain(), *said]), encoding="utf-8")
+        return read(load(path)).problem
+
+
+def in_state(problem: Problem, facts: list[tuple[str, str, str]]) -> Problem:
+    """Return the problem in another state."""
+    relations: dict[str, frozenset[tuple[str, ...]]] = {
+        name: frozenset((one, other) for one, prop, other in facts if prop == name) for name in ("partOf", "near")
+    }
+    initial = {}
+    for one, prop, other in facts:
+        if prop == "holds":
+            initial[Symbol("HOLDS", (one, other))] = TRUE
+        elif prop in SITUATIONS:
+            value = written(decimal(other, prop)) if prop == "weight" else other
+            initial[Symbol(SITUATIONS[prop], (one,))] = value
+    return replace(problem, relations=relations, initial=initial)
+
+
+def derived(problem: Problem) -> Iterator[tuple[str, Derived]]:
+    """Yield what each evaluator derives in the initial state, with its name."""
+    situations = problem.domain.situations
+    defined = [
+        Symbol(name, arguments)
+        for name in problem.domain.rules
+        for arguments in product(*(problem.classes[kind] for kind in situations[name].arguments))
+    ]
+    table = Table(problem.domain.situations, problem.initial)
+    Program(problem).bind(table, {})
+    facts = Facts(problem, problem.initial)
+    yield "search", {_row(s) for s in defined if table.now[s.situation].get(key_of(s.arguments)) == TRUE}
+    yield "checker", {_row(s) for s in defined if facts.value(s.situation, s.arguments) == TRUE}
+
+
+def _row(symbol: Symbol) -> tuple[str, ...]:
+    return NAMES[symbol.situation], *symbol.arguments
+
+
+def compared(problem: Problem, seeds: range) -> tuple[Counter[str], Mapping[str, list[str]]]:
+    """Return how often each definition was true in some states, and for each evaluator where it differs from HermiT."""
+    states = [random_state(Random(seed)) for seed in seeds]
+    truths = entailed([asserted(facts) for facts in states])
+    true: Counter[str] = Counter()
+    wrong: dict[str, list[str]] = {}
+    for seed, facts, truth in zip(seeds, states, truths, strict=True):
+        true.update(name for name, *_ in truth)
+        for who, found in derived(in_state(problem, facts)):
+            wrong.setdefault(who, [])
+            wrong[who] += [f"seed {seed}: {' '.join(row)}" for row in sorted(found ^ truth)]
+    return true, wrong
+
+
+def main() -> None:
+    """Print how many states agree, and what doesn't."""
+    count, first = int(os.environ.get("CONFAB_STATES", "10000")), int(os.environ.get("CONFAB_SEED", "0"))
+    problem, true, wrong, done = first_problem(), Counter[str](), dict[str, list[str]](), 0
+    began, java = process_time(), times().children_user
+    for start in range(first, first + count, BATCH):
+        seeds = range(start, min(start + BATCH, first + count))
+        more, others = compared(problem, seeds)
+        true, done = true + more, done + len(seeds)
+        wrong = {who: wrong.get(who, []) + others[who] for who in others}
+        print(f"{done} states, {process_time() - began:.0f} + {times().children_user - java:.0f} CPU s", flush=True)
+    print(f"\n| definition | true of, in {done} states |\n|---|---|")
+    for name, many in sorted(true.items()):
+        print(f"| {name} | {many} |")
+    print("\n| evaluator | facts that differ from HermiT's entailments |\n|---|---|")
+    for who, faults in wrong.items():
+        print(f"| {who} | {len(faults)} {'; '.join(faults[:5])} |")

@@ -1,0 +1,148 @@
+"""Definitions of every kind in one small world: held against HermiT in random states, planned with, and refused where need be."""
+
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from benchmarks.entailed import NAMES, compared, derived, first_problem, in_state
+from planner.solve import Request, solve
+from planner.validation import Facts
+from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.reading.problem import read, with_goals
+from reasoner.reading.relevance import recognise
+from reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
+from tests.planner import naive
+from worlds.entailed import CONCLUDED, DEFINED, PROPERTIES, domain, implies, random_state
+from worlds.owlapi import jars, jvm
+
+PUT = """
+:PUT a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update
+  "INSERT { ?thing :liesIn ?place } WHERE { ?thing a :Thing . ?place a :Place FILTER(?thing != ?place) }" .
+"""
+STATE = """
+:box1 :liesIn :room1 ; :weight 5 ; :cleanliness :clean . :box2 :liesIn :room1 ; :weight 1.5 ; :cleanliness :dirty .
+:box3 :liesIn :room2 ; :weight 7 ; :cleanliness :clean . :cup1 :liesIn :room2 ; :cleanliness :clean .
+:cup2 :liesIn :room2 ; :cleanliness :dirty . :cup3 :liesIn :room1 ; :cleanliness :clean .
+:hand1 :near :room1 . :room1 :partOf :floor1 . :room2 :partOf :floor2 .
+"""
+Yard = Callable[[str], Path]
+
+
+@pytest.fixture
+def yard(tmp_path: Path) -> Yard:
+    def written(more: str = "") -> Path:
+        path = tmp_path / "yard.ttl"
+        path.write_text("\n".join([domain(), PUT, STATE, more]), encoding="utf-8")
+        return path
+
+    return written
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not jars() or jvm() is None, reason="HermiT comes with the extra owlapi")
+def test_what_planning_derives_is_what_hermit_entails() -> None:
+    true, wrong = compared(first_problem(), range(12))
+    assert set(true) == {kind[1:] for kind, _ in DEFINED.values()} | {k[1:] for k in CONCLUDED.values()} | {*PROPERTIES}
+    assert wrong == {"search": [], "checker": []}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_planning_derives_is_what_a_plain_reading_gives(seed: int) -> None:
+    problem = in_state(first_problem(), random_state(Random(seed)))
+    truth = naive.complete(problem)
+    plain = {s for s in truth if s.situation in problem.domain.rules and truth[s] == "true"}
+    for _, found in derived(problem):
+        assert found == {(NAMES[s.situation], *s.arguments) for s in plain}
+
+
+@pytest.mark.parametrize(
+    ("goal", "steps"),
+    [
+        ("box2 CROWDED", 2),
+        ("room2 SPARSE", 2),
+        ("cup2 GUARDED", 1),
+        ("hand1 SEES cup1", 1),
+        ("cup1 ON_FLOOR floor1", 1),
+        ("box2 DEEP", 1),
+        ("room1 CONTAINS cup2", 1),
+    ],
+)
+def test_plans_lead_to_what_is_defined(yard: Yard, goal: str, steps: int) -> None:
+    for reading in (read(load(yard(""))), recognise(load(yard("")), [goal])):
+        plan = solve(Request(with_goals(reading, [goal]))).plan
+        assert plan is not None
+        assert len(plan.steps) == steps
+
+
+def rules(path: Path, situation: str) -> tuple[Rule, ...]:
+    return read(load(path)).problem.domain.rules[situation]
+
+
+def test_a_variable_is_determined_by_a_value_and_else_sought(yard: Yard) -> None:
+    more = implies(":sees ?h ?x", ":liesIn ?x ?p", ":liesIn ?y ?p", ":near ?h ?p", "different ?x ?y", ":Cup ?y")
+    rule = next(rule for rule in rules(yard(more), "SEES") if len(rule.conditions) == 3)
+    assert [term.name for term in rule.variables] == ["?p"]
+    value, near, witness = rule.conditions
+    assert value == ValueCondition("LIES_IN", ("?x",), "?p")
+    assert near == RelationCondition("near", ("?h", "?p"))
+    assert isinstance(witness, Witness)
+    assert (witness.variable, witness.kind) == ("?y", "Cup")
+    assert set(witness.conditions) == {
+        EqualityCondition("?x", "?y", negated=True),
+        ValueCondition("LIES_IN", ("?y",), "?p"),
+    }
+
+
+BUILT_IN = "http://www.w3.org/2003/11/swrlb#"
+
+
+def counted(built_in: str, number: str) -> str:
+    """Return a rule: a box is guarded whose weight, added to itself, compares so with a number."""
+    x, w, s = (f"<urn:swrl:var#{name}>" for name in "xws")
+
+    def atoms(*said: str) -> str:
+        return "rdf:nil" if not said else f"[ a swrl:AtomList ; rdf:first {said[0]} ; rdf:rest {atoms(*said[1:])} ]"
+
+    body = atoms(
+        f"[ a swrl:DatavaluedPropertyAtom ; swrl:propertyPredicate :weight ; swrl:argument1 {x} ; swrl:argument2 {w} ]",
+        f"[ a swrl:BuiltinAtom ; swrl:builtin <{BUILT_IN}add> ; swrl:arguments ( {s} {w} {w} ) ]",
+        f"[ a swrl:BuiltinAtom ; swrl:builtin <{BUILT_IN}{built_in}> ; swrl:arguments ( {s} {number} ) ]",
+    )
+    head = atoms(f"[ a swrl:ClassAtom ; swrl:classPredicate :Guarded ; swrl:argument1 {x} ]")
+    declared = "".join(f"{v} a swrl:Variable . " for v in (x, w, s))
+    return f'{declared}[ a swrl:Imp ; rdfs:label "by weight" ; swrl:body {body} ; swrl:head {head} ] .'
+
+
+@pytest.mark.parametrize(
+    ("built_in", "guarded"),
+    [("greaterThan", False), ("greaterThanOrEqual", True), ("equal", True), ("notEqual", False), ("lessThan", False)],
+)
+def test_amounts_are_computed_and_compared(yard: Yard, built_in: str, guarded: bool) -> None:
+    problem = read(load(yard(counted(built_in, "14")))).problem
+    assert (Facts(problem, problem.initial).value("GUARDED", ("box3",)) == "true") is guarded
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (implies(":sees ?h ?x", ":Hand ?h"), r"Hand\(\?h\) -> sees\(\?h, \?x\): the variable \?x of its head is in no atom"),
+        (implies(":liesIn ?x :box1", ":Cup ?x"), "concludes liesIn, whose values follow from nothing since it is functional"),
+        (implies(":Cup ?x", ":Box ?x"), "concludes Cup, and no situation type holds of that class"),
+        (implies(":near ?h ?p", ":Hand ?h", ":Room ?p"), "concludes near; planning concludes classes"),
+        (implies(":sees ?h ?x", ":knows ?h ?x"), "knows is neither the value property of a situation type nor a relation"),
+        (counted("matches", "14"), "'by weight': planning doesn't evaluate swrlb:matches"),
+        (counted("equal", "<urn:swrl:var#x>"), r"nothing says which number \?x is"),
+    ],
+)  # fmt: skip
+def test_a_rule_that_planning_doesnt_evaluate_is_refused_with_its_mend(yard: Yard, more: str, said: str) -> None:
+    with pytest.raises(KnowledgeError, match=said):
+        read(load(yard(more)))
+
+
+def test_a_class_counts_up_to_five(yard: Yard) -> None:
+    path = yard("")
+    path.write_text(path.read_text().replace('"2"^^xsd:nonNegativeInteger', '"9"^^xsd:nonNegativeInteger'))
+    with pytest.raises(KnowledgeError, match=r"counts up to 9 values of \w+; planning counts up to 5"):
+        read(load(path))
