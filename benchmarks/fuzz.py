@@ -129,6 +129,7 @@ def _recorded() -> list[Result]:
     from rdflib.plugins.sparql.algebra import translateQuery
     from rdflib.plugins.sparql.parser import parseQuery
 
+    from confab import engines
     from confab.scene import Scene
 
     results: list[Result] = []
@@ -149,6 +150,7 @@ def _recorded() -> list[Result]:
         (Scene, "plan", noted),
         (sparql, "parseQuery", str),
         (sparql, "translateQuery", translated_once),
+        (engines, "some_installed", functools.cache(engines.some_installed)),
     ):
         setattr(place, name, new)
     return results

@@ -7,6 +7,8 @@ python -m benchmarks.kills save 20  so many for one
 from __future__ import annotations
 
 import json
+import math
+import mmap
 import os
 import random
 import signal
@@ -15,8 +17,9 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
+from types import FrameType
 
 import pyoxigraph as ox
 
@@ -39,8 +42,17 @@ LEARNING = ("learn", "execute", "run")
 """What adds an episode."""
 
 
-def killed(write: Callable[[], object], after: float | None) -> bool:
-    """Run something in a process of its own and kill it after some seconds, if any; return whether it had ended by itself."""
+def killed(write: Callable[[], object], after: float = math.inf, call: float = math.inf) -> tuple[bool, float, int]:
+    """Run something in a process of its own; kill it after so many seconds of CPU time, or at one of its calls.
+
+    Returns
+    -------
+    bool
+        Whether it had ended well by itself.
+    float, int
+        CPU seconds that it had, and calls of functions that it made, where `call` was given.
+    """
+    made = mmap.mmap(-1, 8)  # shared with the child
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
         child = os.fork()
@@ -48,17 +60,43 @@ def killed(write: Callable[[], object], after: float | None) -> bool:
         code = 1
         try:
             with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+                if call != math.inf or after == math.inf:
+                    sys.setprofile(_counting(made, call))
                 write()
             code = 0
         except SystemExit as end:
             code = int(end.code or 0)
         finally:
             os._exit(code)
-    if after is not None:
-        time.sleep(after)
-        os.kill(child, signal.SIGKILL)
-    _, state = os.waitpid(child, 0)
-    return os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
+    while (ended := os.wait4(child, os.WNOHANG))[0] == 0:
+        if spent(child) >= after:
+            os.kill(child, signal.SIGKILL)
+            ended = os.wait4(child, 0)
+            break
+        time.sleep(0.0005 if after < math.inf else 0.02)
+    _, state, used = ended
+    well = os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
+    return well, used.ru_utime + used.ru_stime, int.from_bytes(made[:8], "little")
+
+
+def _counting(made: mmap.mmap, last: float) -> Callable[[FrameType, str, object], None]:
+    """Return what counts calls, of Python's functions and of C's, and ends the process at the last."""
+    so_far = 0
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal so_far
+        so_far += 1
+        if so_far >= last:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if last == math.inf:
+            made[:8] = so_far.to_bytes(8, "little")
+
+    return count
+
+
+def spent(process: int) -> float:
+    """Return the seconds of CPU time that a process has had, finer than the clock ticks of its usage."""
+    return int(Path(f"/proc/{process}/schedstat").read_text().split()[0]) / 1e9
 
 
 def learn(file: Path, number: int) -> None:
@@ -101,10 +139,10 @@ def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
         scene = confab_scene(where)
         memory = Memory.of(scene)
         memory.experience = Experience("me", {"me": 1})
+        memory.teach(scene, result := scene.plan())  # rules, orders and methods, as a memory of today has them
         memory.save(file)
         memory.experience = Experience("you", {"you": 7})
         memory.save(other)
-        result = scene.plan()
         writes: dict[str, Callable[[int], object]] = {
             "learn": lambda number: learn(file, number),
             "merge": lambda _: confab(["memory", "merge", str(file), str(other), "-o", str(file)]),
@@ -115,12 +153,17 @@ def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
             "run": lambda _: confab(["run", where, "--no-video", "--memory", str(file), "--out", str(folder / "out")]),
         }
         learn(file, -1)
-        begin = time.monotonic()
-        killed(lambda: writes[command](-2), None)
-        long = 1.2 * (time.monotonic() - begin)  # at the latest it is killed a little after it has ended
+        with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), suppress(SystemExit):
+            writes[command](-2)  # imports what it needs, once for all
+        well, seconds, calls = killed(lambda: writes[command](-3))
+        assert well, f"{command} doesn't work at all"
+        _, seconds, _ = killed(lambda: writes[command](-4), after=1e9)
         acknowledged = Memory.load(file).experience.episodes["me"]
         for number in range(kills):
-            if killed(lambda number=number: writes[command](number), draw.uniform(0.0, long)):  # type: ignore[misc]
+            # half of them at any time, half while or after the files are written, which comes last
+            when = draw.choice((draw.uniform(0.0, 1.1), draw.uniform(0.9, 1.05)))
+            moment = {"after": seconds * when} if number % 2 else {"call": calls * when}
+            if killed(lambda number=number: writes[command](number), **moment)[0]:  # type: ignore[misc]
                 done += 1
                 acknowledged += command in LEARNING
             found = Memory.load(file).experience.episodes["me"]

@@ -20,7 +20,7 @@ from reasoner.memory.experience_file import Lines, lines
 from reasoner.memory.links import Links
 from reasoner.names import Names
 from reasoner.symbols import FALSE, TRUE, Symbol
-from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF, RDFS, XSD
+from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, RDFS, XSD
 
 ASSERTED = """
 SELECT DISTINCT ?node ?property ?value WHERE {
@@ -84,8 +84,11 @@ def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
     ]
     if not scenes:
         raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
-    terms = [text(row[2]) for row in graph.select(ASSERTED) if isinstance(row[2], ox.NamedNode)]
-    return scenes[0], Names(terms)
+    return scenes[0], Names(
+        text(term)
+        for said, term in graph.select("SELECT DISTINCT ?said ?term WHERE { ?node ?said ?term FILTER(isIRI(?term)) }")
+        if text(said).startswith(CORE) and not text(term).startswith(MEMORY)  # what links and rules speak of
+    )
 
 
 def save_links(path: Path, links: Links, names: Names, scene: str) -> None:

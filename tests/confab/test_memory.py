@@ -10,12 +10,14 @@ import rdflib
 from click.testing import CliRunner
 
 import confab
+from confab.authoring import unknown_terms
 from confab.cli import app
 from planner.acting.episode import Failure
 from planner.plan import Plan
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
+from reasoner.memory.links_file import memory_lines
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +41,20 @@ def test_trust_is_kept_in_the_file_and_not_passed_on(tmp_path: Path, scene: conf
     third = confab.Memory.of(scene)
     third.merge(confab.Memory.load(tmp_path / "memory.ttl", scene))
     assert not third.advisor.trusted
+
+
+def test_a_memory_that_is_looked_after_without_its_scene_still_speaks_of_its_terms(
+    tmp_path: Path, scene: confab.Scene
+) -> None:
+    file, other = tmp_path / "memory.ttl", tmp_path / "other.ttl"
+    memory = confab.Memory.of(scene)
+    memory.teach(scene, scene.plan())
+    memory.save(file)
+    confab.Memory.of(scene).save(other)
+    for arguments in (["trust", file, "all"], ["merge", file, other, "-o", file]):
+        assert CliRunner().invoke(app, ["memory", *map(str, arguments)]).exit_code == 0
+        assert unknown_terms(memory_lines(file), scene.knowledge) == []
+    assert confab.Memory.load(file, scene).experience.said == memory.experience.said
 
 
 def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -> None:
