@@ -5,7 +5,7 @@ who    situation type → value → the keys that have it, in the order in which
 trail  what was overwritten, oldest first; `undo` takes it back to a mark
 age    how often anything was changed, undoing included: what was read off the table at this age still holds
 
-What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`Derived`).
+What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`planner.derived_facts`).
 
 Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world. A condition becomes
 one Python expression over `now` and `who`, a behaviour a function ``forward(arguments)`` that returns the individuals of its
@@ -14,31 +14,17 @@ variables and its changes, or None if it isn't applicable now. A new kind of con
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
-from types import CodeType
 from typing import Any, TypeAlias
 
+from planner.amount_transitions import change, comparison, settled
+from planner.generated import code, identifier, key_written, tuple_written, written
 from planner.language import DomainError, needs, nothing_determines
-from reasoner.amounts import (
-    NOTHING,
-    Amount,
-    Calculation,
-    Expression,
-    Measure,
-    Number,
-    Quantity,
-    divided,
-    done,
-    number,
-    terms_of,
-)
-from reasoner.amounts import written as amount_written
-from reasoner.derivation import strata
+from reasoner.amounts import terms_of
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -131,79 +117,6 @@ class Table:
         return {Symbol(s, arguments_of(key)): value for s, cells in self.now.items() for key, value in cells.items()}
 
 
-class Derived(dict[Key, str]):
-    """In place of the cells of a situation type that is defined: nothing is kept in it, and `get` works a value out."""
-
-    def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
-        super().__init__()
-        self.name, self.alone, self.stratum = name, arity == 1, stratum
-
-    def get(self, key: Key, default: str | None = None) -> str:  # type: ignore[override]
-        """Return whether it holds of the arguments behind a key; of a key that has more or fewer, nothing is said."""
-        if isinstance(key, str) is not self.alone:
-            return default  # type: ignore[return-value]
-        return TRUE if self.stratum.holds((self.name, key)) else FALSE
-
-
-class Stratum:
-    """Situation types whose rules need each other, and what is known of them at one age of the table.
-
-    What is asked for is tried, with all that its rules ask for in turn, until a round makes nothing more of it true: then the
-    rest is false. Nothing else is looked at, and no chain is too long for the interpreter's stack.
-    """
-
-    def __init__(self, table: Table) -> None:
-        self.table, self.age = table, -1
-        self.tests: dict[str, Callable[..., bool]] = {}
-        self.known: dict[Cell, bool] = {}
-        self.asked: dict[Cell, None] | None = None  # while something is worked out: with it, what that led to
-
-    def holds(self, cell: Cell) -> bool:
-        """Return whether a symbol is true; while another one is worked out: as far as is known."""
-        if self.age != self.table.age:
-            self.age = self.table.age
-            self.known.clear()
-        found = self.known.get(cell)
-        if found is not None:
-            return found
-        if self.asked is not None:
-            self.asked[cell] = None
-            return False
-        self.asked = {cell: None}
-        try:
-            found = self._worked_out(cell, self.asked)
-            if not found:
-                for other in self.asked:
-                    self.known.setdefault(other, False)
-        finally:
-            self.asked = None
-        return found
-
-    def _worked_out(self, cell: Cell, asked: dict[Cell, None]) -> bool:
-        order, done, known = [cell], 0, self.known
-        while True:
-            grown = False
-            while done < len(order):  # what was asked for the first time
-                grown |= self._try(order[done])
-                done += 1
-                if len(asked) > len(order):
-                    order += list(asked)[len(order) :]
-            if cell in known:
-                return True
-            for other in reversed(order):  # the last ones asked for are those that others wait for
-                if other not in known:
-                    grown |= self._try(other)
-            if cell in known or not (grown or len(asked) > len(order)):
-                return cell in known
-            order += list(asked)[len(order) :]
-
-    def _try(self, cell: Cell) -> bool:
-        found = self.tests[cell[0]](*arguments_of(cell[1]))
-        if found:
-            self.known[cell] = True
-        return found
-
-
 class Writer:
     """Writes conditions and behaviours of one problem as Python over the dictionaries of a table.
 
@@ -218,38 +131,6 @@ class Writer:
         self.constants: dict[str, object] = {}
         self.variables: dict[str, tuple[str, ...]] = {}
         self._fan: dict[str, float] = {}
-        self._measured: dict[str, Mapping[tuple[str, ...], Number]] = {}
-        self._define = self.function(["rules = {}", *self._rules()], "rules") if problem.domain.rules else None
-
-    def define(self, table: Table) -> None:
-        """Have a table work out what is defined; before any function is bound to it."""
-        if self._define is None:
-            return
-        rules = self.problem.domain.rules
-        for group in strata(rules):
-            stratum = Stratum(table)
-            for name in group:
-                table.now[name] = Derived(name, len(self.problem.domain.situations[name].arguments), stratum)
-        tests = self._define(table.now, table.who)
-        for name in rules:
-            cells = table.now[name]
-            assert isinstance(cells, Derived)
-            cells.stratum.tests[name] = tests[name]
-
-    def _rules(self) -> Iterator[str]:
-        """Yield the lines that put a function for each situation type that is defined into `rules`."""
-        for name, rules in self.problem.domain.rules.items():
-            arguments = [f"a{i}" for i in range(len(self.problem.domain.situations[name].arguments))]
-            yield f"def {identifier('rule', name)}({', '.join(arguments)}):"
-            for rule in rules:
-                kinds, bound = rule.behavior.kinds, {p.name for p in rule.parameters}
-                put = ", ".join(written(p.name) for p in rule.parameters)
-                tests = [self.member(p.name, p.kind) for p in rule.parameters]
-                tests += self.conjunction(rule.conditions, bound, kinds, name)
-                yield f"    {put}, = {', '.join(arguments)},"
-                yield f"    if {' and '.join(f'({test})' for test in tests)}: return True"
-            yield "    return False"
-            yield f"rules[{name!r}] = {identifier('rule', name)}"
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
         """Return a function of a table's `now` and `who` (and what else is given) that runs lines and returns a result."""
@@ -259,7 +140,7 @@ class Writer:
             identifier(table, s): f"{table}[{s!r}]" for s in self.problem.domain.situations for table in ("now", "who")
         }
         names = [f"    {name} = {table}" for name, table in tables.items() if name in text]
-        exec(_code("\n".join([f"def bind(now, who{given}):", *names, text])), self.constants)
+        exec(code("\n".join([f"def bind(now, who{given}):", *names, text])), self.constants)
         return self.constants.pop("bind")  # type: ignore[return-value]
 
     def forward(self, behavior: Behavior) -> Iterator[str]:
@@ -274,63 +155,31 @@ class Writer:
         yield f"def {identifier('forward', behavior.name)}({', '.join(map(written, parameters))}):"
         yield f"    if not ({' and '.join(tests) or 'True'}): return None"
         yield "    changes = []"
-        for effect in behavior.effects:
+        if behavior.amounts:
+            yield "    amounts = {}"
+        for effect in behavior.every_effect:
             inner = set(bound)
             when = self.conjunction(effect.when, inner, kinds, behavior.name)
-            free = {t for t in (*effect.arguments, effect.value) if t.startswith("?")} - inner
+            given = terms_of(effect.amount) if isinstance(effect, AmountEffect) else (effect.value,)
+            free = {t for t in (*effect.arguments, *given) if t.startswith("?")} - inner
             if free:
                 raise DomainError(
                     f"{behavior.name}: nothing determines {', '.join(sorted(free))}, which an effect names"
                 )
-            when += self._exists(effect.situation, effect.arguments, kinds)
-            change = f"changes.append(({effect.situation!r}, {key_written(effect.arguments)}, {written(effect.value)}))"
-            yield f"    if {' and '.join(when)}: {change}" if when else f"    {change}"
-        yield from self._amounts(behavior, bound) if behavior.amounts else ()
+            key = key_written(effect.arguments)
+            if isinstance(effect, AmountEffect):
+                when.append(f"{key} in {identifier('now', effect.situation)}")
+                does = change(effect, self.problem.relations, self.constant)
+            else:
+                when += self._exists(effect.situation, effect.arguments, kinds)
+                does = f"changes.append(({effect.situation!r}, {key}, {written(effect.value)}))"
+            yield f"    if {' and '.join(when)}: {does}" if when else f"    {does}"
+        if behavior.amounts:
+            quantities = {s.name: s.quantity for s in self.problem.domain.situations.values() if s.quantity}
+            known = self.constant(("amounts", "quantities"), quantities)
+            yield f"    if not {self.constant(('amounts', 'settled'), settled)}(amounts, {known}, changes): return None"
         yield f"    return {tuple_written(map(written, variables))}, changes"
         yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
-
-    def _amounts(self, behavior: Behavior, bound: set[str]) -> Iterator[str]:
-        """Yield the lines that change amounts, or return None where one would come to be what it can't be."""
-        quantities = {s.name: s.quantity for s in self.problem.domain.situations.values() if s.quantity}
-        self.constants |= {"changed": changed, "settled": settled, "quantities": quantities}
-        yield "    amounts = {}"
-        for effect in behavior.amounts:
-            inner, cells, key = set(bound), identifier("now", effect.situation), key_written(effect.arguments)
-            when = self.conjunction(effect.when, inner, behavior.kinds, behavior.name)
-            free = {t for t in (*effect.arguments, *terms_of(effect.amount)) if t.startswith("?")} - inner
-            if free:
-                raise DomainError(
-                    f"{behavior.name}: nothing determines {', '.join(sorted(free))}, which an effect names"
-                )
-            by = self.amount(effect.amount)
-            change = f"changed(amounts, {effect.situation!r}, {key}, {cells}[{key}], {effect.operation!r}, {by})"
-            yield f"    if {' and '.join([*when, f'{key} in {cells}'])}: {change}"
-        yield "    if not settled(amounts, quantities, changes): return None"
-
-    def amount(self, expression: Expression) -> str:
-        """Return an amount as a Python expression; what has none is `NOTHING`."""
-        match expression:
-            case Amount(situation, arguments):
-                self.constants["number"] = number
-                return f"number({identifier('now', situation)}.get({key_written(arguments)}))"
-            case Measure(relation, arguments):
-                table = self.constant(("measure", relation), self.measured(relation))
-                return (
-                    f"{table}.get({tuple_written(map(written, arguments))}, {self.constant(('no', 'amount'), NOTHING)})"
-                )
-            case Calculation("/", left, right):
-                return f"{self.constant(('amounts', 'divided'), divided)}({self.amount(left)}, {self.amount(right)})"
-            case Calculation(sign, left, right):
-                return f"({self.amount(left)} {sign} {self.amount(right)})"
-            case constant:
-                return self.constant(("number", amount_written(constant)), constant)
-
-    def measured(self, relation: str) -> Mapping[tuple[str, ...], Number]:
-        """Return the numbers that a relation gives."""
-        if relation not in self._measured:
-            rows = self.problem.relations.get(relation, ())
-            self._measured[relation] = {row[:-1]: number(row[-1]) for row in rows}
-        return self._measured[relation]
 
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
@@ -369,9 +218,8 @@ class Writer:
             case AnyOf(alternatives, negated):
                 groups = [" and ".join(self.conjunction(g, set(bound), kinds, where)) or "True" for g in alternatives]
                 return ("not " if negated else "") + "(" + " or ".join(f"({g})" for g in groups) + ")"
-            case Comparison(one, sign, other, negated):
-                test = f"({self.amount(one)} {'==' if sign == '=' else sign} {self.amount(other)})"
-                return f"not {test}" if negated else test
+            case Comparison():
+                return comparison(condition, self.problem.relations, self.constant)
 
     def satisfying(
         self, condition: Witness, bound: set[str], kinds: Mapping[str, str], where: str
@@ -460,50 +308,9 @@ _COST: Mapping[type[Condition], int] = {
 }
 
 
-def changed(amounts: dict[Cell, Number], situation: str, key: Key, old: str, operation: str, by: Number) -> None:
-    """Change an amount, as earlier effects of the same behaviour left it."""
-    cell = situation, key
-    amounts[cell] = done(operation, amounts[cell] if cell in amounts else number(old), by)
-
-
-def settled(amounts: Mapping[Cell, Number], quantities: Mapping[str, Quantity], changes: list[Change]) -> bool:
-    """Add amounts to the changes; whether all are such as they can be."""
-    for (situation, key), amount in amounts.items():
-        if not quantities[situation].allows(amount):
-            return False
-        changes.append((situation, key, amount_written(amount)))
-    return True
-
-
 def ready_condition(waiting: Sequence[Condition], bound: set[str], where: str) -> Condition:
     """Return the cheapest condition to test of those whose variables are bound."""
     ready = [condition for condition in waiting if not needs(condition) - bound]
     if not ready:
         raise nothing_determines(where, waiting, bound)
     return min(ready, key=lambda condition: _COST[type(condition)])
-
-
-def identifier(prefix: str, name: str) -> str:
-    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
-    clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
-    return f"{prefix}_{clean}"
-
-
-def written(term: str) -> str:
-    """Return a term as Python."""
-    return identifier("v", term[1:]) if term.startswith("?") else repr(term)
-
-
-def tuple_written(items: Iterator[str] | Sequence[str] | map[str]) -> str:
-    """Return the tuple of some expressions as Python."""
-    return "(" + "".join(f"{item}, " for item in items) + ")"
-
-
-def key_written(arguments: Sequence[str]) -> str:
-    """Return the key of some terms as Python."""
-    return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
-
-
-@lru_cache(maxsize=256)
-def _code(source: str) -> CodeType:
-    return compile(source, "<compiled behaviours>", "exec")

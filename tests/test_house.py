@@ -149,6 +149,9 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 "language",
                 "levels",
                 "transitions",
+                "generated",
+                "amount_transitions",
+                "derived_facts",
                 *SUBROOMS[room],
             }:
                 found.append(f"{module} imports {other}")

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
+from planner.generated import identifier, tuple_written, written
 from planner.language import mentions, walk
-from planner.transitions import Table, Writer, identifier, tuple_written, written
+from planner.transitions import Table, Writer
 from reasoner.memory.experience import Rule
 from reasoner.symbols import Condition, Problem, RelationCondition, ValueCondition
 

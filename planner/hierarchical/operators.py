@@ -17,21 +17,13 @@ from functools import cached_property
 from math import prod
 from typing import TypeAlias
 
+from planner.amount_transitions import comes_nearer
+from planner.derived_facts import Rules
+from planner.generated import identifier, tuple_written, written
 from planner.hierarchical.symmetry import Alike, representatives
 from planner.language import measures, mentions, terms, walk
-from planner.transitions import (
-    Forward,
-    Key,
-    Table,
-    Writer,
-    identifier,
-    key_written,
-    ready_condition,
-    tuple_written,
-    written,
-)
-from reasoner.amounts import Amount, done, inside, nearer, terms_of
-from reasoner.amounts import number as number_of
+from planner.transitions import Forward, Key, Table, Writer, ready_condition
+from reasoner.amounts import Amount, inside, terms_of
 from reasoner.symbols import (
     AmountEffect,
     AnyOf,
@@ -104,6 +96,7 @@ class Program:
         self.writer = Writer(problem)
         self.variables = self.writer.variables
         self.writer.constants |= {"prefer": prefer, "pick": self._picked}
+        self._rules = Rules(self.writer) if self.domain.rules else None
         self._bind = self.writer.function(self._lines(), "forward, achieve", ", focus, few")
 
     def bind(self, table: Table, focus: Mapping[str, None], few: int = FEW) -> Bound:
@@ -111,7 +104,8 @@ class Program:
 
         Of more than a `few` alike one stands for all.
         """
-        self.writer.define(table)
+        if self._rules is not None:
+            self._rules.define(table)
         return Bound(*self._bind(table.now, table.who, focus, few))
 
     def _picked(
@@ -225,10 +219,7 @@ class Program:
             emit(f"if not ({test}): unmet += ({len(soft)},)")
             soft.append(condition)
         if isinstance(effect, AmountEffect):
-            self.writer.constants |= {"nearer": nearer, "done": done, "number": number_of}
-            old = f"{identifier('now', effect.situation)}.get({key_written(effect.arguments)})"
-            after = f"done({effect.operation!r}, number({old}), {self.writer.amount(effect.amount)})"
-            emit(f"if nearer({old}, {after}, {inputs[-1]}):")
+            emit(f"if {comes_nearer(effect, inputs[-1], self.problem.relations, self.writer.constant)}:")
             depth += 1
         names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
         arguments = tuple_written(written(p.name) for p in behavior.parameters)

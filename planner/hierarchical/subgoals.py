@@ -12,11 +12,13 @@ from fractions import Fraction
 from heapq import nsmallest
 from typing import Any, TypeAlias
 
+from planner.amount_transitions import amount
+from planner.generated import written
 from planner.hierarchical.operators import FEW, Achiever, Program
 from planner.hierarchical.symmetry import representatives
 from planner.language import mentions, needs, walk
-from planner.transitions import Cell, Key, Table, arguments_of, key_of, written
-from reasoner.amounts import NOTHING, Amount, Calculation, Expression, Measure, Number, divided, inside, number
+from planner.transitions import Cell, Key, Table, arguments_of, key_of
+from reasoner.amounts import Amount, Calculation, Number, inside, number
 from reasoner.amounts import written as amount_written
 from reasoner.derivation import circular
 from reasoner.symbols import (
@@ -61,6 +63,7 @@ class Wants:
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str], list[str]] = {}
         self._tests: dict[tuple[int, tuple[str, ...], bool], Callable[..., Any]] = {}
+        self._worths: dict[int, Callable[..., Any]] = {}
         self._concern: frozenset[str] = frozenset()
         self._circular = circular(program.domain.rules)
         self._age = -1
@@ -195,42 +198,34 @@ class Wants:
         """Yield for each amount in a comparison what it would have to be if the others stayed as they are."""
         contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
         sign = contrary.get(condition.operator, ">") if condition.negated else condition.operator
-        difference = Calculation("-", condition.left, condition.right)
-        for part in dict.fromkeys(inside(difference)):
+        for part in dict.fromkeys((*inside(condition.left), *inside(condition.right))):
             key = self._key(part.arguments, env) if isinstance(part, Amount) else None
             if not isinstance(part, Amount) or key not in self.table.now[part.situation]:
                 continue
-            now = self.worth(difference, env)
-            slope = self.worth(difference, env, (part.situation, key)) - now
+            cells, text = self.table.now[part.situation], self.table.now[part.situation][key]
+            now = self.worth(condition, env)
+            cells[key] = amount_written(Fraction(text) + 1)
+            slope = self.worth(condition, env) - now
+            cells[key] = text
             if not isinstance(slope, Fraction) or not slope:
                 continue
-            limit = number(self.table.now[part.situation][key]) - now / slope
+            limit = number(text) - now / slope
             flipped = sign if slope > 0 else sign.translate(str.maketrans("<>", "><"))
             if isinstance(limit, Fraction):
                 yield part.situation, key, (f"{flipped}{amount_written(limit)}".lstrip("="),)
 
-    def worth(self, expression: Expression, env: Env, more: Cell | None = None) -> Number:
-        """Return what an amount comes to now, or if one symbol had one more."""
-        match expression:
-            case Amount(situation, arguments):
-                key = self._key(arguments, env)
-                if key is None or key not in self.table.now[situation]:
-                    return NOTHING
-                return number(self.table.now[situation][key]) + ((situation, key) == more)
-            case Measure(relation, arguments):
-                return self.program.writer.measured(relation).get(tuple(env.get(a) or a for a in arguments), NOTHING)
-            case Calculation(sign, left, right):
-                one, other = self.worth(left, env, more), self.worth(right, env, more)
-                match sign:
-                    case "+":
-                        return one + other
-                    case "-":
-                        return one - other
-                    case "*":
-                        return one * other
-                return divided(one, other)
-            case constant:
-                return constant
+    def worth(self, condition: Comparison, env: Env) -> Number:
+        """Return by how much the left side of a comparison is larger than the right one now."""
+        names = self._about(condition)[2]
+        function = self._worths.get(id(condition))
+        if function is None:
+            writer = self.program.writer
+            difference = Calculation("-", condition.left, condition.right)
+            text = amount(difference, self.program.problem.relations, writer.constant)
+            bind = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
+            function = self._worths[id(condition)] = bind(self.table.now, self.table.who)
+        found: Number = function(*[env.get(name) for name in names])
+        return found
 
     def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
         """Yield wants for other values of the symbols that determine a condition's variables."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from planner.derived_facts import Rules
 from planner.transitions import Forward, Table, Writer, key_of
 from reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
 
@@ -41,7 +42,8 @@ class Model:
         self.writer = Writer(problem)
         self.here = tuple(problem.initial.get(symbol, FALSE) for symbol in stated)
         self.table = Table(problem.domain.situations, dict(zip(stated, self.here, strict=True)))
-        self.writer.define(self.table)
+        if problem.domain.rules:
+            Rules(self.writer).define(self.table)
         lines = [line for b in problem.domain.behaviors.values() for line in self.writer.forward(b)]
         bind = self.writer.function(["forward = {}", *lines], "forward")
         self.forward: Mapping[str, Forward] = bind(self.table.now, self.table.who)

@@ -1,0 +1,107 @@
+"""Amounts in generated Python: what they are compared with, what behaviours make of them, and what comes nearer to a wanted one.
+
+A table keeps an amount as text; functions of this module are called by what is generated, with the numbers behind the texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import TypeAlias
+
+from planner.generated import identifier, key_written, tuple_written, written
+from reasoner.amounts import (
+    NOTHING,
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+    Number,
+    Quantity,
+    divided,
+    done,
+    nearer,
+    number,
+)
+from reasoner.amounts import written as amount_written
+from reasoner.symbols import AmountEffect, Comparison
+
+Rows: TypeAlias = "frozenset[tuple[str, ...]]"
+Constant: TypeAlias = "Callable[[tuple[str, str], object], str]"
+"""Makes a value known to what is generated, and returns its name there."""
+
+
+def amount(expression: Expression, relations: Mapping[str, Rows], constant: Constant) -> str:
+    """Return an amount as a Python expression; what has none is `NOTHING`."""
+    match expression:
+        case Amount(situation, arguments):
+            return _now(situation, key_written(arguments), constant)
+        case Measure(relation, arguments):
+            table = constant(("measure", relation), _measured(relations.get(relation, frozenset())))
+            return f"{table}.get({tuple_written(map(written, arguments))}, {constant(('no', 'amount'), NOTHING)})"
+        case Calculation(sign, one, other):
+            left, right = amount(one, relations, constant), amount(other, relations, constant)
+            if sign == "/":
+                return f"{constant(('amounts', 'divided'), divided)}({left}, {right})"
+            return f"({left} {sign} {right})"
+        case exact:
+            return constant(("number", amount_written(exact)), exact)
+
+
+def comparison(condition: Comparison, relations: Mapping[str, Rows], constant: Constant) -> str:
+    """Return a comparison as a Python expression."""
+    left, right = amount(condition.left, relations, constant), amount(condition.right, relations, constant)
+    test = f"({left} {'==' if condition.operator == '=' else condition.operator} {right})"
+    return f"not {test}" if condition.negated else test
+
+
+def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Constant) -> str:
+    """Return the call that changes an amount in `amounts`, of a symbol that exists."""
+    key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
+    old = f"{identifier('now', effect.situation)}[{key}]"
+    function = constant(("amounts", "changed"), changed)
+    return f"{function}(amounts, {effect.situation!r}, {key}, {old}, {effect.operation!r}, {by})"
+
+
+def comes_nearer(effect: AmountEffect, wanted: str, relations: Mapping[str, Rows], constant: Constant) -> str:
+    """Return the test that an effect brings its amount nearer to what is wanted, which stands in a variable."""
+    key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
+    after = (
+        f"{constant(('amounts', 'done'), done)}({effect.operation!r}, {_now(effect.situation, key, constant)}, {by})"
+    )
+    old = f"{identifier('now', effect.situation)}.get({key})"
+    return f"{constant(('amounts', 'nearer'), nearer)}({old}, {after}, {wanted})"
+
+
+def _now(situation: str, key: str, constant: Constant) -> str:
+    return f"{constant(('amounts', 'number'), number)}({identifier('now', situation)}.get({key}))"
+
+
+@lru_cache(maxsize=64)
+def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
+    """Return the numbers that a relation gives."""
+    return {row[:-1]: number(row[-1]) for row in rows}
+
+
+# ------------------------------------------------------------------------------------------- called by what is generated
+
+
+def changed(
+    amounts: dict[tuple[str, object], Number], situation: str, key: object, old: str, operation: str, by: Number
+) -> None:
+    """Change an amount, as earlier effects of the same behaviour left it."""
+    cell = situation, key
+    amounts[cell] = done(operation, amounts[cell] if cell in amounts else number(old), by)
+
+
+def settled(
+    amounts: Mapping[tuple[str, object], Number],
+    quantities: Mapping[str, Quantity],
+    changes: list[tuple[str, object, str]],
+) -> bool:
+    """Add amounts to the changes; whether all are such as they can be."""
+    for (situation, key), found in amounts.items():
+        if not quantities[situation].allows(found):
+            return False
+        changes.append((situation, key, amount_written(found)))
+    return True

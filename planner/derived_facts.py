@@ -1,0 +1,125 @@
+"""What is defined by rules, worked out where generated Python asks a table for it; only scenes that define something come here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from planner.generated import identifier, written
+from planner.transitions import Cell, Key, Table, Writer, arguments_of
+from reasoner.derivation import strata
+from reasoner.symbols import FALSE, TRUE
+
+
+class Rules:
+    """The rules of a problem as Python, compiled once for any table.
+
+    Parameters
+    ----------
+    writer : Writer
+        Of the problem.
+    """
+
+    def __init__(self, writer: Writer) -> None:
+        self.domain = writer.problem.domain
+        self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
+
+    def define(self, table: Table) -> None:
+        """Have a table work out what is defined; before any function is bound to it."""
+        for group in strata(self.domain.rules):
+            stratum = Stratum(table)
+            for name in group:
+                table.now[name] = Derived(name, len(self.domain.situations[name].arguments), stratum)
+        tests = self._bind(table.now, table.who)
+        for name in self.domain.rules:
+            cells = table.now[name]
+            assert isinstance(cells, Derived)
+            cells.stratum.tests[name] = tests[name]
+
+
+def _lines(writer: Writer) -> Iterator[str]:
+    """Yield the lines that put a function for each situation type that is defined into `rules`."""
+    for name, rules in writer.problem.domain.rules.items():
+        arguments = [f"a{i}" for i in range(len(writer.problem.domain.situations[name].arguments))]
+        yield f"def {identifier('rule', name)}({', '.join(arguments)}):"
+        for rule in rules:
+            kinds, bound = rule.behavior.kinds, {p.name for p in rule.parameters}
+            put = ", ".join(written(p.name) for p in rule.parameters)
+            tests = [writer.member(p.name, p.kind) for p in rule.parameters]
+            tests += writer.conjunction(rule.conditions, bound, kinds, name)
+            yield f"    {put}, = {', '.join(arguments)},"
+            yield f"    if {' and '.join(f'({test})' for test in tests)}: return True"
+        yield "    return False"
+        yield f"rules[{name!r}] = {identifier('rule', name)}"
+
+
+class Derived(dict[Key, str]):
+    """In place of the cells of a situation type that is defined: nothing is kept in it, and `get` works a value out."""
+
+    def __init__(self, name: str, arity: int, stratum: Stratum) -> None:
+        super().__init__()
+        self.name, self.alone, self.stratum = name, arity == 1, stratum
+
+    def get(self, key: Key, default: str | None = None) -> str:  # type: ignore[override]
+        """Return whether it holds of the arguments behind a key; of a key that has more or fewer, nothing is said."""
+        if isinstance(key, str) is not self.alone:
+            return default  # type: ignore[return-value]
+        return TRUE if self.stratum.holds((self.name, key)) else FALSE
+
+
+class Stratum:
+    """Situation types whose rules need each other, and what is known of them at one age of the table.
+
+    What is asked for is tried, with all that its rules ask for in turn, until a round makes nothing more of it true: then the
+    rest is false. Nothing else is looked at, and no chain is too long for the interpreter's stack.
+    """
+
+    def __init__(self, table: Table) -> None:
+        self.table, self.age = table, -1
+        self.tests: dict[str, Callable[..., bool]] = {}
+        self.known: dict[Cell, bool] = {}
+        self.asked: dict[Cell, None] | None = None  # while something is worked out: with it, what that led to
+
+    def holds(self, cell: Cell) -> bool:
+        """Return whether a symbol is true; while another one is worked out: as far as is known."""
+        if self.age != self.table.age:
+            self.age = self.table.age
+            self.known.clear()
+        found = self.known.get(cell)
+        if found is not None:
+            return found
+        if self.asked is not None:
+            self.asked[cell] = None
+            return False
+        self.asked = {cell: None}
+        try:
+            found = self._worked_out(cell, self.asked)
+            if not found:
+                for other in self.asked:
+                    self.known.setdefault(other, False)
+        finally:
+            self.asked = None
+        return found
+
+    def _worked_out(self, cell: Cell, asked: dict[Cell, None]) -> bool:
+        order, done, known = [cell], 0, self.known
+        while True:
+            grown = False
+            while done < len(order):  # what was asked for the first time
+                grown |= self._try(order[done])
+                done += 1
+                if len(asked) > len(order):
+                    order += list(asked)[len(order) :]
+            if cell in known:
+                return True
+            for other in reversed(order):  # the last ones asked for are those that others wait for
+                if other not in known:
+                    grown |= self._try(other)
+            if cell in known or not (grown or len(asked) > len(order)):
+                return cell in known
+            order += list(asked)[len(order) :]
+
+    def _try(self, cell: Cell) -> bool:
+        found = self.tests[cell[0]](*arguments_of(cell[1]))
+        if found:
+            self.known[cell] = True
+        return found

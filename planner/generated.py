@@ -1,0 +1,35 @@
+"""How generated Python names terms, keys and functions, and how it is compiled."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from types import CodeType
+
+
+def identifier(prefix: str, name: str) -> str:
+    """Return an identifier for a term, in ASCII (Python takes µ for μ); distinct terms get distinct ones."""
+    clean = re.sub(r"[^A-Za-z0-9]", lambda m: "__" if m[0] == "_" else f"_{ord(m[0]):x}_", name)
+    return f"{prefix}_{clean}"
+
+
+def written(term: str) -> str:
+    """Return a term as Python."""
+    return identifier("v", term[1:]) if term.startswith("?") else repr(term)
+
+
+def tuple_written(items: Iterable[str]) -> str:
+    """Return the tuple of some expressions as Python."""
+    return "(" + "".join(f"{item}, " for item in items) + ")"
+
+
+def key_written(arguments: Sequence[str]) -> str:
+    """Return the key of some terms as Python."""
+    return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
+
+
+@lru_cache(maxsize=256)
+def code(source: str) -> CodeType:
+    """Return source compiled."""
+    return compile(source, "<compiled behaviours>", "exec")
