@@ -18,9 +18,10 @@ from itertools import groupby
 from operator import contains, itemgetter
 from typing import TypeAlias
 
+from planner.checked_amounts import changed, compares, worth
+from planner.checked_definitions import Definitions
 from planner.plan import Plan, Step
-from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, meets, terms_of, written
-from reasoner.derivation import strata
+from reasoner.amounts import meets, terms_of
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -45,8 +46,6 @@ Cell: TypeAlias = "tuple[str, Arguments]"
 Values: TypeAlias = "list[str]"
 """What the terms of some conditions stand for, by their places."""
 Test: TypeAlias = "Callable[[Facts, Values], bool]"
-Worth: TypeAlias = "Callable[[Facts, Values], Fraction | None]"
-"""What an amount comes to; None if it comes to nothing."""
 Candidates: TypeAlias = "Callable[[Facts, Values], Iterable[str]]"
 Change: TypeAlias = "tuple[str, Arguments, str]"
 
@@ -189,7 +188,6 @@ class Facts:
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
-        self._asking: dict[tuple[str, ...], dict[Cell, bool]] = {}
         for symbol, value in state.items():
             self._values[symbol.situation][symbol.arguments] = value
 
@@ -198,40 +196,14 @@ class Facts:
         if situation in self.problem.domain.rules:
             if not self.exists(situation, arguments):
                 return None
-            return TRUE if self.follows((situation, arguments)) else FALSE
+            return TRUE if self._definitions.follows((situation, arguments)) else FALSE
         value = self._values[situation].get(arguments)
         return FALSE if value is None and self.exists(situation, arguments) else value
 
-    def follows(self, cell: Cell) -> bool:
-        """Return whether something that is defined holds: whether its rules give it, or what they ask for in turn.
-
-        What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
-        tried again until nothing more becomes true.
-        """
-        stratum = self._strata[cell[0]]
-        asked = self._asking.get(stratum)
-        if asked is not None:
-            return asked.setdefault(cell, False)
-        asked = self._asking[stratum] = {cell: False}
-        seen, grown = 0, False
-        try:
-            while not asked[cell] and (seen < len(asked) or grown):
-                fresh = list(asked)[seen:]
-                seen, grown = len(asked), bool(fresh) and grown
-                for one in fresh or [one for one in reversed(asked) if not asked[one]]:
-                    asked[one] = self._rules.follows(*one, self)
-                    grown |= asked[one]
-            return asked[cell]
-        finally:
-            del self._asking[stratum]
-
     @cached_property
-    def _strata(self) -> Mapping[str, tuple[str, ...]]:
-        return {name: group for group in strata(self.problem.domain.rules) for name in group}
-
-    @cached_property
-    def _rules(self) -> Rules:
-        return Rules(self.problem)
+    def _definitions(self) -> Definitions:
+        rules = Rules(self.problem)
+        return Definitions(self.problem.domain.rules, lambda about, key: rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
         """Return what is stated now."""
@@ -320,28 +292,11 @@ class Rules:
             about = key(inner)
             if facts.exists(situation, about):
                 found.append((situation, about, inner[value]))
-        more = self.amounts(read, values, facts) if read.amounts else []
+        if not read.amounts:
+            return found
+        quantities = {name: kind.quantity for name, kind in self.problem.domain.situations.items()}
+        more = changed(read.on_amounts(values, facts), facts.value, quantities)
         return None if more is None else found + more
-
-    def amounts(self, read: _Behavior, values: Values, facts: Facts) -> list[Change] | None:
-        """Return the amounts after a behaviour, each changed by what held before; None if one can't be what it would be."""
-        after: dict[Cell, Fraction | None] = {}
-        for when, situation, key, operation, amount in read.amounts:
-            inner = values.copy()
-            if not _hold(when, facts, inner) or (said := facts.value(situation, key(inner))) is None:
-                continue
-            cell = situation, key(inner)
-            by, old = amount(facts, inner), after.get(cell, Fraction(said))
-            if by is None or old is None:
-                after[cell] = None
-            else:
-                new = {"assign": by, "scale": old * by, "increase": old + by, "decrease": old - by}
-                after[cell] = new[operation]
-        for (situation, _), result in after.items():
-            quantity = self.problem.domain.situations[situation].quantity
-            if result is None or quantity is None or not quantity.allows(result):
-                return None
-        return [(*cell, written(result)) for cell, result in after.items() if result is not None]
 
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
@@ -387,7 +342,7 @@ class _Behavior:
                 e.situation,
                 reading.key(e.arguments),
                 e.operation,
-                reading.worth(e.amount),
+                worth(e.amount, reading.key, rules.problem.relations),
             )
             for operations in (("assign",), ("scale",), ("increase", "decrease"))
             for e in behavior.amounts
@@ -395,6 +350,13 @@ class _Behavior:
         ]
         self.terms = tuple(reading.places)
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
+
+    def on_amounts(self, values: Values, facts: Facts) -> Iterator[tuple[Cell, str, Fraction | None]]:
+        """Yield the symbols whose amounts change, what is done to each, and by how much."""
+        for when, situation, key, operation, amount in self.amounts:
+            inner = values.copy()
+            if _hold(when, facts, inner):
+                yield (situation, key(inner)), operation, amount(facts.value, inner)
 
 
 class _Reading:
@@ -498,36 +460,6 @@ class _Reading:
                 return related
         return lambda facts, values: self.problem.classes.get(kind, ())
 
-    def worth(self, expression: Expression) -> Worth:
-        """Return a function to the amount that an expression comes to."""
-        match expression:
-            case Amount(situation, arguments):
-                key = self.key(arguments)
-
-                def has(facts: Facts, values: Values) -> Fraction | None:
-                    said = facts.value(situation, key(values))
-                    return None if said is None else Fraction(said)
-
-                return has
-            case Measure(relation, arguments):
-                about = self.key(arguments)
-                numbers = {row[:-1]: Fraction(row[-1]) for row in self.problem.relations.get(relation, ())}
-                return lambda facts, values: numbers.get(about(values))
-            case Calculation(sign, one, other):
-                of_left, of_right = self.worth(one), self.worth(other)
-
-                def comes_to(facts: Facts, values: Values) -> Fraction | None:
-                    left, right = of_left(facts, values), of_right(facts, values)
-                    if left is None or right is None or (sign == "/" and not right):
-                        return None
-                    if sign == "/":
-                        return left / right
-                    return {"+": left + right, "-": left - right, "*": left * right}[sign]
-
-                return comes_to
-            case number:
-                return lambda facts, values: number
-
     def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
         """Return a condition as a test; what is chosen inside of it is forgotten."""
         match condition:
@@ -550,14 +482,9 @@ class _Reading:
             case AnyOf(alternatives, negated):
                 groups = [self.conjunction(group, set(bound), kinds) for group in alternatives]
                 return lambda facts, values: any(_hold(g, facts, values.copy()) for g in groups) is not negated
-            case Comparison(one, sign, other, negated):
-                of_left, of_right = self.worth(one), self.worth(other)
-
-                def compares(facts: Facts, values: Values) -> bool:
-                    left, right = of_left(facts, values), of_right(facts, values)
-                    return (left is not None and right is not None and COMPARING[sign](left, right)) is not negated
-
-                return compares
+            case Comparison():
+                comparison = compares(condition, self.key, self.problem.relations)
+                return lambda facts, values: comparison(facts.value, values)
 
 
 def _hold(tests: Sequence[Test], facts: Facts, values: Values) -> bool:

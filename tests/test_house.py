@@ -146,6 +146,8 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 room,
                 "plan",
                 "validation",
+                "checked_amounts",
+                "checked_definitions",
                 "language",
                 "levels",
                 "transitions",

@@ -1,0 +1,91 @@
+"""Amounts as the checker works them out, from what is written, without a line in common with any search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import TypeAlias
+
+from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, written
+from reasoner.symbols import Comparison
+
+Arguments: TypeAlias = "tuple[str, ...]"
+Cell: TypeAlias = "tuple[str, Arguments]"
+Said: TypeAlias = "Callable[[str, Arguments], str | None]"
+"""Returns the value of a symbol, None if there is no such symbol."""
+Values: TypeAlias = "list[str]"
+Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
+"""Returns a function from the values of all terms to those of some."""
+Worth: TypeAlias = "Callable[[Said, Values], Fraction | None]"
+"""What an amount comes to; None if it comes to nothing."""
+Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
+
+
+def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
+    """Return a function to the amount that an expression comes to."""
+    match expression:
+        case Amount(situation, arguments):
+            of = key(arguments)
+
+            def has(said: Said, values: Values) -> Fraction | None:
+                text = said(situation, of(values))
+                return None if text is None else Fraction(text)
+
+            return has
+        case Measure(relation, arguments):
+            about = key(arguments)
+            numbers = {row[:-1]: Fraction(row[-1]) for row in relations.get(relation, ())}
+            return lambda said, values: numbers.get(about(values))
+        case Calculation(sign, one, other):
+            of_left, of_right = worth(one, key, relations), worth(other, key, relations)
+
+            def comes_to(said: Said, values: Values) -> Fraction | None:
+                left, right = of_left(said, values), of_right(said, values)
+                if left is None or right is None or (sign == "/" and not right):
+                    return None
+                if sign == "/":
+                    return left / right
+                return {"+": left + right, "-": left - right, "*": left * right}[sign]
+
+            return comes_to
+        case number:
+            return lambda said, values: number
+
+
+def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[[Said, Values], bool]:
+    """Return a comparison as a test; with what comes to nothing it doesn't hold."""
+    of_left, of_right = worth(condition.left, key, relations), worth(condition.right, key, relations)
+    holds = COMPARING[condition.operator]
+
+    def test(said: Said, values: Values) -> bool:
+        left, right = of_left(said, values), of_right(said, values)
+        return (left is not None and right is not None and holds(left, right)) is not condition.negated
+
+    return test
+
+
+def changed(
+    effects: Iterable[tuple[Cell, str, Fraction | None]], said: Said, quantities: Mapping[str, Quantity | None]
+) -> list[tuple[str, Arguments, str]] | None:
+    """Return the amounts after effects, each changed by what held before; None if one can't be what it would be.
+
+    An effect is a symbol, what is done to it, and by how much; on one that doesn't exist it has no effect.
+    """
+    after: dict[Cell, Fraction | None] = {}
+    for cell, operation, by in effects:
+        text = said(*cell)
+        if text is None:
+            continue
+        old = after.get(cell, Fraction(text))
+        if by is None or old is None:
+            after[cell] = None
+        else:
+            new = {"assign": by, "scale": old * by, "increase": old + by, "decrease": old - by}
+            after[cell] = new[operation]
+    found = []
+    for cell, result in after.items():
+        quantity = quantities[cell[0]]
+        if result is None or quantity is None or not quantity.allows(result):
+            return None
+        found.append((*cell, written(result)))
+    return found

@@ -1,0 +1,50 @@
+"""What follows from rules, as the checker works it out, without a line in common with any search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+from reasoner.derivation import strata
+from reasoner.symbols import Rule
+
+Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
+
+
+class Definitions:
+    """What is defined, asked one symbol at a time.
+
+    Parameters
+    ----------
+    rules : mapping of situation type to its rules
+    given : function of a situation type and arguments to a truth value
+        Whether one of the rules gives it; what rules ask for in turn they ask of `follows`.
+    """
+
+    def __init__(self, rules: Mapping[str, Sequence[Rule]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
+        self._given = given
+        self._strata = {name: group for group in strata(rules) for name in group}
+        self._asking: dict[tuple[str, ...], dict[Cell, bool]] = {}
+
+    def follows(self, cell: Cell) -> bool:
+        """Return whether something that is defined holds: whether its rules give it, or what they ask for in turn.
+
+        What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
+        tried again until nothing more becomes true.
+        """
+        stratum = self._strata[cell[0]]
+        asked = self._asking.get(stratum)
+        if asked is not None:
+            return asked.setdefault(cell, False)
+        asked = self._asking[stratum] = {cell: False}
+        seen, grown = 0, False
+        try:
+            while not asked[cell] and (seen < len(asked) or grown):
+                fresh = list(asked)[seen:]
+                seen, grown = len(asked), bool(fresh) and grown
+                for one in fresh or [one for one in reversed(asked) if not asked[one]]:
+                    asked[one] = self._given(*one)
+                    grown |= asked[one]
+            return asked[cell]
+        finally:
+            del self._asking[stratum]
