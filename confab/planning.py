@@ -57,10 +57,11 @@ def plan(
     level: int | None = None,
     leave_levels: bool = True,
 ) -> Result:
-    """Plan in this scene.
+    """Plan in a scene; as a method of `confab.scene.Scene`, in this one.
 
     Parameters
     ----------
+    scene : Scene
     goals : str or iterable of str
         Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
@@ -77,7 +78,8 @@ def plan(
         File of observed facts, which replace the scene's.
     engine : str, optional
         A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
-        where ours gives up, for which two fifths of a time limit are kept; with ``none`` none is.
+        where ours gives up and levels may be left, and is given what is left of a time limit, at least two fifths of it; with
+        ``none`` none is.
     level : int, optional
         The level that the engine plans; the lowest if left out.
     leave_levels : bool

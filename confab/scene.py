@@ -9,9 +9,10 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import ontology
+from confab import planning
 from confab.accepting import AnyPlan, Facts, plan_of
 from confab.known import Known
-from confab.planning import Result, plan
+from confab.planning import Result
 from planner.plan import Plan
 from planner.solve import DEFAULT_MODE
 from reasoner.graph.inference import infer
@@ -42,53 +43,7 @@ class Scene(Known):
         What loading took.
     """
 
-    def plan(
-        self,
-        goals: Facts = (),
-        memory: Memory | Links | str | Path | None = None,
-        mode: str = DEFAULT_MODE,
-        time_limit: float | Deadline | None = None,
-        optimal: bool = False,
-        observed: str | Path | None = None,
-        engine: str | None = None,
-        level: int | None = None,
-        leave_levels: bool = True,
-    ) -> Result:
-        """Plan in this scene.
-
-        Parameters
-        ----------
-        goals : str or iterable of str
-            Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
-        memory : Memory, its file or endpoint, or Links alone in paper mode; optional
-            What was learned before; none if left out.
-        mode : str
-            ``paper``: A* with eq. (5) on each level, over everything that SPARQL quantifies in the scene. ``guarded``,
-            ``leading`` and ``strict``: the fast planner over what the task can need, and how far experience may lead
-            it; behaviours are then numbered among the individuals that were recognised. ``optimal``: as `optimal` says.
-        time_limit : float or Deadline, optional
-            Seconds after which the call gives up, or when; `OPTIMAL_SECONDS` if `optimal` is asked for and nothing is said.
-        optimal : bool
-            Improve the plan until it is proved optimal or a limit comes, and tell the bound; without memory.
-        observed : str or Path, optional
-            File of observed facts, which replace the scene's.
-        engine : str, optional
-            A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
-            where ours gives up at a limit other than that of time; with ``none`` none is.
-        level : int, optional
-            The level that the engine plans; the lowest if left out.
-        leave_levels : bool
-            Whether steps of a lower level may stand where a level has no plan that can be refined; the outcome says where, and
-            what they break that only the level above asks.
-
-        Raises
-        ------
-        KnowledgeError
-            A goal names what the scene doesn't have, the mode is unknown, or options exclude each other.
-        LimitError
-            The time was over before the search began; if it is over later, the outcome says so.
-        """
-        return plan(self, goals, memory, mode, time_limit, optimal, observed, engine, level, leave_levels)
+    plan = planning.plan
 
     def picture(self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False) -> Any:
         """Draw the table with its places, a behaviour, or the classes: into a file, or as an image that a notebook shows.

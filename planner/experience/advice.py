@@ -25,7 +25,7 @@ from planner.experience.leading import SEARCHING, Candidate, Guide, follow, go_o
 from planner.experience.lessons import rules_in
 from planner.hierarchical import planner as fast
 from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import OpenRole, Template
+from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import LimitError, Limits, Outcome, Status
 from reasoner.amounts import meets
@@ -95,7 +95,7 @@ class Memory:
         for name, one in sorted(self.experience.said.items()):
             if isinstance(one, Method) and name not in self.experience.disabled and self._fits(one, using):
                 tally = self.totals.get(name, {}).get(ITSELF, Tally())
-                template = Template(one.steps, tuple(OpenRole(r.kind, r.source, r.becomes) for r in one.open))
+                template = Template(one.steps, one.open)
                 known = templates.setdefault(one.behavior, [])
                 if tally.failed <= tally.chosen and template not in known:
                     known.append(template)

@@ -22,7 +22,7 @@ from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.paper.learning import LearningError
 from planner.plan import LimitError, Limits, Plan, Step
 from planner.transitions import Cell
-from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, OpenRole, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Rule, Tally
 from reasoner.symbols import Problem
 
 SINGLE, OTHERS = 6, 2
@@ -183,8 +183,7 @@ def methods(problem: Problem, plan: Plan, using: Compiled) -> Iterator[Method]:
 def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> Method:
     """Return a step's refinement over roles."""
     template = refiner.template(grounds(step.steps), own)
-    opened = tuple(OpenRole(role.kind, role.source, role.becomes) for role in template.open)
-    return Method(step.behavior, len(own), template.steps, opened)
+    return Method(step.behavior, len(own), template.steps, template.open)
 
 
 def chosen(

@@ -17,6 +17,7 @@ from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segme
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
 from planner.transitions import Cell, Change, key_of
 from reasoner.amounts import meets
+from reasoner.memory.experience import OpenRole
 from reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4, expansions=60)
@@ -40,19 +41,6 @@ class RefinedStep(NamedTuple):
     arguments: tuple[str, ...]
     bindings: tuple[str, ...]
     steps: tuple[RefinedStep, ...]
-
-
-@dataclass(frozen=True)
-class OpenRole:
-    """A role of a template that its parent doesn't name.
-
-    `kind` is the class of the parameter that it filled; `source` the symbol whose value it is where it is needed first: situation
-    type and places of the arguments; `becomes` the situation type of which it becomes a value, so that a free one is wanted.
-    """
-
-    kind: str
-    source: tuple[str, tuple[int, ...]] | None
-    becomes: str | None
 
 
 @dataclass(frozen=True)
