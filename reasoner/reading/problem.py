@@ -128,6 +128,7 @@ DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLeve
 DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 """What the core says of its nodes in numbers, signs, truth values and text; all else that it says leads to other nodes."""
+OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
 SIGNS = ("+", "-", "*", "/")
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """What is wanted of an amount, as people write it."""
@@ -466,12 +467,17 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         A text, or something without a name, stands where an individual belongs.
     """
     subject, predicate, value = row
+    if text(predicate) in OF_ONTOLOGIES:
+        said = local_name(text(predicate))
+        raise KnowledgeError(
+            f"<{text(subject)}>: {said} is said of an ontology, not of an individual; move it beside owl:imports"
+        )
     for term in (subject, value):
         if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
             what = f"'{text(term)[:60]}', a text" if isinstance(term, ox.Literal) else "something without a name"
             raise KnowledgeError(
-                f"<{text(subject)}>: {local_name(text(predicate))} leads to {what}, where an individual belongs; "
-                "name one, without quotation marks"
+                f"<{text(subject)}>: {local_name(text(predicate))} leads to {what}, where an individual belongs; name one"
+                + (", without quotation marks" if isinstance(term, ox.Literal) else "")
             )
     return text(subject), text(predicate), text(value)
 

@@ -29,6 +29,7 @@ from reasoner.symbols import (
     Condition,
     Problem,
     ValueCondition,
+    ValueEffect,
     Witness,
 )
 from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
@@ -330,6 +331,69 @@ def _words(condition: Condition) -> str:
     return type(condition).__name__
 
 
+def gaps_of_values(case: Case) -> Iterator[Fault]:
+    """Find effects none of whose values a behaviour of the next level leads to."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    leads: dict[tuple[int, str], set[str]] = defaultdict(set)
+    for behavior in problem.domain.behaviors.values():
+        for effect in behavior.effects:
+            leads[behavior.level, effect.situation].update(_individuals(effect.value, behavior, problem))
+    for behavior in problem.domain.behaviors.values():
+        level = behavior.level + 1
+        for effect in behavior.effects:
+            values, finer = _individuals(effect.value, behavior, problem), leads.get((level, effect.situation))
+            if values and finer and finer.isdisjoint(values):
+                kind = behavior.kinds.get(effect.value)
+                said = f"a {kind}" if kind else effect.value
+                yield (
+                    names.iri(behavior.name),
+                    f"{behavior.name} on level {behavior.level} gives {effect.situation} {said}, "
+                    f"and no behaviour of level {level} gives that",
+                    "a refinement has to reach the same situation with behaviours of the next level; here it can't",
+                    f"add a behaviour on level {level} with that effect, or widen the class of a parameter of one that has another",
+                )
+
+
+def crowded_places(case: Case) -> Iterator[Fault]:
+    """Find things that have one value together at first, though every behaviour that gives it asks for it to be free."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    asks: dict[tuple[str, str], set[str]] = {}  # of what is given: the classes of which nobody may have it already
+    for behavior in problem.domain.behaviors.values():
+        for effect in behavior.effects:
+            free = {kind for c in behavior.preconditions if (kind := _none_has(c, effect))}
+            for value in _individuals(effect.value, behavior, problem):
+                given = effect.situation, value
+                asks[given] = asks.get(given, free) & free
+    holders: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for symbol, value in sorted(problem.initial.items()):
+        if len(symbol.arguments) == 1 and asks.get((symbol.situation, value)):
+            holders[symbol.situation, value].append(symbol.arguments[0])
+    for (situation, value), individuals in holders.items():
+        for kind in sorted(asks[situation, value]):
+            several = [one for one in individuals if one in problem.classes.get(kind, ())]
+            if len(several) > 1:
+                some = ", ".join(several[:5]) + (", …" if len(several) > 5 else "")
+                yield (
+                    names.iri(several[1]),
+                    f"the {situation} of {some} is {value} at first, though each behaviour giving that asks that no {kind} has it",
+                    "no behaviour leads to such a situation, so it is likely not meant",
+                    f"state another {situation} of all but one, or let the behaviours take several {kind} there",
+                )
+
+
+def _none_has(condition: Condition, effect: ValueEffect) -> str:
+    """Return the class none of which has the value of an effect, if that is what a condition says."""
+    match condition:
+        case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
+            same = (situation, about, value) == (effect.situation, variable, effect.value)
+            return kind if same and value.startswith("?") else ""
+    return ""
+
+
 AXIOMS_OF_PROPERTIES = {
     OWL + "TransitiveProperty": "is transitive",
     OWL + "SymmetricProperty": "is symmetric",
@@ -450,6 +514,10 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "file-name-and-iri": files_and_iris,
     "undetermined-variable": undetermined_variables,
     "unreachable": unreachable_behaviors,
+    "value-gap": gaps_of_values,
+    "crowded": crowded_places,
     "definition-without-effect": definitions_without_effect,
     "unit-mismatch": unlike_units,
 }
+WARNINGS = frozenset({"crowded"})
+"""Rules of what can be planned with all the same."""

@@ -33,7 +33,7 @@ from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.updates.compiling import Fault
 from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
-from reasoner.validation.rules import RULES, Case, misread
+from reasoner.validation.rules import RULES, WARNINGS, Case, misread
 from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
 def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
     for rule, faults in RULES.items():
         for node, what, why, remedy in faults(case):
-            yield places.finding(rule, node, what, why, remedy)
+            yield places.finding(rule, node, what, why, remedy, WARNING if rule in WARNINGS else ERROR)
 
 
 def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -> Iterator[Finding]:
