@@ -159,12 +159,17 @@ Condition: TypeAlias = (
 
 @dataclass(frozen=True)
 class ValueEffect:
-    """``situation(arguments)`` becomes `value`, if all of `when` held before; variables in `when` are determined there."""
+    """``situation(arguments)`` becomes `value`, if all of `when` held before; variables in `when` are determined there.
+
+    With `each`, it does so for every individual of that class in place of that variable: as long as a behaviour is lifted. In a
+    `Problem` there is an effect for each of them (`spread`).
+    """
 
     situation: str
     arguments: tuple[str, ...]
     value: str
     when: tuple[Condition, ...] = ()
+    each: Parameter | None = None
 
 
 @dataclass(frozen=True)
@@ -179,6 +184,10 @@ class AmountEffect:
     operation: str
     amount: Expression
     when: tuple[Condition, ...] = ()
+    each: Parameter | None = None
+
+
+Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
 # ---------------------------------------------------------------------------------------------------------- behaviours
@@ -416,6 +425,33 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
             return AnyOf(tuple(tuple(substituted(c, terms) for c in group) for group in alternatives), negated)
         case Comparison(one, sign, other, negated):
             return Comparison(put_in(one, terms), sign, put_in(other, terms), negated)
+
+
+def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior:
+    """Return a behaviour with an effect for each individual of a class in place of one for all of them."""
+    if all(effect.each is None for effect in behavior.every_effect):
+        return behavior
+
+    def single(effect: Effect) -> list[Effect]:
+        if effect.each is None:
+            return [effect]
+        found: list[Effect] = []
+        for one in classes.get(effect.each.kind, ()):
+            terms = {effect.each.name: one}
+            arguments = tuple(terms.get(a, a) for a in effect.arguments)
+            when = tuple(substituted(condition, terms) for condition in effect.when)
+            if isinstance(effect, ValueEffect):
+                value = terms.get(effect.value, effect.value)
+                found.append(ValueEffect(effect.situation, arguments, value, when))
+            else:
+                by = put_in(effect.amount, terms)
+                found.append(AmountEffect(effect.situation, arguments, effect.operation, by, when))
+        return found
+
+    every = [one for effect in behavior.every_effect for one in single(effect)]
+    effects = tuple(one for one in every if isinstance(one, ValueEffect))
+    amounts = tuple(one for one in every if isinstance(one, AmountEffect))
+    return replace(behavior, effects=effects, amounts=amounts)
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:

@@ -53,6 +53,7 @@ from reasoner.symbols import (
     Comparison,
     Condition,
     Domain,
+    Effect,
     EqualityCondition,
     Parameter,
     Problem,
@@ -63,6 +64,8 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    spread,
+    substituted,
 )
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, TYPE
 
@@ -199,6 +202,13 @@ class Schema:
         amounts = {p for iri in self.of_kind("Amount") for p in self.nodes[iri].get(CORE + "valueProperty", ())}
         return frozenset(amounts.union(self.by_kind.get(OWL + "DatatypeProperty", ())))
 
+    @cached_property
+    def individuals_of(self) -> frozenset[str]:
+        """The classes of objects: where an individual is expected, they stand for all of theirs."""
+        known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}
+        known |= {iri for iri, node in self.expressions.items() if OWL + "equivalentClass" in node}
+        return frozenset(known - self.nodes.keys())
+
     def of_kind(self, *kinds: str) -> list[str]:
         """Return the nodes of some classes of the core."""
         return [iri for kind in kinds for iri in self.by_kind.get(CORE + kind, ())]
@@ -273,7 +283,7 @@ def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
     """Return behaviours as they are written: with IRIs for names, and classes that situations define left as they are named."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
-    parts = _Schema(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names))
+    parts = _Schema(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
     return {iri: parts.behavior(iri) for iri in behaviors}
 
 
@@ -281,7 +291,8 @@ def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
 class Frame:
     """A schema as values, for some individuals: everything of a problem but its facts and its goal.
 
-    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values.
+    `properties` leads from the IRI of a value property to the name of its situation type, and whether it takes many values;
+    `lifted` are the behaviours with effects for all of a class still in one.
     """
 
     schema: Schema
@@ -290,6 +301,7 @@ class Frame:
     classes: dict[str, tuple[str, ...]]
     parents: dict[str, tuple[str, ...]]
     properties: dict[str, tuple[str, bool]]
+    lifted: dict[str, Behavior]
 
     @property
     def names(self) -> Names:
@@ -323,28 +335,28 @@ def frame(
     )
     definitions = _definitions(schema, names)
     terms = set(schema.of_kind("Parameter", "Variable"))
-    parts = _Schema(nodes, names, terms, set(schema.pairs), definitions)
+    parts = _Schema(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
     classes, parents = _classes(instances, supers, names)
     situations, properties = _situations(parts, schema, classes)
     if earlier is not None and earlier.names.agree(names):
-        behaviors = earlier.domain.behaviors
+        lifted = earlier.lifted
     else:
         ordered = sorted(_ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
-        behaviors = {names.short(iri): parts.behavior(iri) for iri in ordered}
+        lifted = {names.short(iri): parts.behavior(iri) for iri in ordered}
     rules = _rules(parts, schema, {s.name: s for s in situations})
     domain = Domain(
         situations={s.name: s for s in _on_their_levels(situations, rules)},
-        behaviors=behaviors,
+        behaviors={name: spread(behavior, classes) for name, behavior in lifted.items()},
         first_ids={
             parts.level(iri): parts.number(iri, "firstId", 0, HIGHEST_NUMBER, 0) for iri in schema.of_kind("Level")
         },
         rules=rules,
     )
-    for behavior in domain.behaviors.values():
+    for behavior in lifted.values():
         _check_behavior(behavior, domain)
     for rule in chain.from_iterable(rules.values()):
         _check_behavior(rule.behavior, domain)
-    return Frame(schema, parts, domain, classes, parents, properties)
+    return Frame(schema, parts, domain, classes, parents, properties, lifted)
 
 
 def reading_of(
@@ -599,6 +611,10 @@ class _Schema:
     terms: set[str]
     pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
     definitions: Definitions
+    individuals_of: frozenset[str] = frozenset()  # classes that stand for all of their individuals
+    standing: dict[str, str] = field(
+        default_factory=dict
+    )  # those of what is being read, and the term for each individual
     inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
     count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
 
@@ -653,6 +669,8 @@ class _Schema:
         """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
         if iri in self.terms:
             return "?" + local_name(iri).rsplit(".", 1)[-1]
+        if iri in self.standing:
+            return self.standing[iri]
         name = self.names.short(iri)
         if self.terms and name not in self.names and name not in (TRUE, FALSE):  # a scene's facts have no terms
             raise KnowledgeError(
@@ -703,8 +721,38 @@ class _Schema:
                 f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
             )
         self.inside.append(iri)
-        found = self._condition(iri)
+        found = self._of_all(iri)
         self.inside.pop()
+        return found
+
+    def classes_in(self, iri: str) -> list[str]:
+        """Return the classes that stand in the place of an individual of a condition or an effect, and stand for nobody yet."""
+        said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
+        found = [value for value in said if value in self.individuals_of and value not in self.standing]
+        if twice := [kind for kind in found if found.count(kind) > 1]:
+            raise KnowledgeError(
+                f"<{iri}> names the class {local_name(twice[0])} twice, so that it can't be told whether the same individual is "
+                "meant; use a :Witness with a variable for one of them"
+            )
+        situation = self.values(iri, "situationType")[:1]
+        if found and found[-1:] == [*self.values(iri, "value")] and situation and situation[0] not in self.pairs:
+            raise KnowledgeError(
+                f"<{iri}> wants every {local_name(found[-1])} as the one value of {local_name(situation[0])}; name an individual, "
+                "or seek some one by a :Witness"
+            )
+        return found
+
+    def _of_all(self, iri: str) -> Condition:
+        """Return a condition; of a class in the place of an individual it asks for each of the class."""
+        kinds = self.classes_in(iri)
+        for kind in kinds:
+            self.standing[kind] = f"?each{len(self.standing) or ''}"
+        found = self._condition(iri)
+        for kind in reversed(kinds):
+            term = self.standing.pop(kind)
+            contrary = replace(found, negated=not found.negated)
+            inner = (*self.definitions.beyond_base(term, kind), contrary)
+            found = Witness(term, self.names.short(self.definitions.base(kind)), inner, negated=True)
         return found
 
     def _condition(self, iri: str) -> Condition:
@@ -791,7 +839,24 @@ class _Schema:
             return self.conditions(iri, "condition")
         return (self.condition(iri),)
 
-    def effect(self, iri: str) -> ValueEffect:
+    def effect(self, iri: str) -> Effect:
+        """Return an effect; with a class in the place of an individual it is made for each of the class for which `when` holds."""
+        kinds = self.classes_in(iri)
+        if len(kinds) > 1:
+            raise KnowledgeError(
+                f"<{iri}> is about all of two classes, {' and '.join(map(local_name, kinds))}; make one of them a parameter"
+            )
+        for kind in kinds:
+            self.standing[kind] = "?each"
+        of_amount = _is(self.nodes[iri], "AmountEffect")
+        found = self.amount_effect(iri) if of_amount else self.value_effect(iri)
+        for kind in kinds:
+            term = self.standing.pop(kind)
+            each = Parameter(term, self.names.short(self.definitions.base(kind)))
+            found = replace(found, when=(*self.definitions.beyond_base(term, kind), *found.when), each=each)
+        return found
+
+    def value_effect(self, iri: str) -> ValueEffect:
         situation, arguments, value = self.situation_and_value(iri)
         if self.flag(iri, "negated"):
             value = FALSE
@@ -808,8 +873,7 @@ class _Schema:
     def behavior(self, iri: str) -> Behavior:
         parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
-        effects = self.values(iri, "postcondition")
-        of_amounts = [e for e in effects if e in self.nodes and _is(self.nodes[e], "AmountEffect")]
+        effects = [self.effect(effect) for effect in self.values(iri, "postcondition")]
         return Behavior(
             name=self.names.short(iri),
             level=self.level(iri),
@@ -819,9 +883,9 @@ class _Schema:
                 *self.conditions(iri, "precondition"),
                 *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
             ),
-            effects=tuple(self.effect(value) for value in effects if value not in of_amounts),
+            effects=tuple(effect for effect in effects if isinstance(effect, ValueEffect)),
             cost=self.cost(iri),
-            amounts=tuple(map(self.amount_effect, of_amounts)),
+            amounts=tuple(effect for effect in effects if isinstance(effect, AmountEffect)),
         )
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
@@ -1143,8 +1207,8 @@ def _check_amount(symbol: Symbol, value: str, quantity: Quantity) -> None:
 def _with_goal(problem: Problem, known: Frame) -> Problem:
     schema, goal = known.parts, dict[Symbol, str]()
     for task in known.schema.of_kind("Task"):
-        for iri in schema.values(task, "goal"):
-            wanted = schema.condition(iri)
+        goals = schema.values(task, "goal")
+        for iri, wanted in ((goal, one) for goal in goals for one in _wanted(schema, goal, known)):
             if isinstance(wanted, Comparison):
                 symbol, value = _bounds(iri, wanted)
                 value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
@@ -1163,6 +1227,29 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
                 )
     return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _wanted(schema: _Schema, iri: str, known: Frame) -> list[Condition]:
+    """Return what a goal wants: of a class in the place of an individual, the same of each of the class."""
+    found = schema.condition(iri)
+    if not (isinstance(found, Witness) and schema.classes_in(iri)):
+        return [found]
+    wanted: list[Condition] = [found]
+    while isinstance(found, Witness):
+        *others, _ = found.conditions
+        if others:
+            raise KnowledgeError(
+                f"<{iri}> wants something of all of a class whose individuals change; name a class that situations don't define, "
+                "or want a situation type that is defined"
+            )
+        wanted = [
+            substituted(one.conditions[-1], {one.variable: member})
+            for one in wanted
+            if isinstance(one, Witness)
+            for member in known.classes.get(one.kind, ())
+        ]
+        found = found.conditions[-1]
+    return [replace(one, negated=not one.negated) for one in wanted]
 
 
 def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:

@@ -51,6 +51,7 @@ from reasoner.symbols import (
     Condition,
     RelationCondition,
     ValueCondition,
+    ValueEffect,
     Witness,
 )
 from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, PREFIXES, RDF, TYPE
@@ -141,21 +142,27 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     more_situations : iterable of str
         Situation types that count besides those of the task's goals.
     """
-    found = Routes(forward=set(known.properties) - known.schema.numbers)
+    found = Routes(forward=set(known.properties) - known.schema.numbers, classes=_goal_classes(known.schema))
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
     looked_up: dict[str, set[str]] = {}
     spanned = set[tuple[int, int, bool]]()
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
-    doing = [*known.domain.behaviors.values(), *rules]
+    doing = [*known.lifted.values(), *rules]
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
         for behavior in doing:
             if not behavior.changes & counting:
                 continue
             counting |= behavior.changes
-            kinds = behavior.kinds
-            changes = [((e.value,), e) for e in behavior.effects] + [(terms_of(e.amount), e) for e in behavior.amounts]
+            kinds = {
+                **behavior.kinds,
+                **{e.each.name: e.each.kind for e in behavior.every_effect if e.each is not None},
+            }
+            changes = [(_values_of(e), e) for e in behavior.effects] + [
+                (terms_of(e.amount), e) for e in behavior.amounts
+            ]
             for number, (values, effect) in enumerate(changes):
+                kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}
                 starts = {False: set(effect.arguments)}
                 if effect.situation in looked_up and any(
                     value.startswith("?") or value in looked_up[effect.situation] for value in values
@@ -176,6 +183,11 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
                     for scope in scopes[1:]:
                         _span(scope, start | own, set(), known, found, looked_up)
     return found
+
+
+def _values_of(effect: ValueEffect) -> tuple[str, ...]:
+    """Return the value that an effect gives; where it makes a pair true or false, that is the second of them."""
+    return effect.arguments[1:] if effect.value in (TRUE, FALSE) and len(effect.arguments) == 2 else (effect.value,)
 
 
 @dataclass(frozen=True)
@@ -530,7 +542,7 @@ def _constants(schema: Schema) -> set[str]:
         known = {*schema.swrl, *schema.supers, *chain.from_iterable(schema.supers.values())}
         said = (*named, *(SWRL + f"argument{place}" for place in (1, 2)))
         found |= {v for node in schema.swrl.values() for name in said for v in node.get(name, ()) if ":" in v} - known
-    return (found - set(schema.nodes)) | {CORE + "true", CORE + "false"}
+    return (found - set(schema.nodes) - schema.individuals_of) | {CORE + "true", CORE + "false"}
 
 
 def _goal_conditions(schema: Schema) -> set[str]:
@@ -545,7 +557,14 @@ def _goal_individuals(schema: Schema) -> set[str]:
     """Return what the goals and the facts about nobody name."""
     goals = [schema.nodes.get(iri, {}) for iri in _goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
-    return {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}
+    named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}
+    return named - schema.individuals_of
+
+
+def _goal_classes(schema: Schema) -> set[str]:
+    """Return the classes of which goals want something of all individuals."""
+    goals = (schema.nodes.get(iri, {}) for iri in _goal_conditions(schema))
+    return {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
 
 
 def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:

@@ -713,7 +713,9 @@ class _Writer:
         said = {(t.subject, t.predicate, t.object) for group in asked for t in group.parts if isinstance(t, Triple)}
         for one in operation.delete:
             self.changes(one)
-            one_value = self.iri(one.predicate) not in self.pairs and _last(one) != Truth(True)
+            prop = self.iri(one.predicate)
+            pair = prop in self.vocabulary.properties and prop not in self.vocabulary.functional
+            one_value = not pair and _last(one) != Truth(True)
             numeric = self.vocabulary.numeric(self.iri(one.predicate)) and self.numbers.get(str(_last(one))) == one
             if not one_value:
                 self.effect(one, when, known, negated=True)

@@ -1,0 +1,136 @@
+"""What follows inside planning beside Fast Downward, which knows axioms: solvability and the least number of steps.
+
+python -m benchmarks axioms
+CONFAB_PROBLEMS=200 …        how many random problems, half of nested boxes, half of rooms that open doors join
+CONFAB_PEERS=PYTHON …        a Python that has up-fast-downward
+
+The problems are those of the shipped worlds packing and gallery with other individuals, states and goals; Fast Downward gets what
+`confab export` writes of them, and searches by A* without a heuristic.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from time import process_time
+
+from benchmarks.pddl import peers, planners, run
+from planner.plan import Limits, Status
+from planner.solve import Request, solve
+from planner.validation import Facts
+from reasoner.graph.knowledge import load
+from reasoner.pddl.exporting import to_pddl
+from reasoner.reading.problem import read
+from reasoner.symbols import TRUE, Problem, Symbol
+
+SECONDS = 60.0
+
+
+def boxes(problem: Problem, rng: Random) -> Problem:
+    """Return a random problem of boxes in boxes: one or two goals about what is around what, or stored away."""
+    rooms, count = ["hall", "vault"][: rng.choice((2, 2, 1))], rng.choice((2, 3, 3, 4))
+    cases, things = [f"box{i}" for i in range(count)], ["ring"]
+    initial = {}
+    for place, thing in enumerate([*cases, *things]):  # a box lies in a room or in a box before it
+        initial[Symbol("LIES_IN", (thing,))] = rng.choice([*rooms, *cases[: min(place, count)]])
+    initial |= {Symbol("SHUT", (box,)): TRUE for box in cases if rng.random() < 0.5}
+    members = {"Room": rooms, "Vault": rooms[1:], "Box": cases, "Thing": cases + things, "Place": rooms + cases}
+    members |= dict.fromkeys(("INSIDE", "LIES_IN"), members["Place"]) | {"Object": rooms + cases + things}
+    wanted = [Symbol("INSIDE", (one, other)) for one, other in pairwise(rng.sample([*things, *cases], 3))]
+    wanted = [symbol for symbol in wanted if symbol.arguments[1] in cases]
+    wanted.append(rng.choice([Symbol("STORED_AWAY", ("ring",)), Symbol("INSIDE", ("ring", rng.choice(rooms)))]))
+    return _with(problem, members, {}, initial, dict.fromkeys(rng.sample(wanted, rng.choice((1, len(wanted)))), TRUE))
+
+
+def rooms(problem: Problem, rng: Random) -> Problem:
+    """Return a random problem of rooms that doors join: where the guard shall be, and ways that shall be open or not."""
+    count = rng.choice((4, 5, 6))
+    places = [f"room{i}" for i in range(count)]
+    doors, initial = [], {}
+    door_of, switch = set[tuple[str, ...]](), set[tuple[str, ...]]()
+    joined = [[*both] for both in pairwise(places)] + [rng.sample(places, 2) for _ in range(rng.choice((0, 1, 2)))]
+    for i, both in enumerate(joined):
+        door = f"door{i}"
+        doors.append(door)
+        door_of |= {(door, place) for place in both}
+        switch |= {(door, place) for place in rng.sample(rng.choice((places, both, both)), rng.choice((0, 1, 1, 2)))}
+        if rng.random() < 0.4:
+            initial[Symbol("OPEN", (door,))] = TRUE
+    initial[Symbol("AT", ("guard",))] = rng.choice(places)
+    members = {"Room": places, "Door": doors, "Guard": ["guard"], "Object": [*places, *doors, "guard"]}
+    members |= dict.fromkeys(("AT", "JOINED", "WAY"), places)
+    wanted = {Symbol("AT", ("guard",)): rng.choice(places)} if rng.random() < 0.6 else {}
+    for _ in range(rng.choice((1, 2))):
+        one, other = rng.sample(places, 2)
+        wanted[Symbol("WAY", (one, other))] = rng.choice((TRUE, TRUE, "false"))
+    return _with(problem, members, {"doorOf": door_of, "workedFrom": switch}, initial, wanted)
+
+
+def _with(
+    problem: Problem,
+    members: dict[str, list[str]],
+    relations: dict[str, set[tuple[str, ...]]],
+    initial: dict[Symbol, str],
+    goal: dict[Symbol, str],
+) -> Problem:
+    classes = {name: tuple(members.get(name, ())) for name in problem.classes} | {"Truth": problem.classes["Truth"]}
+    static = {name: frozenset(rows) for name, rows in relations.items()}
+    return replace(problem, classes=classes, relations=static, initial=initial, goal=goal)
+
+
+def downward(problem: Problem, command: list[str]) -> int | None:
+    """Return the length of Fast Downward's shortest plan, None if it proves that there is none."""
+    written = to_pddl(problem)
+    with TemporaryDirectory() as folder:
+        domain, task = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
+        domain.write_text(written.domain)
+        task.write_text(written.problem)
+        done = run(command, domain, task, cap=int(SECONDS))
+    if done.plan is None and "unsolvable" not in done.output and "no solution" not in done.output:
+        raise RuntimeError(done.output[-1500:])
+    return None if done.plan is None else len(done.plan)
+
+
+def deepest(problem: Problem) -> int:
+    """Return how many individuals stand in a row by what is transitive, in the initial state."""
+    name = "INSIDE" if "INSIDE" in problem.domain.rules else "WAY"
+    facts, (one, other) = Facts(problem, problem.initial), problem.domain.situations[name].arguments
+    return max(sum(facts.value(name, (a, b)) == TRUE for b in problem.classes[other]) for a in problem.classes[one])
+
+
+def main() -> None:
+    """Print how many problems agree."""
+    half = int(os.environ.get("CONFAB_PROBLEMS", "200")) // 2
+    command = planners(peers())["lama-first"]
+    place = command.index("--alias")
+    command = [*command[:place], *command[place + 2 :], "--search", "astar(blind())"]
+    counts, wrong, seconds = Counter[str](), list[str](), dict.fromkeys(("optimal", "guarded"), 0.0)
+    for name, make in (("packing", boxes), ("gallery", rooms)):
+        world = read(load(f"{name}-small")).problem
+        for seed in range(half):
+            problem = make(world, Random(seed))
+            theirs = downward(problem, command)
+            counts[f"{name}: solvable"] += theirs is not None
+            counts[f"{name}: chains of three and more"] += deepest(problem) >= 3
+            counts[f"{name}: steps"] += theirs or 0
+            for mode in seconds:
+                begin = process_time()
+                found = solve(Request(problem, mode, Limits(10_000_000, SECONDS)))
+                seconds[mode] += process_time() - begin
+                solved = found.status is Status.SOLVED
+                if solved is not (theirs is not None) or found.status is Status.GAVE_UP:
+                    wrong.append(f"{name} {seed} {mode}: {found.status.name}, Fast Downward: {theirs}")
+                elif solved and found.plan is not None:
+                    counts[f"{name}: steps of {mode}"] += len(found.plan.steps)
+                    if mode == "optimal" and len(found.plan.steps) != theirs:
+                        wrong.append(f"{name} {seed}: {len(found.plan.steps)} steps, Fast Downward: {theirs}")
+    print("| of each world's " + str(half) + " | |\n|---|---|")
+    for what, many in sorted(counts.items()):
+        print(f"| {what} | {many} |")
+    print("\nCPU s:", ", ".join(f"{mode} {spent:.1f}" for mode, spent in seconds.items()))
+    print(f"\nDisagreements: {len(wrong)}", *wrong, sep="\n")
