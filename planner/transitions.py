@@ -96,6 +96,11 @@ class Table:
                 keys[key] = None
         self.trail.append((situation, key, old))
 
+    def put_all(self, values: Mapping[Cell, str]) -> None:
+        """Give several symbols values."""
+        for (situation, key), value in values.items():
+            self.put(situation, key, value)
+
     def undo(self, mark: int) -> None:
         """Take back all changes since the trail had the length `mark`."""
         trail = self.trail

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import groupby
 from operator import contains, itemgetter
 from typing import TypeAlias
 
@@ -172,9 +171,17 @@ class _Check:
 
 def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
     """Yield each step of a level by itself, and what is below that level in stretches."""
-    for lower, group in groupby(steps, key=lambda step: step.level > level):
-        part = list(group)
-        yield from [part] if lower else ([step] for step in part)
+    lower: list[Step] = []
+    for step in steps:
+        if step.level > level:
+            lower.append(step)
+            continue
+        if lower:
+            yield lower
+            lower = []
+        yield [step]
+    if lower:
+        yield lower
 
 
 # ------------------------------------------------------------------------------------------------------ states and rules

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner
@@ -12,9 +12,13 @@ from reasoner.symbols import ValueCondition
 
 @dataclass(frozen=True)
 class Concern:
-    """A step with the individuals that it moved, and the symbols of its own level that it changed and that it asked for."""
+    """A step with the individuals that it moved, and the symbols of its own level that it changed and that it asked for.
+
+    `after` has what is otherwise after it than before, on all levels.
+    """
 
     step: RefinedStep
+    after: Mapping[Cell, str]
     moved: frozenset[str]
     touched: frozenset[Cell]
     asked: frozenset[Cell]
@@ -64,4 +68,6 @@ def concern(refiner: Refiner, step: RefinedStep, mark: int) -> Concern:
         for c in behavior.preconditions
         if isinstance(c, ValueCondition) and not c.negated
     )
-    return Concern(step, frozenset(moved & {*arguments, *bindings}), frozenset(touched), asked)
+    return Concern(
+        step, refiner.table.since(mark), frozenset(moved & {*arguments, *bindings}), frozenset(touched), asked
+    )

@@ -210,8 +210,7 @@ class Improver:
                 k = j + 1
                 continue
             self.table.undo(mark)
-            if not self.refiner.redo(parts[k][0]):
-                return list(steps)
+            self.table.put_all(changes[k][1])  # all is as it was when these changes were noted
             kept.append(parts[k])
             k += 1
         self.table.undo(0)
@@ -279,14 +278,15 @@ class Improver:
                 position = members[-1] + 1 - len(between)
                 rest[position : members[-1] + 1] = between
                 continue
-            again: RefinedStep | None = rest[position].step
+            step = rest[position].step
             if position < disturbed:
-                again = self.refiner.again(rest[position].step)
-            elif not self.refiner.redo(rest[position].step):
-                again = None
-            if again is None:
-                return steps
-            found.append(again)
+                again = self.refiner.again(step)
+                if again is None:
+                    return steps
+                step = again
+            else:
+                self.table.put_all(rest[position].after)
+            found.append(step)
             position += 1
         return found
 
