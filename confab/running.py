@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from confab.memory import Memory, undisturbed
@@ -10,6 +12,7 @@ from confab.physics import Report
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, with_reach
+from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene, load
 from confab.show import show
 from planner.plan import Status
@@ -56,7 +59,12 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
         show(result)
         print(f"report    {reported(scene, result, None, None, out)}")
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
-    report = verified(scene, result, seed, out / "run.mp4" if film else None, gui) if bodies else None
+    report = None
+    if bodies:
+        video = out / "run.mp4" if film else None
+        scene, result, report = persuaded(
+            scene, result, seed, video, gui, partial(Scene.plan, memory=remembered, mode=mode)
+        )
     show(result if report is None else report)
     if memory and (report is None or report.verified):
         with undisturbed(memory):
@@ -68,6 +76,26 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     for what, path in {"memory": memory, **files}.items() if memory else files.items():
         print(f"{what:<9} {path}")
     return YES if report is None or report.verified else NO
+
+
+def persuaded(
+    scene: Scene, result: Result, seed: int, video: Path | None, gui: bool, plan: Callable[[Scene], Result]
+) -> tuple[Scene, Result, Report]:
+    """Return the first plan that physics doesn't refute, with what is known by then, and what physics says of it.
+
+    What a planner of motions refutes is known to the next plan, and kept if there is one.
+    """
+    report = verified(scene, result, seed, video, gui)
+    while refuted := refuted_in(scene, report):
+        known = knowing(scene, refuted)
+        tell(f"refuted: {refuted[-1]}; planning anew")
+        another = plan(known)
+        if another.outcome.plan is None or another.plan.primitives == result.plan.primitives:
+            break
+        keep(scene, refuted)
+        scene, result = known, another
+        report = verified(scene, result, seed, video, gui)
+    return scene, result, report
 
 
 def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: bool = False) -> Report:

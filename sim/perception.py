@@ -32,11 +32,12 @@ class Draft:
 
 @dataclass(frozen=True)
 class Perceiver:
-    """How a kind of situation type is read off the world and set up in it."""
+    """How a kind of situation type is read off the world and set up in it; whether its values say where something is."""
 
     observe: Callable[[Engine, PerceiverUse, tuple[str, ...]], str | None]
     arrange: Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]
     code: str
+    spatial: bool = False
 
 
 LOOKS = 6
@@ -178,11 +179,11 @@ def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...]
 
 
 BUILT_IN: Mapping[str, Perceiver] = {
-    "perceive_place": Perceiver(observe_place, arrange_place, "misplaced"),
+    "perceive_place": Perceiver(observe_place, arrange_place, "misplaced", True),
     "perceive_content": Perceiver(observe_content, arrange_content, "under-pour"),
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
-    "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected"),
-    "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck"),
+    "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
+    "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),
 }
 

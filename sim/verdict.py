@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from reasoner.symbols import Fact
+
 CODES = {
     "unreachable": "no posture of the arm takes the hand there",
     "goal in collision": "the hand, or what it holds, would touch something there",
@@ -26,15 +28,23 @@ CODES = {
 """Failure codes and what they mean. `Verdict.code` is one of them, or None for success."""
 
 
+REFUTED = ("no path", "goal in collision")
+"""With these codes a planner of motions says that something can't be done as things stand."""
+
+
 @dataclass(frozen=True)
 class Verdict:
-    """How a step went in the world. `measured` has numbers by name; the name ends with the unit."""
+    """How a step went in the world. `measured` has numbers by name; the name ends with the unit.
+
+    `facts` say where everything was that took part, if a planner of motions found no way: as long as they hold there is none.
+    """
 
     ok: bool
     code: str | None = None
     objects: tuple[str, ...] = ()
     measured: Mapping[str, float] = field(default_factory=dict)
     message: str = ""
+    facts: tuple[Fact, ...] = ()
 
     def __str__(self) -> str:
         """Return one line, e.g. ``tracking error: hidden wall (joint_lag_rad 0.084)``."""
@@ -57,6 +67,7 @@ class Verdict:
             "message": self.message,
             "objects": list(self.objects),
             "measured": {name: round(value, 6) for name, value in self.measured.items()},
+            **({"while": [str(fact) for fact in self.facts]} if self.facts else {}),
         }
 
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import TracebackType
 from typing import Protocol
 
 from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import State, Symbol
+from reasoner.symbols import Fact, State, Symbol
 from sim.engine import RATE, Engine
 from sim.perception import Draft, perceiver
 from sim.skills import perform
 from sim.staging import Perturbation, furnish, stage
-from sim.verdict import SkillError, Verdict
+from sim.verdict import REFUTED, SkillError, Verdict
 
 
 class Step(Protocol):
@@ -134,8 +135,17 @@ class World(Engine):
         try:
             measured = perform(self, use, roles)
         except SkillError as failure:
-            return failure.verdict
+            return self._with_facts(failure.verdict, step)
         finally:
             if hand is not None:
                 hand.deadline = math.inf
         return Verdict(True, measured=measured)
+
+    def _with_facts(self, verdict: Verdict, step: Step) -> Verdict:
+        """Return a verdict with where all is that it names, if it found no motion for something that could be elsewhere."""
+        if verdict.code not in REFUTED:
+            return verdict
+        spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}
+        asked = [s for s in self.symbols if s.situation in spatial and s.arguments[0] in verdict.objects]
+        seen = self.observe() if {s.arguments[0] for s in asked} - {*step.arguments} else {}
+        return replace(verdict, facts=tuple(Fact(symbol, seen[symbol]) for symbol in asked if symbol in seen))

@@ -168,6 +168,7 @@ def verify(
 ) -> None:
     """Carry a plan out in physics and check every primitive."""
     from confab.physics import counted
+    from confab.refuting import keep, refuted_in
 
     if out is not None:
         json_file(out)
@@ -176,6 +177,7 @@ def verify(
         report = loaded.verify(
             plan_in(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
         )
+    keep(loaded, refuted_in(loaded, report))
     if out is not None:
         from reasoner.files import write_whole
 
@@ -268,6 +270,10 @@ def execute(
             perturb=perturb,
             both_hands=both_hands,
         )
+    if execution.episode.refuted:
+        from confab.refuting import keep
+
+        keep(loaded, execution.episode.refuted)
     if learn and memory is not None:
         with undisturbed(memory):  # others may have learned meanwhile
             newest = Memory.load(memory, loaded)

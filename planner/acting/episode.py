@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Protocol
 
 from planner.plan import Plan, Reason, Step
+from reasoner.refutations import Refutation
 from reasoner.symbols import Fact, State, Symbol
 
 
@@ -208,6 +209,8 @@ class Episode:
         Those that never came: the episode was over before.
     course : tuple of Seen
         How the situation changed from `initial` to `observed`, in the order of time.
+    refuted : tuple of Refutation
+        What planners of motions found to be impossible as things stood, and what was then done otherwise.
     """
 
     scene: str
@@ -225,3 +228,4 @@ class Episode:
     seconds: Mapping[str, float] = field(default_factory=dict)
     missed: tuple[Intervention, ...] = ()
     course: tuple[Seen, ...] = ()
+    refuted: tuple[Refutation, ...] = ()

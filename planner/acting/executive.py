@@ -32,7 +32,7 @@ from planner.acting.episode import (
     World,
     WorldError,
 )
-from planner.acting.failure_memory import Caution, Static, without_relations
+from planner.acting.failure_memory import Caution, Static, refuted_by, without_relations
 from planner.acting.repair import Planner, difference, mend, replan, vanished
 from planner.acting.symbolic_world import with_individual
 from planner.hierarchical.planner import compiled
@@ -40,6 +40,7 @@ from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
 from planner.validation import successor
 from reasoner.amounts import meets
+from reasoner.refutations import Refutation, with_refuted
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
 logger = logging.getLogger(__name__)
@@ -212,6 +213,7 @@ class _Run:
     begun: dict[tuple[int, ...], State] = field(default_factory=dict)
     attempts: Counter[tuple[str, tuple[str, ...]]] = field(default_factory=Counter)
     withdrawn: set[Static] = field(default_factory=set)
+    refuted: dict[Refutation, None] = field(default_factory=dict)
     rounds: int = 0
     seconds: dict[str, float] = field(default_factory=lambda: {"planning": 0.0, "repairing": 0.0})
     unseen: frozenset[Symbol] | None = None
@@ -220,7 +222,7 @@ class _Run:
     first: Plan = Plan(())  # noqa: RUF009 - frozen
 
     def __post_init__(self) -> None:
-        self.initial, self.relations = dict(self.belief.initial), self.belief.relations
+        self.initial, self.believed = dict(self.belief.initial), self.belief
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -281,6 +283,7 @@ class _Run:
             {**self.seconds, "simulated": clock},
             tuple(self.waiting),
             tuple(self.course),
+            tuple(self.refuted),
         )
 
     def executed(self) -> Plan:
@@ -462,7 +465,8 @@ class _Run:
     def despair(self, outcome: Outcome | None) -> None:
         """Set aside the goals that can't be reached even one by one; if that explains nothing, come to rest and stop."""
         reason = outcome.reason if outcome is not None and outcome.reason else Reason("no plan was found")
-        proved = outcome is not None and outcome.status is Status.UNSOLVABLE and not self.withdrawn
+        doubted = self.withdrawn or self.refuted
+        proved = outcome is not None and outcome.status is Status.UNSOLVABLE and not doubted
         hopeless = []
         for symbol, value in self.belief.goal.items():
             if proved and not meets(self.belief.initial.get(symbol, FALSE), value):
@@ -473,7 +477,7 @@ class _Run:
         if hopeless:
             self.set_aside_the_impossible(hopeless)
             self.doubt("what can't be reached is set aside")
-        elif self.withdrawn and self.try_anew("no other way is left"):
+        elif doubted and self.try_anew("no other way is left"):
             return
         else:
             self.give_up(End.IMPOSSIBLE if proved else End.GAVE_UP, reason)
@@ -504,6 +508,12 @@ class _Run:
             text = f"stopped after {len(self.failures)} failures, the last of {step}: {verdict.message or code}"
             self.give_up(End.GAVE_UP, Reason(text, verdict.objects))
             return
+        refuted = refuted_by(self.belief, chain, getattr(verdict, "facts", ()), code)
+        if refuted and not self.refuted.keys() >= {*refuted}:
+            self.refuted |= dict.fromkeys(refuted)
+            self.rely_on_all_but(self.withdrawn)
+            self.doubt(f"{refuted[-1]}")
+            return
         if self.attempts[step.behavior, step.arguments] < self.patience.attempts:
             return
         relied_on = relations_of(self.belief, chain)
@@ -523,13 +533,15 @@ class _Run:
         self.rounds += 1
         self.attempts.clear()
         self.withdrawn.clear()
+        self.refuted.clear()
         self.rely_on_all_but(())
         self.doubt(f"tried anew: {why}")
         return True
 
     def rely_on_all_but(self, gone: Iterable[Static]) -> None:
-        """Believe in all static facts of the scene except some; what is in progress isn't finished as it was planned."""
-        self.belief = without_relations(replace(self.belief, relations=self.relations), gone)
+        """Believe in all static facts of the scene except some, and in what is refuted; what is in progress is planned anew."""
+        known = replace(self.belief, relations=self.believed.relations, domain=self.believed.domain)
+        self.belief = with_refuted(without_relations(known, gone), self.refuted)
         self.using = compiled(self.belief)
         self.sound = False
 

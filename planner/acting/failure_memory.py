@@ -3,17 +3,21 @@
 A primitive that fails though its preconditions hold casts doubt on the static facts that it relied on: that this hand can
 reach that place, for instance. Counts only grow, so that what several robots have seen can be added up. A fact that failed more
 often than it held isn't relied on as long as there is a plan without it.
+
+What a planner of motions refutes is known at once, and more exactly: there is no way as long as everything is where it is
+(`refuted_by`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from planner.acting.episode import Episode
-from planner.plan import Outcome, Status
-from reasoner.symbols import Problem
+from planner.plan import Outcome, Plan, Status, Step
+from reasoner.refutations import Refutation
+from reasoner.symbols import Fact, Problem
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
@@ -70,3 +74,28 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
     for name, row in gone:
         relations[name] = relations.get(name, frozenset()) - {row}
     return replace(problem, relations=relations)
+
+
+def refuted_by(problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str) -> tuple[Refutation, ...]:
+    """Return what is refuted when a primitive can't be done while some facts hold: it, and what is above it with its arguments.
+
+    Parameters
+    ----------
+    problem : Problem
+    chain : sequence of Step
+        The primitive, behind all that is above it.
+    facts : sequence of Fact
+        Where everything was that took part; none, if nothing can be said. A level above is refuted only if it sees them all.
+    why : str
+    """
+    found, needed = [], {*chain[-1].arguments}
+    for step in chain if facts else ():
+        level = problem.domain.behaviors[step.behavior].level
+        if needed <= {*step.arguments} and all(problem.sees(level, fact.symbol, fact.value) for fact in facts):
+            found.append(Refutation(step.behavior, step.arguments, tuple(facts), why))
+    return tuple(found)
+
+
+def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
+    """Return the step of a plan at a path, behind all that is above it."""
+    return tuple(step for step in plan.walk() if step.path == path[: len(step.path)])

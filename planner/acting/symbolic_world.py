@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from planner.acting.episode import Change, Intervention
 from planner.plan import Step
 from planner.validation import successor
-from reasoner.symbols import Problem, State, Symbol
+from reasoner.symbols import Fact, Problem, State, Symbol
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class Said:
     code: str | None = None
     objects: tuple[str, ...] = ()
     message: str = ""
+    facts: tuple[Fact, ...] = ()
 
 
 DONE = Said(True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
+from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.names import Names
 from reasoner.vocabulary import CORE, OWL, PROV, RDF
@@ -69,6 +69,17 @@ def save_reach(
         ox.Triple(ox.NamedNode(names.iri(hand)), relation, ox.NamedNode(names.iri(place)))
         for hand, place in sorted(pairs)
     ]
+    _write(path, graph, triples)
+
+
+def add_to_reach(path: Path, graph: KnowledgeGraph, triples: Iterable[ox.Triple]) -> None:
+    """Add to what a reach file says of a scene's geometry."""
+    with alone(path):
+        there = [quad.triple for quad in ox.parse(path.read_bytes(), format=ox.RdfFormat.TURTLE)]
+        _write(path, graph, dict.fromkeys((*there, *triples)))
+
+
+def _write(path: Path, graph: KnowledgeGraph, triples: Iterable[ox.Triple]) -> None:
     prefixes = {p: n for p, n in graph.prefixes.items() if p in ("owl", "k", "r", "t")}
     text = ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes={**prefixes, "": CORE, "prov": PROV})
     write_whole(path, text or b"")

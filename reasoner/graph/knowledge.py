@@ -24,7 +24,7 @@ import ontology
 from reasoner.graph.documents import DocumentError, document
 from reasoner.limits import Deadline
 from reasoner.names import nearest
-from reasoner.vocabulary import CORE, PREFIXES
+from reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 if TYPE_CHECKING:
     from reasoner.updates.compiling import Fault, Place
@@ -294,6 +294,23 @@ def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
     reach = path.with_name(f"{path.stem}.reach.ttl")
     if reach.is_file():
         read_into(graph, reach, "reach")
+        _forget_what_names_nothing(graph)
+
+
+def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
+    """Take out of a scene's reach what was refuted about things that the scene has no more (`reasoner.refutations`)."""
+    store, reach, asserted = graph.store, ox.NamedNode(BASE + "reach"), ox.NamedNode(BASE + "asserted")
+    refuted = list(store.quads_for_pattern(None, ox.NamedNode(CORE + "precondition"), None, reach))
+    quads = list(store.quads_for_pattern(None, None, None, reach)) if refuted else []
+    for first in refuted:
+        stem = str(first.object).strip("<>")
+        own = [first, *(quad for quad in quads if str(quad.subject).startswith(f"<{stem}"))]
+        said = {term for quad in own if quad.predicate.value != TYPE for term in (quad.subject, quad.object)}
+        names = [term for term in said if isinstance(term, ox.NamedNode) and not term.value.startswith(stem)]
+        kind = ox.NamedNode(TYPE)
+        if any(next(store.quads_for_pattern(name, kind, None, asserted), None) is None for name in names):
+            for quad in own:
+                store.remove(quad)
 
 
 def scene_file(source: str | Path) -> Path:

@@ -1,9 +1,13 @@
-"""A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it."""
+"""A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it.
+
+What is refuted (`reasoner.refutations`) is stated here, too, as the precondition that it is.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from hashlib import sha256
 
 import pyoxigraph as ox
 
@@ -12,6 +16,7 @@ from reasoner.files import as_iri_part
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.limits import Deadline
 from reasoner.reading.problem import Reading
+from reasoner.refutations import Refutation
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
 from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE, XSD
 
@@ -19,6 +24,7 @@ VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valuePropert
 STATED = "SELECT ?node ?property ?value WHERE { ?node a :SituatedObjectInstance ; ?property ?value }"
 WANTED = "SELECT ?node ?property ?value WHERE { ?task :goal ?node . ?node ?property ?value }"
 TASKS = "SELECT DISTINCT ?task WHERE { ?task a/rdfs:subClassOf* :Task } ORDER BY ?task"
+PARAMETERS = "SELECT ?behavior ?term WHERE { ?behavior :parameter ?term . ?term :index ?index } ORDER BY ?index"
 
 DECIMAL = ox.NamedNode(XSD + "decimal")
 
@@ -65,6 +71,40 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
     return copy
 
 
+def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
+    """Return a copy of a graph in which some behaviours are refuted, among what geometry says of the scene."""
+    copy, target = _copied(graph), ox.NamedNode(BASE + "reach")
+    triples = (triple for one in refutations for triple in refuted(graph, reading, one))
+    copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
+    return copy
+
+
+def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterator[ox.Triple]:
+    """Yield what states a refutation: none of one alternative, that these are the arguments and that these facts hold."""
+    behavior = reading.names.iri(one.behavior)
+    terms = [row[1] for row in graph.select(PARAMETERS, SCENE, behavior=behavior)]
+    if len(terms) != len(one.arguments):
+        raise KnowledgeError(f"{one}: {one.behavior} has {len(terms)} parameters with an index")
+    digest = sha256(repr(replace(one, why="")).encode()).hexdigest()[:8]
+    node = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach#refuted-{digest}")
+    every = ox.NamedNode(f"{node.value}.all")
+    yield ox.Triple(ox.NamedNode(behavior), ox.NamedNode(CORE + "precondition"), node)
+    yield from _individual(node, "AnyOf", str(one))
+    yield ox.Triple(node, ox.NamedNode(CORE + "negated"), ox.Literal(True))
+    yield ox.Triple(node, ox.NamedNode(CORE + "alternative"), every)
+    yield from _individual(every, "AllOf", "all of this")
+    for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
+        part = ox.NamedNode(f"{node.value}.argument{number}")
+        yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
+        yield from _individual(part, "EqualityCondition", f"it is {argument}")
+        yield ox.Triple(part, ox.NamedNode(CORE + "about"), ox.NamedNode(text(term)))
+        yield ox.Triple(part, ox.NamedNode(CORE + "value"), ox.NamedNode(reading.names.iri(argument)))
+    for number, fact in enumerate(one.facts, 1):
+        part = ox.NamedNode(f"{node.value}.fact{number}")
+        yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
+        yield from _wanted(reading, fact, part)
+
+
 def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
     """Return the property that states the values of a situation type, by the type's IRI."""
     return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
@@ -103,9 +143,7 @@ def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Tri
     iri, symbol, value = reading.names.iri, goal.symbol, goal.value
     if _counted(reading, symbol):
         [(sign, limit)] = bounds(value)
-        yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
-        yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "Comparison"))
-        yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(str(goal), language="en"))
+        yield from _individual(node, "Comparison", str(goal))
         yield ox.Triple(node, ox.NamedNode(CORE + "sign"), ox.Literal(sign))
         yield ox.Triple(node, ox.NamedNode(CORE + "amount"), ox.Literal(written(limit), datatype=DECIMAL))
         for part, name in (*zip(ARGUMENTS, symbol.arguments, strict=False), ("situationType", symbol.situation)):
@@ -117,13 +155,18 @@ def _wanted(reading: Reading, goal: Fact, node: ox.NamedNode) -> Iterator[ox.Tri
             yield ox.Triple(node, ox.NamedNode(CORE + "negated"), ox.Literal(True))
         arguments, value = arguments[:-1], arguments[-1]
     terms = dict(zip(ARGUMENTS, arguments, strict=False)) | {"situationType": symbol.situation, "value": value}
-    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
-    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + "ValueCondition"))
-    yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(str(goal), language="en"))
+    yield from _individual(node, "ValueCondition", str(goal))
     for part, name in terms.items():
         yield ox.Triple(
             node, ox.NamedNode(CORE + part), ox.NamedNode(CORE + name if name in (TRUE, FALSE) else iri(name))
         )
+
+
+def _individual(node: ox.NamedNode, kind: str, label: str) -> Iterator[ox.Triple]:
+    """Yield that a node is an individual of one of core's classes, and its label."""
+    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(INDIVIDUAL))
+    yield ox.Triple(node, ox.NamedNode(TYPE), ox.NamedNode(CORE + kind))
+    yield ox.Triple(node, ox.NamedNode(LABEL), ox.Literal(label, language="en"))
 
 
 def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:

@@ -218,6 +218,25 @@ def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episo
     return act(serving(), SymbolicWorld(serving(), fault=fault), planned())
 
 
+def test_what_has_no_path_as_things_stand_is_done_when_they_stand_otherwise() -> None:
+    there = at("cup2", "location1")
+
+    def blocked(step: Step, state: State) -> Said | None:
+        taken = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments[1] == "cup1"
+        return (
+            Said(False, "no path", ("cup1", "cup2"), "", (there,))
+            if taken and state[there.symbol] == there.value
+            else None
+        )
+
+    episode = act(serving(), SymbolicWorld(serving(), fault=blocked), planned())
+    assert episode.status is End.REACHED
+    tried = [failure.step.arguments for failure in episode.failures]
+    assert tried
+    assert len(tried) == len(set(tried))  # no hand tries it twice
+    assert {one.facts for one in episode.refuted} == {(there,)}
+
+
 def test_a_slip_is_tried_again() -> None:
     tries = iter([True])
     episode = failing(lambda step, state: step.behavior == "B3_GRASP" and next(tries, False), "no grasp")

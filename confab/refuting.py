@@ -1,0 +1,49 @@
+"""Refutations at the front desk: what physics found impossible as things stand is known to the next plan and to later calls."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from contextlib import suppress
+
+import ontology
+from confab.known import Known, S
+from confab.physics import Report
+from planner.acting.failure_memory import chain_to, refuted_by
+from reasoner.embodiment.reach import add_to_reach
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.reading.restating import refuted, with_refuted
+from reasoner.refutations import Refutation
+
+log = logging.getLogger(__name__)
+
+
+def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
+    """Return what the first rollout that failed refutes; nothing if it failed otherwise than for want of a motion."""
+    failure = report.shown.failure
+    if failure is None:
+        return ()
+    chain = chain_to(report.plan, failure.step.path)
+    return refuted_by(scene.problem, chain, failure.verdict.facts, failure.verdict.code or "")
+
+
+def knowing(scene: S, refutations: Sequence[Refutation]) -> S:
+    """Return a scene in which some behaviours are refuted; this one stays as it is."""
+    return type(scene)(with_refuted(scene.knowledge, scene.reading, refutations), dict(scene.seconds))
+
+
+def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
+    """Write refutations into ``SCENE.reach.ttl`` beside a scene of the user's own, which later calls read.
+
+    They stand there as long as the scene's geometry stays what it is. What is shipped isn't written into.
+    """
+    path = scene.knowledge.path
+    if not refutations or path is None or path.is_relative_to(ontology.ROOT):
+        return
+    file = path.with_name(f"{path.stem}.reach.ttl")
+    triples = [triple for one in refutations for triple in refuted(scene.knowledge, scene.reading, one)]
+    with suppress(FileNotFoundError):  # a scene that states reach by hand has no such file
+        try:
+            add_to_reach(file, scene.knowledge, triples)
+        except (PermissionError, KnowledgeError) as error:
+            log.warning("%s: %s; what was refuted isn't kept", file, error)

@@ -1,0 +1,94 @@
+"""What planners of motions refute: done otherwise by the next plan, kept beside the scene, forgotten with what it is about."""
+
+from functools import cache
+from pathlib import Path
+from shutil import copy
+
+import pytest
+
+import confab
+import ontology
+from confab.physics import Report
+from confab.refuting import keep, knowing, refuted_in
+from confab.scene import Scene
+from reasoner.refutations import Refutation
+from reasoner.symbols import Fact, Symbol
+
+BLOCKED = "blocked-cupboard"
+
+
+@cache
+def first() -> tuple[Scene, Report]:
+    """The scene, and what physics says of the first plan: the door can't be opened."""
+    scene = confab.load(BLOCKED)
+    return scene, scene.verify(scene.plan())
+
+
+def own(folder: Path) -> Path:
+    """Return the scene as a user's own file."""
+    for kind in ("ttl", "reach.ttl"):
+        copy(ontology.ROOT / "scenes" / f"{BLOCKED}.{kind}", folder / f"{BLOCKED}.{kind}")
+    return folder / f"{BLOCKED}.ttl"
+
+
+def done(scene: Scene, mode: str = "guarded") -> list[tuple[str, ...]]:
+    return [(step.behavior, *step.arguments) for step in scene.plan(mode=mode).plan.primitives]
+
+
+def test_what_a_planner_of_motions_refutes_has_the_facts_as_long_as_which_it_holds() -> None:
+    scene, report = first()
+    assert report.shown.failure is not None
+    assert report.shown.failure.verdict.objects == ("door", "bottle")
+    facts = Fact(Symbol("LOCATION", ("bottle",)), "before_door"), Fact(Symbol("OPENED", ("door",)), "false")
+    refuted = refuted_in(scene, report)
+    assert [(one.behavior, one.arguments) for one in refuted] == [
+        (name, ("left_hand", "door")) for name in ("F2_OPEN", "F3_OPEN")
+    ]
+    assert all(set(one.facts) == set(facts) for one in refuted)
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: str) -> None:
+    scene, report = first()
+    steps = done(knowing(scene, refuted_in(scene, report)), mode)
+    before = steps[: steps.index(("F3_OPEN", "left_hand", "door"))]
+    assert any(name == "B3_REACH_HAND_OBJECT" and thing[-1] == "bottle" for name, *thing in before)
+    assert done(scene)[0] == ("F3_OPEN", "left_hand", "door")  # the scene itself stays as it is
+
+
+def test_what_was_refuted_is_kept_beside_the_scene_for_the_next_call(tmp_path: Path) -> None:
+    _, report = first()
+    scene = confab.load(own(tmp_path))
+    keep(scene, refuted_in(scene, report))
+    keep(scene, refuted_in(scene, report))
+    again = confab.load(own_path := tmp_path / f"{BLOCKED}.ttl")
+    assert done(again)[0] != ("F3_OPEN", "left_hand", "door")
+    text = own_path.with_name(f"{BLOCKED}.reach.ttl").read_text(encoding="utf-8")
+    assert text.count("not F3_OPEN left_hand door while bottle LOCATION before_door") == 1
+    assert "canReach" in text
+
+
+def test_what_was_refuted_about_something_that_is_gone_is_forgotten(tmp_path: Path) -> None:
+    _, report = first()
+    path = own(tmp_path)
+    scene = confab.load(path)
+    keep(scene, refuted_in(scene, report))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if ":bottle" not in line), encoding="utf-8")
+    assert done(confab.load(path))[0] == ("F3_OPEN", "left_hand", "door")
+
+
+def test_what_is_false_can_be_what_a_refutation_holds_by() -> None:
+    scene = confab.load(BLOCKED)
+    while_shut = (Fact(Symbol("OPENED", ("drawer",)), "false"),)
+    refuted = [Refutation("B2_PICK", (hand, "lid"), while_shut) for hand in ("left_hand", "right_hand")]
+    assert ("F3_OPEN", "right_hand", "drawer") not in done(scene)
+    assert ("F3_OPEN", "right_hand", "drawer") in done(knowing(scene, refuted))
+
+
+def test_nothing_is_written_into_what_is_shipped() -> None:
+    scene, report = first()
+    file = ontology.ROOT / "scenes" / f"{BLOCKED}.reach.ttl"
+    before = file.read_text(encoding="utf-8")
+    keep(scene, refuted_in(scene, report))
+    assert file.read_text(encoding="utf-8") == before
