@@ -104,17 +104,18 @@ def sources(folder: Path) -> None:
         save_observed(folder / domain / "observed.ttl", scene.problem.initial, scene.names, scene.iri)
 
 
-def mutated_triples(draw: random.Random, file: Path) -> None:
+def mutated_triples(draw: random.Random, file: Path, mutations: Sequence[Mutation] | None = None) -> None:
     """Break an ontology file in its structure: parts deleted, doubled, swapped, given another type, another end, a circle."""
     parser = ox.parse(path=str(file), format=ox.RdfFormat.TURTLE, base_iri="urn:fuzz:base")
     triples = [quad.triple for quad in parser]
     for _ in range(draw.choice((1, 1, 1, 2, 3, 5))):
-        draw.choice(MUTATIONS)(draw, triples)
+        draw.choice(mutations or MUTATIONS)(draw, triples)
     prefixes = {k: v for k, v in parser.prefixes.items() if k}
     file.write_bytes(ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
 
 
 Triples = list[ox.Triple]
+Mutation = Callable[[random.Random, Triples], None]
 
 
 def _any(draw: random.Random, triples: Triples) -> int:
@@ -221,7 +222,7 @@ def rename(draw: random.Random, triples: Triples) -> None:
         ]
 
 
-MUTATIONS: tuple[Callable[[random.Random, Triples], None], ...] = (
+MUTATIONS: tuple[Mutation, ...] = (
     delete,
     delete_node,
     double,

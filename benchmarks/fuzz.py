@@ -18,6 +18,7 @@ import functools
 import gc
 import io
 import json
+import math
 import os
 import random
 import re
@@ -38,13 +39,16 @@ from typing import TYPE_CHECKING, Any
 
 import pyoxigraph as ox
 
-from benchmarks.broken_inputs import DOMAINS, DOORS, HERE, TARGETS, Call, sources
+from benchmarks import broken_inputs, broken_worlds
+from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Call
+from benchmarks.broken_worlds import WORLDS
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     from confab.planning import Result
 
+DOORS = {**broken_inputs.DOORS, **broken_worlds.DOORS}
 SEEDS, TRIED = HERE / "fuzz-seeds.txt", HERE / "fuzz-tried.json"
 CASES, ROUND, BATCH = 100_000, 1_000, 100
 SECONDS, WAITING, MEGABYTES = 30, 600, 4_000
@@ -70,6 +74,12 @@ class Failure:
 
 
 # ----------------------------------------------------------------------------------------------------------- one case
+
+
+def sources(given: Path) -> None:
+    """Write what all cases begin with."""
+    broken_inputs.sources(given)
+    broken_worlds.sources(given)
 
 
 def run_case(door: str, seed: int, given: Path, keep: bool = False) -> Failure | None:
@@ -162,7 +172,7 @@ def _answer(door: str, seed: int, given: Path, results: list[Result], keep: bool
     try:
         draw = random.Random(f"{door} {seed}")
         case, out, err = folder / "case", folder / "stdout", folder / "stderr"
-        shutil.copytree(given / draw.choice(DOMAINS), case)
+        shutil.copytree(given / draw.choice(WORLDS.get(door, DOMAINS)), case)
         call = DOORS[door][0](draw, case)
         before = _contents(case)
         os.chdir(case)
@@ -254,11 +264,20 @@ def _check_plan(result: Result) -> None:
     """Raise AssertionError if a plan is none, or if there is one where the answer is that there is none."""
     from planner.plan import Status
     from planner.validation import validate
-    from worlds.agreement import solvable
+    from worlds.agreement import cheapest
 
     outcome, problem = result.outcome, result.problem
-    if outcome.status is Status.UNSOLVABLE and quantified_behaviors(problem) <= FEW_STEPS:
-        assert not solvable(problem, most=FEW_STATES), "unsolvable was said of what a search of all states solves"
+    proved = outcome.status is Status.UNSOLVABLE or outcome.bound is not None
+    if (
+        proved
+        and quantified_behaviors(problem) <= FEW_STEPS
+        and (least := cheapest(problem, most=FEW_STATES)) is not None
+    ):
+        unsolvable = outcome.status is Status.UNSOLVABLE
+        assert not unsolvable or least == math.inf, "unsolvable was said of what a search of all states solves"
+        assert (outcome.bound or 0.0) <= least + 1e-6, (
+            f"{outcome.bound} was proved, and a search of all states finds {least}"
+        )
     if outcome.plan is None:
         return
     faults = validate(problem, outcome.plan)

@@ -5,36 +5,43 @@ The truth is what a search through all states of the lowest level finds, by whic
 
 from __future__ import annotations
 
-from collections import deque
+import math
 from collections.abc import Callable, Iterable, Mapping
+from heapq import heappop, heappush
+from itertools import count
 
 from planner.levels import levels_left
 from planner.plan import Outcome, Status
 from planner.validation import Facts, Rules, validate
+from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem, Symbol
 from worlds.writing import quantified
 
 State = Mapping[Symbol, str]
-Successors = Callable[[Problem], Callable[[State], Iterable[State]]]
+Successors = Callable[[Problem], Callable[[State], Iterable[tuple[float, State]]]]
+"""Of a problem, what leads from a state to others, each with what it costs."""
 
 
-def by_the_checker(problem: Problem) -> Callable[[State], Iterable[State]]:
+def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
     """Return a function of a state to those that behaviours of the lowest level lead to, as the checker reads them."""
     rules = Rules(problem)
     steps = list(quantified(problem, problem.domain.levels[-1]))
 
-    def successors(state: State) -> Iterable[State]:
+    def successors(state: State) -> Iterable[tuple[float, State]]:
         facts = Facts(problem, state)
         for behavior, arguments in steps:
             changes = rules.changes(behavior, arguments, facts)
             if changes is not None:
-                yield {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
+                yield behavior.cost, {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
 
     return successors
 
 
-def solvable(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> bool | None:
-    """Return whether some steps of the lowest level reach the goal with all that was touched at rest; None above so many states."""
+def cheapest(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> float | None:
+    """Return what steps of the lowest level cost at least that reach the goal with all that was touched at rest.
+
+    Infinity if there are none, None above so many states. What is defined is worked out, and amounts are compared, by the checker.
+    """
     after = successors(problem)
     rests = {
         s: r for s in problem.initial if (r := problem.domain.situations[s.situation].rest) and s not in problem.goal
@@ -44,21 +51,34 @@ def solvable(problem: Problem, successors: Successors = by_the_checker, most: in
         """Return what was touched and isn't at rest."""
         return frozenset(s for s, r in rests.items() if state[s] != r and (s in old or state[s] != before[s]))
 
+    def reached(state: State) -> bool:
+        facts = Facts(problem, state)
+        return all(meets(facts.value(s.situation, s.arguments) or FALSE, wanted) for s, wanted in problem.goal.items())
+
     start = frozenset(problem.initial.items()), frozenset[Symbol]()
-    seen, waiting = {start}, deque([start])
+    least, waiting, number = {start: 0.0}, [(0.0, 0, start)], count(1)
     while waiting:
-        facts, old = waiting.popleft()
+        cost, _, node = heappop(waiting)
+        facts, old = node
+        if cost > least[node]:
+            continue
         state = dict(facts)
-        if not old and all(state.get(symbol, FALSE) == value for symbol, value in problem.goal.items()):
-            return True
-        for following in after(state):
+        if not old and reached(state):
+            return cost
+        for more, following in after(state):
             node = frozenset(following.items()), restless(state, following, old)
-            if node not in seen:
-                if len(seen) >= most:
+            if cost + more < least.get(node, math.inf):
+                if len(least) >= most:
                     return None
-                seen.add(node)
-                waiting.append(node)
-    return False
+                least[node] = cost + more
+                heappush(waiting, (cost + more, next(number), node))
+    return math.inf
+
+
+def solvable(problem: Problem, successors: Successors = by_the_checker, most: int = 20_000) -> bool | None:
+    """Return whether some steps of the lowest level reach the goal with all that was touched at rest; None above so many states."""
+    least = cheapest(problem, successors, most)
+    return None if least is None else least < math.inf
 
 
 def complaints(problem: Problem, outcome: Outcome, other: Outcome, truth: bool | None) -> list[str]:

@@ -419,6 +419,11 @@ class Definitions:
         iri, inverse = self._named(prop)
         one, other = (value, term) if inverse else (term, value)
         if iri not in self.situations:
+            if iri not in self.kinds:
+                raise KnowledgeError(
+                    f"{local_name(iri)} stands in a definition, but is neither a value property nor a relation; "
+                    "declare it as a :Relation, or mend the name"
+                )
             return RelationCondition(self.names.short(iri), (one, other))
         situation, functional = self.situations[iri]
         name = self.names.short(situation)

@@ -1128,12 +1128,13 @@ def _facts(
 ) -> tuple[dict[str, frozenset[tuple[str, ...]]], dict[Symbol, set[str]]]:
     """Return the static relations, and the values that the scene states of each symbol."""
     relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+    numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # those that give a number, at the end of each row
     stated: dict[Symbol, set[str]] = defaultdict(set)
     for subject, predicate, value in rows:
         number = predicate in numbers
         pair = (names.short(subject), value if number else names.short(value))
         if predicate not in properties:
-            relations[names.short(predicate)].add(pair)
+            (numbered if number else relations)[names.short(predicate)].add(pair)
             continue
         situation, boolean = properties[predicate]
         if situation in domain.rules:
@@ -1145,9 +1146,12 @@ def _facts(
     facts = _Schema(tuples, names, set(), set(), Definitions({}, {}, names))
     for iri, node in tuples.items():
         if CORE + "relation" in node:
-            tail = [names.short(v) for v in facts.values(iri, "value")]
-            tail += [written(decimal(v, f"<{iri}>: :amount")) for v in facts.values(iri, "amount")]
-            relations[names.short(facts.one(iri, "relation"))].add((*facts.arguments(iri), *tail))
+            individuals = (*facts.arguments(iri), *(names.short(v) for v in facts.values(iri, "value")))
+            relation, amount = names.short(facts.one(iri, "relation")), facts.decimal(iri, "amount")
+            if amount is None:
+                relations[relation].add(individuals)
+            else:
+                numbered[relation].add((*individuals, written(amount)))
         else:
             values = facts.values(iri, "value")
             symbol = Symbol(names.short(facts.one(iri, "situationType")), facts.arguments(iri))
@@ -1157,10 +1161,26 @@ def _facts(
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"{symbol}: a fact of no known situation type")
-        many, wanted = len(symbol.arguments), len(domain.situations[symbol.situation].arguments)
-        if many != wanted:
-            raise KnowledgeError(f"{symbol}: a fact about {many} individuals; {symbol.situation} is about {wanted}")
-    return {name: frozenset(pairs) for name, pairs in sorted(relations.items())}, stated
+        _check_arguments(symbol, domain, "a fact")
+    for relation, pairs in numbered.items():
+        _check_numbers(relation, pairs, relations.get(relation, ()))
+    return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
+
+
+def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
+    """Raise `KnowledgeError` if a relation gives two numbers for the same individuals, or for some none."""
+    for row in bare:
+        raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its :amount")
+    found: dict[tuple[str, ...], str] = {}
+    for *individuals, value in sorted(rows):
+        if (old := found.setdefault(tuple(individuals), value)) != value:
+            raise KnowledgeError(f"{relation} of {', '.join(individuals)} is {old} and {value}; state one number")
+
+
+def _check_arguments(symbol: Symbol, domain: Domain, what: str) -> None:
+    many, wanted = len(symbol.arguments), len(domain.situations[symbol.situation].arguments)
+    if many != wanted:
+        raise KnowledgeError(f"{symbol}: {what} about {many} individuals; {symbol.situation} is about {wanted}")
 
 
 def _initial(
@@ -1219,6 +1239,7 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
             if not isinstance(wanted, ValueCondition):
                 raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
             symbol = Symbol(wanted.situation, wanted.arguments)
+            _check_arguments(symbol, problem.domain, "a goal")
             value = FALSE if wanted.negated and wanted.value == TRUE else wanted.value
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")

@@ -17,6 +17,7 @@ from confab.authoring import migrate, new_domain
 from confab.cli import main
 from confab.memory import Memory
 from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES
+from ontology import scenes as shipped_scenes
 from reasoner.files import alone, write_whole
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
@@ -317,6 +318,15 @@ def test_a_scene_that_cannot_be_meant_is_refused_in_one_line_by_plan_and_validat
     assert (code, out, err.count("\n")) == (MISUSE, "", 1)
     assert said in err
     assert ask("validate", tearoom)[0] == 1
+
+
+def test_a_goal_about_too_few_individuals_is_refused(tmp_path: Path, ask: Ask) -> None:
+    scene = tmp_path / "packing-small.ttl"
+    scene.write_text(shipped_scenes()["packing-small"].read_text())
+    change(scene, "c:ValueCondition ; c:about :ring ;", "c:ValueCondition ;")
+    code, out, err = ask("plan", scene, "--optimal")
+    assert (code, out, err.count("\n")) == (MISUSE, "", 1)
+    assert "<casket, INSIDE>: a goal about 1 individuals; INSIDE is about 2" in err
 
 
 def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> None:

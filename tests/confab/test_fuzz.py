@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import broken_inputs, fuzz
+from benchmarks import fuzz
 from planner.plan import Outcome, Reason, Status
 from planner.solve import Request
 
@@ -15,7 +15,7 @@ from planner.solve import Request
 @pytest.fixture(scope="module")
 def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fuzz")
-    broken_inputs.sources(folder)
+    fuzz.sources(folder)
     return folder
 
 
@@ -25,9 +25,9 @@ def test_the_cases_that_broke_once_hold(given: Path, door: str) -> None:
     assert [str(failure) for failure in fuzz.run_batch(door, seeds, given)] == []
 
 
-@pytest.mark.parametrize("door", broken_inputs.DOORS)
+@pytest.mark.parametrize("door", fuzz.DOORS)
 def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None:
-    share = 1 if door in ("bodies", "urdf") else 2
+    share = 1 if door in ("bodies", "urdf", "meshes") else 2
     assert [str(failure) for failure in fuzz.run_batch(door, range(1_000_000, 1_000_000 + share), given)] == []
 
 
@@ -48,9 +48,7 @@ def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr("confab.commands.planning.load_scene", lambda *_: exec(replaced + "\nimport sys; sys.exit(0)"))
     monkeypatch.setattr(fuzz, "SECONDS", 1 if "while" in replaced else 30)
     monkeypatch.setattr(fuzz, "WAITING", 1 if "sleep" in replaced else 600)
-    monkeypatch.setitem(
-        broken_inputs.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--diff", "x"], 1)
-    )
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--diff", "x"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None
     assert what in failure.what
@@ -58,9 +56,7 @@ def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch,
 
 def test_a_plan_that_is_none_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planner.validation.validate", lambda *_: ["seeded"])
-    monkeypatch.setitem(
-        broken_inputs.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1)
-    )
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None
     assert "no plan of what was read: seeded" in failure.what
@@ -71,11 +67,8 @@ def test_a_false_no_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         return Outcome(Status.UNSOLVABLE, reason=Reason("seeded"))
 
     monkeypatch.setattr("confab.planning.solve", no)
-    monkeypatch.setattr("benchmarks.broken_inputs.DOMAINS", ("ferry",))
     monkeypatch.setattr(fuzz, "DOMAINS", ("ferry",))
-    monkeypatch.setitem(
-        broken_inputs.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1)
-    )
+    monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None
     assert "unsolvable was said of what a search of all states solves" in failure.what
@@ -87,7 +80,7 @@ def test_after_a_crash_the_cases_behind_it_are_run(given: Path, monkeypatch: pyt
             os.kill(os.getpid(), signal.SIGKILL)
         return ["memory", "show", str(folder / "memory.ttl")]
 
-    monkeypatch.setitem(broken_inputs.DOORS, "plan", (crash, 1))
+    monkeypatch.setitem(fuzz.DOORS, "plan", (crash, 1))
     broke = list(fuzz.run_batch("plan", range(12), given))
     assert 0 < len(broke) < 12
     assert {failure.what for failure in broke} == {"killed by signal 9"}

@@ -46,6 +46,29 @@ def test_a_fault_in_amounts_is_found_with_its_node_and_its_mend(
     assert all(finding.remedy for finding in found)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("d:portion 0.5", "d:portion 0.5, 2.75", "portion of cup3 is 0.5 and 2.75; state one number"),
+        (
+            "c:argument2 d:dock ; c:amount 2.0 .",
+            "c:argument2 d:dock ; c:amount 2.0, 9.0 .",
+            "wanted one :amount, found 2",
+        ),
+        (
+            "c:argument2 d:dock ; c:amount 2.0 .",
+            "c:argument2 d:dock .",
+            "WAY of tap, dock has no number, where others have one",
+        ),
+    ],
+)
+def test_a_relation_gives_one_number_for_its_individuals(
+    canteen: Callable[[str, str], Path], old: str, new: str, said: str
+) -> None:
+    with pytest.raises(KnowledgeError, match=said):
+        read(load(canteen(old, new)))
+
+
 def test_a_goal_that_compares_what_cant_be_is_refused(canteen: Callable[[str, str], Path]) -> None:
     path = canteen('c:sign ">=" ; c:amount 0.5', 'c:sign ">=" ; c:right :round.half')
     with pytest.raises(KnowledgeError, match=r"used as a calculation"):

@@ -112,10 +112,10 @@ def test_random_worlds_keep_their_levels_and_the_truth(mode: str, part: int) -> 
         assert complaints(problem, outcome, reference, truth) == [], seed
 
 
-def naively(problem: Problem) -> Callable[[State], Iterable[State]]:
+def naively(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]]:
     """Return the successors of a state as the naive interpreter reads behaviours."""
     behaviors = problem.domain.at_level(problem.domain.levels[-1])
-    return lambda state: (after for b in behaviors for _, after in naive.results(problem, b, dict(state)))
+    return lambda state: ((b.cost, after) for b in behaviors for _, after in naive.results(problem, b, dict(state)))
 
 
 def test_the_truth_about_random_worlds_is_that_of_the_naive_interpreter() -> None:

@@ -168,3 +168,12 @@ def test_a_type_without_a_bounding_class_is_refused_by_name(tmp_path: Path) -> N
     )
     with pytest.raises(KnowledgeError, match="Special is used as a type"):
         read(load(path))
+
+
+def test_a_property_that_is_neither_situation_nor_relation_is_refused_by_name(tmp_path: Path) -> None:
+    there = restriction(":liesBy", "owl:someValuesFrom :Sink")
+    path = scene(tmp_path, ":liesBy a owl:ObjectProperty . " + defined(both(":Item", IS_DIRTY, there)))
+    with pytest.raises(
+        KnowledgeError, match="liesBy stands in a definition, but is neither a value property nor a relation"
+    ):
+        read(load(path))
