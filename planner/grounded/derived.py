@@ -67,6 +67,35 @@ class Derived:
                 state = new
         return state
 
+    def fresh(self, state: int, bits: int) -> int:
+        """Return a state with some of these bits as they have to be; the others may be those of another state."""
+        for number in self._support(bits & self.mask):
+            state = _worked_out(self.parts[number], state)
+        return state
+
+    def _support(self, bits: int) -> Sequence[int]:
+        """Return the parts on which bits depend, in order."""
+        known = self._supports.get(bits)
+        if known is None:
+            found: set[int] = set()
+            waiting = [self._part_of[low] for low in _single(bits)]
+            while waiting:
+                number = waiting.pop()
+                if number not in found:
+                    found.add(number)
+                    needed = _union(way for bit in self.parts[number] for way in bit.alternatives)
+                    waiting += [self._part_of[low] for low in _single(needed & self.mask)]
+            known = self._supports[bits] = tuple(sorted(found))
+        return known
+
+    @cached_property
+    def _supports(self) -> dict[int, Sequence[int]]:
+        return {}
+
+    @cached_property
+    def _part_of(self) -> Mapping[int, int]:
+        return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
+
     def renamed(self, small: Callable[[int], int]) -> Derived:
         """Return the same over other bits."""
         return Derived(

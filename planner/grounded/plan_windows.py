@@ -71,12 +71,7 @@ def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) ->
         work -= len(plan) - i
         if work < 0 or (deadline is not None and perf_counter() > deadline):
             break
-        trial, kept = state, []
-        for operator in plan[i + 1 :]:
-            after = task.applied(trial, operator)
-            if after is not None:
-                trial = after
-                kept.append(operator)
+        trial, kept = task.carried_out(state, plan[i + 1 :])
         if trial & task.goal == task.goal:
             plan[i:] = kept
         else:
@@ -154,12 +149,8 @@ def _states(task: Task, plan: Sequence[int]) -> list[int]:
 
 def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
     """Return whether a plan leads from a state to the goal."""
-    for operator in plan:
-        after = task.applied(state, operator)
-        if after is None:
-            return False
-        state = after
-    return state & task.goal == task.goal
+    after, kept = task.carried_out(state, plan)
+    return len(kept) == len(plan) and after & task.goal == task.goal
 
 
 @dataclass

@@ -107,8 +107,11 @@ class Task:
         """Return the number of operators."""
         return len(self.costs)
 
-    def applied(self, state: int, operator: int) -> int | None:
-        """Return the state after an operator, or None where it isn't applicable."""
+    def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
+        """Return the state after an operator, or None where it isn't applicable.
+
+        Unless what follows is to be worked out, the bits that follow from others stay as they are.
+        """
         precondition, changes = self._changes.get(operator) or self.known(operator)
         if state & precondition != precondition or (self.barred and (state, operator) in self.barred):
             return None
@@ -121,7 +124,26 @@ class Task:
             if moved is None:
                 return None
             after = moved
-        return self.derived.after(after, state) if self.derived.parts else after
+        return self.derived.after(after, state) if follow and self.derived.parts else after
+
+    def carried_out(self, state: int, plan: Sequence[int]) -> tuple[int, list[int]]:
+        """Return the state after those operators of a plan that are applicable when it is their turn, and these.
+
+        On the way, of the bits that follow from others only those are worked out that an operator asks for.
+        """
+        follow = bool(self.barred) or not self.derived.parts  # what is barred is told by whole states
+        kept = []
+        for operator in plan:
+            if not follow:
+                asked, changes = self.known(operator)
+                for when, _, _ in changes:
+                    asked |= when
+                state = self.derived.fresh(state, asked)
+            after = self.applied(state, operator, follow)
+            if after is not None:
+                state = after
+                kept.append(operator)
+        return state if follow else self.derived.completed(state), kept
 
     @cached_property
     def applicable(self) -> Callable[[int], tuple[list[int], int]]:

@@ -84,6 +84,22 @@ def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10**9))
+def test_a_plan_is_carried_out_alike_whether_all_that_follows_is_worked_out_or_what_is_asked_for(seed: int) -> None:
+    task = ground(replace(language(seed, defined=True), goal={}))
+    assert isinstance(task, Task)
+    if not len(task):
+        return
+    plan = Random(seed).choices(range(len(task)), k=30)
+    state, kept = task.initial, []
+    for operator in plan:
+        after = task.applied(state, operator)
+        if after is not None:
+            state = after
+            kept.append(operator)
+    assert task.carried_out(task.initial, plan) == (state, kept)
+
+
+@given(seed=st.integers(0, 10**9))
 def test_a_goal_that_is_defined_holds_for_the_grounded_level_where_it_does(seed: int) -> None:
     problem = language(seed, defined=True)
     truth = naive.complete(problem)
