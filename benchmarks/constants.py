@@ -43,17 +43,17 @@ LENGTH, EFFORT, TIME = 0.002, 0.05, 0.4
 
 @dataclass(frozen=True)
 class Constant:
-    """A number in a module: its name, which of the numbers under that name, and where it stands."""
+    """A number in a module: its name, which of the numbers under that name, where it stands, and what is said of it there."""
 
     path: Path
     name: str
     number: int
     node: ast.Constant
+    said: str
 
     def __str__(self) -> str:
-        """Return room, module and name."""
-        room = self.path.relative_to(ROOT / "planner")
-        return f"{room}: {self.name}" + (f" [{self.number}]" if self.number else "")
+        """Return its name, and which of the numbers it is if there are several."""
+        return self.name + (f" [{self.number}]" if self.number else "")
 
     def times(self, factor: float) -> float:
         """Return the number halved or doubled; a whole number stays one, and doesn't become nothing."""
@@ -65,7 +65,8 @@ class Constant:
 def constants(room: Path) -> Iterator[Constant]:
     """Yield the numbers that the modules of a room give names in capitals."""
     for path in sorted(room.glob("*.py")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, following in zip(body, [*body[1:], ast.Pass()], strict=True):
             if not isinstance(node, ast.Assign):
                 continue
             for target in node.targets:
@@ -80,7 +81,14 @@ def constants(room: Path) -> Iterator[Constant]:
                     found = [
                         n for n in ast.walk(given) if isinstance(n, ast.Constant) and type(n.value) in (int, float)
                     ]
-                    yield from (Constant(path, name, i, n) for i, n in enumerate(found))
+                    yield from (Constant(path, name, i, n, comment(following)) for i, n in enumerate(found))
+
+
+def comment(node: ast.stmt) -> str:
+    """Return the text that stands behind an assignment, in one line."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+        return " ".join(node.value.value.split())
+    return ""
 
 
 def changed(text: str, constant: Constant, factor: float) -> str:
@@ -227,10 +235,16 @@ def main() -> None:
     for room in os.environ.get("CONFAB_ROOMS", ",".join(INSTRUMENTS)).split(","):
         base = asked(room, None, 1.0)
         print(f"\nplanner/{room}: " + ", ".join(f"{what} {value:.0f}" for what, value in base.items()), "\n")
-        print("| constant | value | halved | doubled |\n|---|---|---|---|")
+        print("| constant | value | what it is, and trades | halved | doubled |\n|---|---|---|---|---|")
+        module, before = None, ""
         for constant in constants(ROOT / "planner" / room):
             said = [
                 verdict(base, asked(room, constant, factor)) if constant.times(factor) != constant.node.value else "–"
                 for factor in (0.5, 2.0)
             ]
-            print(f"| {constant} | {constant.node.value!r} | {' | '.join(said)} |", flush=True)
+            if constant.path != module:
+                module = constant.path
+                print(f"| `{module.relative_to(ROOT)}` | | | | |")
+            text = "as above" if constant.said and constant.said == before else constant.said
+            before = constant.said
+            print(f"| {constant} | {constant.node.value!r} | {text} | {' | '.join(said)} |", flush=True)

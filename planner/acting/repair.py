@@ -31,7 +31,7 @@ from planner.validation import validate
 from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
-RESTING = Effort(depth=6, expansions=400)
+RESTING = Effort(depth=6)
 CLOSE = 1.1
 """A repair that costs more than replanning by more than this factor gives way to it."""
 

@@ -23,7 +23,7 @@ from time import perf_counter
 
 from planner.hierarchical.concerns import concerns, put_aside
 from planner.hierarchical.postoptimization import Improver, length
-from planner.hierarchical.recovery import SOME, Recovery
+from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.subplans import Watch, nobody
@@ -172,7 +172,7 @@ def reordered(call: Call) -> list[RefinedStep]:
         other.segments.most_work = max(call.segments.worked / 2, REORDERING)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
-            done = recovery.together(first, SOME) if at_once else other.serialise(recovery.harder)
+            done = recovery.together(first) if at_once else other.serialise(recovery.harder)
             if done and length(other.steps) < length(best):
                 best = other.steps
     return best

@@ -35,9 +35,9 @@ REACH = 30
 """So many steps ahead a cluster looks for steps that concern it."""
 LARGEST = 7
 """So many steps a cluster has at most."""
-OPERATORS, MOST_ROWS = 400, 20_000
-"""The largest world in which steps are planned anew, in operators, and in rows of a join on the way to them."""
-STATES, WORK = 4_000, 2_500
+OPERATORS = 400
+"""The largest world in which steps are planned anew, in operators; in rows of a join on the way to them fifty times as many."""
+STATES = 2_500
 """So many states are expanded for a cluster or a whole plan, and in all, for each cluster allowed."""
 WHOLE_BITS = 48
 """The largest world that is planned anew as a whole, in bits of a state if every symbol could take every value."""
@@ -88,7 +88,7 @@ class Improver:
     known : dict
         For each shape of a cluster the steps that replace it, or None; kept between calls.
     clusters_left : int
-        So many shapes of clusters may be planned anew, in worlds as much larger, with an effort of `WORK` for each.
+        So many shapes of clusters may be planned anew, in worlds as much larger, with an effort of `STATES` for each.
     """
 
     refiner: Refiner
@@ -99,7 +99,7 @@ class Improver:
         self.table = self.refiner.table
         self.segments = self.refiner.segments
         self.states = min(STATES * self.clusters_left, 40 * STATES)
-        self.work = WORK * self.clusters_left
+        self.work = STATES * self.clusters_left
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
 
@@ -166,7 +166,7 @@ class Improver:
 
         problem = replace(problem, domain=self._binding(level))
         try:
-            task = ground(problem, level, most=MOST_ROWS, deadline=self.segments.deadline)
+            task = ground(problem, level, most=50 * OPERATORS, deadline=self.segments.deadline)
         except TooLargeError:
             return None
         if isinstance(task, Reason) or len(task) > OPERATORS:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
+from planner.hierarchical.refinement_cache import WHOLE
 from planner.hierarchical.serialization import LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
-from planner.hierarchical.subproblem import Width
 from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, proved
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell
@@ -21,10 +21,8 @@ from reasoner.symbols import State
 
 MOST_TOGETHER = 20_000
 """The largest level, in quantified behaviours, on which all goals are searched at once."""
-ALL, SOME = (Width(None, 1, 10_000_000),), (Width(None, 1, 100_000),)
-"""All goals at once in the whole world; the second where a plan is known, and a shorter one is looked for."""
-ANEW = (Width(None, 1, 1_500_000),)
-"""All goals at once from the beginning, on the most abstract level: the goals reached so far may be in the way for good."""
+ALL = (WHOLE,)
+"""All goals at once in the whole world."""
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
 Done = TypeVar("Done")
@@ -103,7 +101,7 @@ class Recovery:
                         self._prove()
                     if not self.forward:
                         self.forward = True
-                        if self.retreat() or self.anew(call.program.levels[:1], ANEW):
+                        if self.retreat() or self.anew(call.program.levels[:1]):
                             call.restarts += 1
                             return True
         if call.moved:  # something was done since some of these attempts failed
@@ -144,7 +142,7 @@ class Recovery:
         call.kept.update(call.unseen)
         return True
 
-    def anew(self, levels: Sequence[int], width: Attempt = ALL) -> bool:
+    def anew(self, levels: Sequence[int]) -> bool:
         """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was."""
         call = self.call
         if not call.steps:
@@ -153,7 +151,7 @@ class Recovery:
         call.table.undo(0)
         call.steps, call.given_up, self._tried = [], [], {}
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        if any(self.together(level, width) for level in levels):
+        if any(self.together(level) for level in levels):
             return True
         call.redo(steps)
         call.steps, call.given_up, call.kept, self._tried = steps, given_up, kept, tried
@@ -186,13 +184,13 @@ class Recovery:
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         return True
 
-    def together(self, level: int, width: Attempt = ALL) -> bool:
+    def together(self, level: int) -> bool:
         """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
         call = self.call
         if call.program.size(level) > MOST_TOGETHER or self._tried.get(level) == len(call.steps):
             return False
         self._tried[level] = len(call.steps)
-        return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, width)
+        return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, ALL)
 
 
 # ------------------------------------------------------------------------------------ whether all can still be reached

@@ -20,10 +20,11 @@ from reasoner.amounts import meets
 from reasoner.memory.experience import OpenRole
 from reasoner.symbols import FALSE, Behavior, ValueCondition
 
-SHORT = Effort(depth=4, expansions=60)
+SHORT = Effort(depth=4)
 """For a refinement that a few relevant steps make; a longer one is searched in a small world."""
-NEAR, WIDER, WIDE = Width(10, 0, 50_000), Width(20, 1), Width(160, 4, 1_000_000)
-WHOLE = Width(None, 1, 1_500_000)
+MUCH = 1_500_000
+"""What a search in a large world may cost, in states times operators."""
+NEAR, WIDER, WIDE, WHOLE = Width(10, spares=0), Width(20), Width(160, 4, MUCH), Width(None, work=MUCH)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""

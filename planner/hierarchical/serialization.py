@@ -25,7 +25,7 @@ from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 
-EASY, LONGER = Effort(depth=1, expansions=10), Effort(depth=3, expansions=150)
+EASY, LONGER = Effort(depth=1), Effort(depth=3)
 """For a goal that one step achieves, and for one that a few relevant steps do."""
 Attempt: TypeAlias = "Effort | Sequence[Width]"
 Asleep: TypeAlias = "dict[Cell, None]"

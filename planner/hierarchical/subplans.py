@@ -32,6 +32,8 @@ Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
 """A quantified behaviour, and the changes since the segment began after which it is forbidden."""
+EXPANSIONS = 150
+"""The most expansions of one search for a few steps."""
 Watch: TypeAlias = "Callable[[int | None], object]"
 """Told the level of each expansion, and `None` before what costs most begins."""
 
@@ -46,13 +48,9 @@ def nobody(level: int | None) -> None:
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard to try.
-
-    `depth` is the most steps of a segment or a chain, `expansions` the most of one search.
-    """
+    """How hard to try: `depth` is the most steps of a segment or a chain."""
 
     depth: int
-    expansions: int
 
 
 @dataclass
@@ -115,7 +113,7 @@ class Segments:
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []
-        left = effort.expansions
+        left = EXPANSIONS
         seen: dict[frozenset[tuple[Cell, str]], int] = {}
 
         def deepen(depth: int, off: dict[Cell, str], changed: dict[Cell, str]) -> bool:
