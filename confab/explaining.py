@@ -158,7 +158,7 @@ def explain(
             raise KnowledgeError(f"{_words(asked_of)}: {trouble}")
     say = Sayings(labels)
     guide = Guide(call, advisor.rules, advisor.orders)
-    every = [c for cell in guide.open for c in guide.every(cell)]
+    every = list(guide.every(guide.open()))
     ways = [c for c in every if not guide.waits(c.goal)] or every
     view = View(call.program, call.table, call.goal)
     chosen = _best([c for c in every if c.ground == steps[number]], advisor, view)

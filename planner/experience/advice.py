@@ -6,10 +6,9 @@ leading    rules lead whatever their record is
 strict     memoryless search plans, exactly as without; rules try a step of their own for every `SHARE` expansions of it
 =========  ====================================================================================================
 
-Where rules run out, search takes the next goal and they go on from there. What is left in the end is for the search without
-memory: from there with a bounded number of expansions, if three quarters of the goals are reached, else from the beginning. That
-there is no plan is for it to prove. Memory that isn't trusted runs in strict mode whatever was asked for, and one that knows none
-of the goals isn't asked at all.
+Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`);
+what search finds where they have nothing to say, they learn at once. That there is no plan is for search to prove. Memory that
+isn't trusted runs in strict mode whatever was asked for, and one that knows none of the goals isn't asked at all.
 """
 
 from __future__ import annotations
@@ -21,10 +20,9 @@ from functools import cached_property
 from time import perf_counter
 
 from planner.experience.evidence import Judge, View
-from planner.experience.leading import SEARCHING, Candidate, Guide, follow, go_on, usable
+from planner.experience.leading import Candidate, Guide, by_rules, usable
 from planner.experience.lessons import rules_in
 from planner.hierarchical import planner as fast
-from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import LimitError, Limits, Outcome, Status
@@ -84,7 +82,7 @@ class Memory:
         view = View(call.program, call.table, call.goal)
 
         def score(c: Candidate) -> float:
-            return self.judge.cogency(c.rule, view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles))
+            return self.judge.told(view, c.rule, c.roles)
 
         rules = [rule for rule in self.rules if not guarded or self.helps(rule)]
         return Guide(call, rules, self.orders, score)
@@ -150,40 +148,16 @@ def plan(
     if mode == "strict" or not memory.trusted:
         return _strictly(problem, memory, limits, using, improve, leave_levels)
 
-    def ahead(call: Call) -> bool:
-        return led(call, memory.guide(call, guarded=mode == "guarded"))
+    def advised(call: Call) -> None:
+        call.advise(memory.guide(call, guarded=mode == "guarded"))
 
     warm = memory.warmed(using)
-    return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, ahead=ahead)
+    return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)
 
 
 def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], Outcome]:
     """Return what plans any problem of one domain with experience."""
     return lambda problem: plan(problem, memory, mode)
-
-
-def led(call: Call, guide: Guide) -> bool:
-    """Let rules lead, with search between them and after them; whether all goals are reached."""
-    if not guide.by_situation:
-        return False
-    segments, most = call.segments, call.segments.most
-    goals = len(guide.open)
-    try:
-        for _ in go_on(guide):
-            pass
-        if not guide.open:
-            return True
-        if 4 * len(guide.open) > goals:
-            return False
-        segments.most = min(most, segments.expanded + SEARCHING + goals - len(guide.open))
-        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        return call.serialise(Recovery(call, levels=call.program.levels[:1], attempts=1).harder)
-    except LimitError:
-        if segments.most == most or (segments.deadline is not None and perf_counter() > segments.deadline):
-            raise
-        return False
-    finally:
-        segments.most = most
 
 
 class _ArrivedError(Exception):
@@ -210,9 +184,9 @@ def _strictly(
         if level == first and (base + 1) // SHARE > call.segments.counts[first].expanded:
             if guide is None:
                 guide = memory.guide(call, guarded=False)
-                stream = follow(guide)
+                stream = by_rules(guide)
             with suppress(LimitError):
-                if next(stream, None) is None and not guide.open:
+                if next(stream, None) is None and not guide.open():
                     raise _ArrivedError
         base += level == first
         spent[level] = spent.get(level, 0) + 1

@@ -11,7 +11,7 @@ that is new is judged by the classes above it. Who was preferred weighs a tenth 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import log
 from typing import TypeAlias
@@ -38,13 +38,14 @@ class View:
         self.wanters: dict[tuple[str, str], list[Cell]] = {}
         for cell, value in goal.items():
             self.wanters.setdefault((cell[0], value), []).append(cell)
-        self._plans: dict[str, list[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]] = {}
+        self._plans: dict[tuple[str, bool], list[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]] = {}
 
-    def facts(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
-        """Return the facts about the individuals in a rule's roles."""
-        plan = self._plans.get(rule.name)
+    def facts(self, rule: Rule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
+        """Return the facts about the individuals in a rule's roles, or those of them of which something is asked."""
+        plan = self._plans.get((rule.name, among is None))
         if plan is None:
-            plan = self._plans[rule.name] = list(self._questions(rule))
+            asked = [question for question in self._questions(rule) if among is None or question[1] in among]
+            plan = self._plans[rule.name, among is None] = asked
         named = {who: role for (role, _), who in zip(rule.kinds, roles, strict=True)}
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
@@ -144,38 +145,50 @@ class Judge:
     def __init__(self, experience: Experience) -> None:
         self.totals = experience.totals()
         self.preferred = experience.preferences(DECAY)
-        self._answers: dict[str, dict[str, int]] = {}
+        self._weights: dict[str, dict[Fact, float]] = {}
+        self._asked: dict[str, frozenset[str]] = {}
 
-    def factors(self, rule: Rule, facts: list[Fact], individuals: list[Fact] = ()) -> list[Factor]:  # type: ignore[assignment]
-        """Return the summands of the cogency of following a rule where these facts hold."""
-        counted = self.totals.get(rule.name)
-        if counted is None:
-            return []
-        whole = counted.get(ITSELF, Tally())
-        not_ = whole.passed_over + whole.failed
-        found = [Factor(ITSELF, log((whole.chosen + 0.5) / (not_ + 0.5)))]
-        answers = self._answers.get(rule.name)
-        if answers is None:
-            answers = self._answers[rule.name] = {}
+    def weights(self, rule: Rule) -> Mapping[Fact, float]:
+        """Return what each fact that was counted adds to the cogency of a rule, in ln odds; its own is there in any case."""
+        found = self._weights.get(rule.name)
+        if found is None:
+            counted = self.totals.get(rule.name, {})
+            whole = counted.get(ITSELF, Tally())
+            not_ = whole.passed_over + whole.failed
+            spread: dict[str, int] = {}
             for asks, _ in counted:
-                answers[asks] = answers.get(asks, 0) + 1
-        for fact in facts:
-            tally = counted.get(fact)
-            if tally is not None:
-                spread = answers[fact[0]]
-                chosen = (tally.chosen + 1) / (whole.chosen + spread)
-                passed = (tally.passed_over + tally.failed + 1) / (not_ + spread)
-                found.append(Factor(fact, log(chosen / passed)))
-        liked = self.preferred.get(rule.name, {})
+                spread[asks] = spread.get(asks, 0) + 1
+            found = self._weights[rule.name] = {ITSELF: log((whole.chosen + 0.5) / (not_ + 0.5))} if counted else {}
+            for fact, tally in counted.items():
+                if fact != ITSELF and spread[fact[0]] > 1:  # else there is nothing to tell apart
+                    chosen = (tally.chosen + 1) / (whole.chosen + spread[fact[0]])
+                    passed = (tally.passed_over + tally.failed + 1) / (not_ + spread[fact[0]])
+                    found[fact] = log(chosen / passed)
+        return found
+
+    def factors(self, rule: Rule, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
+        """Yield the summands of the cogency of following a rule where these facts hold."""
+        weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
+        for fact in (ITSELF, *facts):
+            if fact in weights:
+                yield Factor(fact, weights[fact])
         for fact in individuals:
             c, p = liked.get(fact, (0.0, 0.0))
             if c or p:
-                found.append(Factor(fact, log((c + 0.5) / (p + 0.5))))
-        return found
+                yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
-    def cogency(self, rule: Rule, facts: list[Fact], individuals: list[Fact]) -> float:
+    def cogency(self, rule: Rule, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
         """Return the sum."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
+
+    def told(self, view: View, rule: Rule, roles: tuple[str, ...]) -> float:
+        """Return the cogency of following a rule with individuals in its roles, by the facts that were counted."""
+        weights = self.weights(rule)
+        if rule.name not in self._asked:
+            self._asked[rule.name] = frozenset(asks for asks, _ in weights)
+        facts = view.facts(rule, roles, self._asked[rule.name])
+        who = view.individuals(rule, roles) if rule.name in self.preferred else ()
+        return self.cogency(rule, facts, who)
 
 
 def told_apart(problem: Problem) -> tuple[str, ...]:

@@ -1,15 +1,18 @@
-"""The loop in which rules act: what promises the fewest steps is done for real, and where rules run out, search goes on.
+"""Rules that act, on every level: what promises the fewest steps is done for real, refined, until what was wanted is so.
 
-open      goals that don't hold
-first     what orders say must come before a goal; it waits while that is open
-rank      the steps that a rule promises; of equal ones, the candidate of the greatest cogency is tried first
-broken    a promise isn't kept: after a rule's step no rule for its goal promises fewer steps; twice broken, it isn't asked again
-mark      where the fewest goals were open so far: what leads no further is undone down to there
+off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
+rank      the steps that a rule promises; of equal ones, the candidate that loses least and has the greatest cogency comes first
+promise   after a rule's step, rules for the same symbol must promise fewer; what came to be right must not go wrong again
+wasted    steps that were undone because a promise was broken; nothing is tried while more than a tenth of all effort was
+
+The goals of a task, one by one in series, and the changes that a refinement must bring about are the same to rules: `Guide.follow`
+leaves the table as wanted, with all kept that must be, or as it was. So search goes on as if nobody had asked, and what it
+finds becomes rules at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TypeAlias
@@ -17,25 +20,22 @@ from typing import TypeAlias
 from planner.experience.matching import Find, finder, known
 from planner.experience.regression import Course, ordered
 from planner.hierarchical.operators import Program
-from planner.hierarchical.serialization import EASY, LONGER, Call
-from planner.plan import LimitError
-from planner.transitions import Cell, Change, arguments_of
+from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.serialization import Call
+from planner.hierarchical.subplans import Keep
+from planner.transitions import Cell, arguments_of
 from reasoner.amounts import meets
-from reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, Ground, Order, Rule, Tally
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
 
 CANDIDATES = 20
 """So many ways to fill a rule's roles are compared."""
-PATIENCE = 6
-"""So many steps, and twice what was promised, may bring no new least number of open goals."""
-SEARCHING = 10
-"""Expansions of search between rules, and again after them, beside one for each goal that was reached."""
-GOALS = 8
-"""So many goals are searched for where rules run out."""
 TRIES = 3
 """So many of them are tried."""
 CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
+WASTE = 10
+"""Of so many expansions one may have been for steps of rules that were undone."""
 FAR = 1000
 """More steps than any rule promises."""
 
@@ -44,14 +44,14 @@ Roles: TypeAlias = "tuple[str, ...]"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A way to follow a rule now: the goal that it is for, and the individuals in its roles."""
+    """A way to follow a rule now: the symbol that it is for, and the individuals in its roles."""
 
     rule: Rule
     goal: Cell
     roles: Roles
 
     @property
-    def ground(self) -> tuple[str, Roles]:
+    def ground(self) -> Ground:
         """The step to do."""
         filled = dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
         return self.rule.does[0], tuple([filled.get(term, term) for term in self.rule.does[1]])
@@ -66,21 +66,23 @@ class Guide:
     Parameters
     ----------
     call : Call
-    rules : sequence of Rule
+    rules : iterable of Rule
     orders : sequence of Order
     score : function of a candidate, optional
         The greater, the sooner tried.
     """
 
-    def __init__(self, call: Call, rules: Iterable[Rule], orders: Sequence[Order], score: Score | None = None) -> None:
-        self.call, self.goal, self.score = call, call.goal, score
-        self.by_situation: dict[str, list[Rule]] = {}
+    def __init__(
+        self, call: Call, rules: Iterable[Rule], orders: Sequence[Order] = (), score: Score | None = None
+    ) -> None:
+        self.call, self.score = call, score
+        self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
+        self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.finds: dict[str, Find | None] = {}
         self.names: set[str] = set()
         self.broken: dict[str, int] = {}
-        self.before = _before(self.goal, orders, call.program)
-        self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
-        self.open = {cell: None for cell in self.goal if not call.met(cell)}
+        self.wasted = 0
+        self.before = _before(call.goal, orders, call.program)
         self.add(rules)
 
     def add(self, rules: Iterable[Rule]) -> None:
@@ -89,187 +91,175 @@ class Guide:
             if rule.name not in self.names:
                 self.names.add(rule.name)
                 if known(rule, self.call.program.problem):
-                    self.by_situation.setdefault(rule.goal.situation, []).append(rule)
-        for found in self.by_situation.values():
-            found.sort(key=lambda rule: (rule.steps, rule.name))
+                    of = self.by_goal.setdefault((self.levels[rule.does[0]], rule.goal.situation), [])
+                    of.append(rule)
+                    of.sort(key=lambda rule: (rule.steps, rule.name))
 
-    def ways(self, rule: Rule, cell: Cell) -> list[Candidate]:
-        """Return ways to follow a rule for a goal now; it is compiled when it is first asked."""
+    def ways(self, rule: Rule, cell: Cell, value: str, most: int = CANDIDATES) -> list[Candidate]:
+        """Return ways to follow a rule for a value now; it is compiled when it is first asked."""
         if rule.name not in self.finds:
             bind = finder(rule, self.call.program.writer)
             self.finds[rule.name] = bind(self.call.table) if bind is not None else None
         find = self.finds[rule.name]
         if find is None:
             return []
-        roles = islice(find(*arguments_of(cell[1]), self.goal[cell]), CANDIDATES)
-        return [Candidate(rule, cell, filled) for filled in roles]
+        return [Candidate(rule, cell, roles) for roles in islice(find(*arguments_of(cell[1]), value), most)]
 
-    def look(self, mark: int) -> None:
-        """See which goals changes since a mark have opened or achieved."""
-        met = self.call.met
-        for cell in (*((s, key) for s, key, _ in self.call.table.trail[mark:]), *self.call.segments.defined):
-            if cell in self.goal:
-                if met(cell):
-                    self.open.pop(cell, None)
-                else:
-                    self.open[cell] = None
+    def open(self) -> dict[Cell, str]:
+        """Return the goals of the call that don't hold now."""
+        return {cell: value for cell, value in self.call.goal.items() if not self.call.met(cell)}
 
-    def every(self, cell: Cell) -> Iterator[Candidate]:
-        """Yield every way to follow a rule for a goal."""
-        for rule in self.by_situation.get(cell[0], ()):
-            yield from self.ways(rule, cell)
+    def every(self, cells: Mapping[Cell, str]) -> Iterator[Candidate]:
+        """Yield every way to follow a rule of the most abstract level for some values."""
+        for cell, value in cells.items():
+            for rule in self.by_goal.get((self.call.program.levels[0], cell[0]), ()):
+                yield from self.ways(rule, cell, value)
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal comes first."""
-        return any(other in self.open for other in self.before.get(cell, ()))
+        return any(not self.call.met(other) for other in self.before.get(cell, ()))
 
-    def candidates(self, cells: Iterable[Cell], below: int) -> list[Candidate]:
-        """Return the candidates of the least rank below a bound for some goals, the most cogent first."""
+    def candidates(self, level: int, cells: Mapping[Cell, str], below: int = FAR) -> list[Candidate]:
+        """Return the candidates of the least rank below a bound for some values, in the order in which to try them."""
         rank, found = below - 1, list[Candidate]()
-        for cell in cells:
-            for rule in self.by_situation.get(cell[0], ()):
+        for cell, value in cells.items():
+            for rule in self.by_goal.get((level, cell[0]), ()):
                 if rule.steps > rank or (rule.steps == rank and len(found) >= CANDIDATES):
                     break
                 if self.broken.get(rule.name, 0) > 1:
                     continue
-                ways = self.ways(rule, cell)
+                ways = self.ways(rule, cell, value)
                 if ways and rule.steps < rank:
                     rank, found = rule.steps, []
                 found += ways
-        score = self.score
-        if score is not None and len(found) > 1:
-            found.sort(key=lambda c: -score(c))
+        if self.score is not None and len(found) > 1:
+            found.sort(key=lambda c: -self.score(c))  # type: ignore[misc]
         return found
 
-    def next(self, following: Candidate | None) -> list[Candidate]:
-        """Return the candidates to try: for the goal that is followed, else for those that need not wait, else for any."""
-        if following is not None and following.goal in self.open:
-            found = self.candidates([following.goal], following.rule.steps)
-            if found:
-                return found
-        ready = [cell for cell in self.open if not self.waits(cell)]
-        found = self.candidates(ready, FAR)
-        return found if found or len(ready) == len(self.open) else self.candidates(self.open, FAR)
+    def ready(self) -> bool:
+        """Whether no more than a share of the effort was wasted so far."""
+        return self.wasted * WASTE <= self.call.segments.expanded
 
-    def do(self, candidate: Candidate) -> bool:
-        """Do a candidate's step, refined, unless it changes nothing or a goal that holds for good is lost; whether it was done."""
-        call = self.call
-        name, arguments = candidate.ground
-        said = call.segments.forward[name](*arguments)
-        if said is None or self.loses(said[1]):
-            return False
-        mark = len(call.table.trail)
-        call.segments.expand(self.levels[name])
-        done = call.refiner.do(self.levels[name], name, arguments)
-        if done is None:
-            return False
-        if len(call.table.trail) == mark or self.harmed(mark):
-            call.table.undo(mark)
-            return False
-        call.steps.append(done)
-        self.look(mark)
-        return True
-
-    def loses(self, changes: Iterable[Change]) -> bool:
-        """Whether changes would lose a goal that holds for good: they needn't be tried."""
-        for situation, key, value in changes:
-            cell = situation, key
-            wanted = self.goal.get(cell)
-            if wanted is not None and cell not in self.open and not meets(value, wanted) and not self.waits(cell):
-                return True
-        return False
-
-    def harmed(self, mark: int) -> bool:
-        """Whether a goal was lost since a mark that waits for no other."""
-        cells = {(situation, key) for situation, key, _ in self.call.table.trail[mark:]}
-        return any(
-            cell in self.goal and cell not in self.open and not self.call.met(cell) and not self.waits(cell)
-            for cell in cells
+    def rank(self, cell: Cell) -> int:
+        """Return how many steps rules promise for a goal; 0 if they promise nothing."""
+        rules = self.by_goal.get((self.call.program.levels[0], cell[0]), ()) if self.ready() else ()
+        return next(
+            (r.steps for r in rules if self.broken.get(r.name, 0) < 2 and self.ways(r, cell, self.call.goal[cell], 1)),
+            0,
         )
 
+    def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
+        """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
+        if not self.ready():
+            return None
+        stream = self.following(level, targets, keep)
+        while True:
+            try:
+                next(stream)
+            except StopIteration as end:
+                done: list[RefinedStep] | None = end.value
+                return done
 
-def follow(guide: Guide) -> Iterator[Candidate]:
-    """Follow rules from where a call stands, and leave it where they led nearer; yield each candidate before it is tried."""
-    call = guide.call
-    table = call.table
-    least, mark, steps, left = len(guide.open), len(table.trail), len(call.steps), -1
-    following: Candidate | None = None
-    while guide.open:
-        tried = guide.next(following)
-        if following is not None and following.goal in guide.open and not (tried and tried[0].goal == following.goal):
-            guide.broken[following.rule.name] = guide.broken.get(following.rule.name, 0) + 1
-        done = None
-        for candidate in tried[:TRIES]:
-            yield candidate
-            if guide.do(candidate):
-                done = candidate
+    def following(
+        self, level: int, targets: Mapping[Cell, str], keep: Keep
+    ) -> Generator[Candidate, None, list[RefinedStep] | None]:
+        """Do the same, and yield each candidate before it is tried."""
+        call = self.call
+        table, segments = call.table, call.segments
+        start = mark = len(table.trail)
+        began = segments.expanded
+        origin: dict[Cell, str] = {}
+        off = {c: v for c, v in targets.items() if not meets(table.now[c[0]].get(c[1], FALSE), v)}
+        closed: set[Cell] = set()
+        steps: list[RefinedStep] = []
+        used: dict[str, None] = {}
+        goal: Cell | None = None
+        rank = FAR
+        while off:
+            among = {goal: off[goal]} if goal in off else {c: v for c, v in off.items() if c not in closed}
+            done = None
+            for candidate in self.candidates(level, among, rank)[:TRIES]:
+                yield candidate
+                used[candidate.rule.name] = None
+                done = self.do(level, candidate)
+                if done is not None:
+                    goal, rank = candidate.goal, candidate.rule.steps
+                    steps.append(done)
+                    break
+            if done is None:
                 break
-        if done is None:
-            if not tried:
-                break
-            for name in {candidate.rule.name for candidate in tried}:
-                guide.broken[name] = guide.broken.get(name, 0) + 1
-            following = None  # another rule may get on
-            continue
-        following = done if done.goal in guide.open else None
-        if len(guide.open) < least:
-            least, mark, steps, left = len(guide.open), len(table.trail), len(call.steps), -1
+            for situation, key, old in table.trail[mark:]:
+                first = origin.setdefault((situation, key), old)
+                self._look((situation, key), targets.get((situation, key)) or keep((situation, key), first), off)
+            for cell in segments.defined:
+                self._look(cell, targets.get(cell) or keep(cell, ""), off)
+            mark = len(table.trail)
+            if goal is not None and goal not in off:
+                closed.add(goal)
+                rank = FAR
+        if not off and call.refiner.left_as_it_must(start, targets, keep) is None:
+            return steps
+        for name in used:
+            self.broken[name] = self.broken.get(name, 0) + 1
+        self.wasted += segments.expanded - began
+        table.undo(start)
+        return None
+
+    def _look(self, cell: Cell, wanted: str | None, off: dict[Cell, str]) -> None:
+        if wanted is None or meets(self.call.table.now[cell[0]].get(cell[1], FALSE), wanted):
+            off.pop(cell, None)
         else:
-            left = 2 * done.rule.steps + PATIENCE if left < 0 else left - 1
-            if left == 0:
-                break
-    back = len(table.trail)
-    if back > mark:
-        touched = table.trail[mark:]
-        table.undo(mark)
-        del call.steps[steps:]
-        table.trail.extend(touched)  # for a look at the goals among them
-        guide.look(mark)
-        del table.trail[mark:]
+            off[cell] = wanted
+
+    def do(self, level: int, candidate: Candidate) -> RefinedStep | None:
+        """Do a candidate's step, refined, unless it changes nothing; None, and the table as it was, if it can't be done."""
+        call, mark = self.call, len(self.call.table.trail)
+        name, arguments = candidate.ground
+        call.segments.expand(level)
+        done = call.refiner.do(level, name, arguments)
+        return done if len(call.table.trail) > mark else None
+
+    def learn(
+        self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
+    ) -> bool:
+        """Learn rules at once from steps of a level that search found, done since a mark; whether there are new ones."""
+        known = len(self.names)
+        done = [(step.behavior, step.arguments) for step in steps]
+        self.add(course(self.call, mark, targets, keep, done).rules_of())
+        return len(self.names) > known
 
 
-def go_on(guide: Guide) -> Iterator[Candidate]:
-    """Follow rules as long as they reach goals; where they run out, search for one, learn from that at once, and follow them again.
-
-    Searching may take `SEARCHING` expansions in all, and one for each goal that was reached.
-    """
-    call, goals = guide.call, len(guide.open)
-    first = call.program.levels[0]
-    searching = 0
-    while guide.open:
-        open_ = len(guide.open)
-        yield from follow(guide)
-        before = call.segments.expanded
-        budget = SEARCHING + goals - len(guide.open) - searching
-        if len(guide.open) in (0, open_) or budget <= 0 or not searched(guide, first, budget):
-            return
-        searching += call.segments.expanded - before
+def by_rules(guide: Guide) -> Iterator[Candidate]:
+    """Achieve goals by rules alone, as many as they can; yield each candidate before it is tried."""
+    call, level = guide.call, guide.call.program.levels[0]
+    reached = True
+    while reached:
+        reached = False
+        for cell, value in sorted(guide.open().items(), key=lambda item: guide.waits(item[0])):
+            if not call.met(cell):
+                steps = yield from guide.following(level, {cell: value}, call.segments.keeping(call.kept))
+                if steps is not None:
+                    call.steps += steps
+                    call.kept[cell] = value
+                    reached = True
 
 
-def searched(guide: Guide, level: int, budget: int) -> bool:
-    """Achieve one more goal by search, and learn rules from that; whether one was."""
-    call, began = guide.call, guide.call.segments.expanded
-    ready = [cell for cell in guide.open if not guide.waits(cell)] or list(guide.open)
-    call.kept = {cell: call.goal[cell] for cell in call.goal if cell not in guide.open and not guide.waits(cell)}
-    before, mark, steps = call.table.state(), len(call.table.trail), len(call.steps)
-    most = call.segments.most
-    call.segments.most = min(most, began + budget)
-    try:
-        cell = next(c for a in (EASY, LONGER) for c in ready[:GOALS] if call.achieve(level, c, a))
-    except StopIteration:
-        return False
-    except LimitError:
-        if began + budget >= most or call.segments.expanded <= began + budget:
-            raise
-        call.table.undo(mark)
-        return False
-    finally:
-        call.segments.most = most
-    guide.look(mark)
-    goal = {Symbol(cell[0], arguments_of(cell[1])): call.goal[cell]}
-    done = [(step.behavior, step.arguments) for step in call.steps[steps:]]
-    guide.add(Course(replace(call.problem, initial=before, goal=goal), done).rules_of())
-    return True
+def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
+    """Return steps of a level, done since a mark, as a way from the state there to what they should leave."""
+    before: dict[Cell, str] = {}
+    for situation, key, old in call.table.trail[mark:]:
+        before.setdefault((situation, key), old)
+    state = call.table.state()
+    goal = {}
+    for cell, first in before.items():
+        symbol = Symbol(cell[0], arguments_of(cell[1]))
+        state[symbol] = first
+        wanted = targets.get(cell) or keep(cell, first)
+        if wanted is not None:
+            goal[symbol] = wanted
+    for cell in targets.keys() - before.keys():
+        goal[Symbol(cell[0], arguments_of(cell[1]))] = targets[cell]
+    return Course(replace(call.problem, initial=state, goal=goal), done)
 
 
 def usable(experience: Experience) -> list[Order]:

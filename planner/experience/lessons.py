@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from planner.experience.evidence import View
-from planner.experience.leading import Candidate, Guide, follow, usable
+from planner.experience.leading import Candidate, Guide, by_rules, course, usable
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner
@@ -123,17 +123,14 @@ def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     rules = rules_in(experience)
     call = Call(problem, using, None, SHORT.expansions)
     guide = Guide(call, rules, usable(experience))
-    lesson = Lesson()
-    if not guide.by_situation:
-        return lesson
-    open_ = list(guide.open)
+    lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
-        for _ in follow(guide):
+        for _ in by_rules(guide):
             pass
     for cell in open_:
-        kinds = {rule.goals for rule in guide.by_situation.get(cell[0], ())}
+        kinds = {rule.goals for rule in guide.by_goal.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
-            (kind, ITSELF, FAILED if cell in guide.open else CHOSEN) for kind in kinds if about(kind, cell, problem)
+            (kind, ITSELF, CHOSEN if call.met(cell) else FAILED) for kind in kinds if about(kind, cell, problem)
         ]
     return lesson
 
@@ -164,20 +161,34 @@ def learned(
     course = Course(problem, grounds(steps))
     lesson = Lesson(said=list(course.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
-    lesson.counted += [(method, ITSELF, CHOSEN) for method in methods(problem, plan, using)]
+    for one in refined(Call(problem, using, None, SHORT.expansions), steps, set()):
+        if isinstance(one, Rule):
+            lesson.said.append(one)
+        else:
+            lesson.counted.append((one, ITSELF, CHOSEN))
     own = [rule for rule in lesson.said if isinstance(rule, Rule)]
     lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
     return lesson
 
 
-def methods(problem: Problem, plan: Plan, using: Compiled) -> Iterator[Method]:
-    """Yield how each step of a plan was refined."""
-    refiner = Call(problem, using, None, 1).refiner
-    for step in plan.walk():
-        if step.steps:
-            variables = using.program.variables[step.behavior]
-            own = (*step.arguments, *(step.bindings[v] for v in variables if v in step.bindings))
-            yield method_of(refiner, step, own)
+def refined(call: Call, steps: Iterable[Step], known: set[str]) -> Iterator[Method | Rule]:
+    """Do steps, and yield how each was refined: the method, and the rules of each that isn't known yet."""
+    for step in steps:
+        mark = len(call.table.trail)
+        done = call.segments.forward[step.behavior](*step.arguments)
+        if done is None:
+            raise LearningError(f"{step}: its preconditions don't hold there")
+        if not step.steps:
+            call.segments.apply(done[1])
+            continue
+        targets = call.refiner.targets(done[1])
+        yield from refined(call, step.steps, known)
+        method = method_of(call.refiner, step, (*step.arguments, *done[0]))
+        yield method
+        if method.name not in known and len({inner.level for inner in step.steps}) == 1:
+            known.add(method.name)
+            keep = call.segments.refining(step.level)
+            yield from course(call, mark, targets, keep, grounds(step.steps)).rules_of()
 
 
 def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> Method:
@@ -196,20 +207,21 @@ def chosen(
     later = grounds(steps)
     lesson = Lesson()
     for number, ground in enumerate(later):
-        tried_ = guide.next(None)
+        open_ = guide.open()
+        first = using.program.levels[0]
+        ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
+        tried_ = guide.candidates(first, ready) or guide.candidates(first, open_)
         done = [c for c in tried_ if c.ground == ground]
         if done:
             rest = set(later[number + 1 :])
             passed = {c.ground: c for c in tried_ if c.ground != ground and c.ground not in rest}
             lesson += compared(view, done, list(passed.values()))
-        mark = len(call.table.trail)
         changes = call.segments.forward[ground[0]](*ground[1])
         if changes is None:
             raise LearningError(
                 f"step {number} ({' '.join((ground[0], *ground[1]))}): its preconditions don't hold there"
             )
         call.segments.apply(changes[1])
-        guide.look(mark)
     return lesson
 
 
@@ -244,16 +256,13 @@ def in_vain(
         changes = call.segments.forward[ground[0]](*ground[1])
         if changes is None:
             raise LearningError(f"{' '.join((ground[0], *ground[1]))}: its preconditions don't hold there")
-        mark = len(call.table.trail)
         call.segments.apply(changes[1])
-        guide.look(mark)
     view = View(using.program, call.table, call.goal)
     lesson = Lesson()
     wanted = (step.behavior, step.arguments)
-    for cell in guide.open:
-        for c in guide.every(cell):
-            if c.ground == wanted:
-                facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
-                lesson.counted += [(c.rule, fact, FAILED) for fact in facts]
-                lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
+    for c in guide.every(guide.open()):
+        if c.ground == wanted:
+            facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
+            lesson.counted += [(c.rule, fact, FAILED) for fact in facts]
+            lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
     return lesson

@@ -67,6 +67,8 @@ class Course:
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
+        self.lost: dict[Fact, int] = {}
+        """The last step after which a goal didn't hold any more."""
         for number, (name, arguments) in enumerate(steps):
             self._do(number, name, arguments)
 
@@ -90,12 +92,16 @@ class Course:
             raise LearningError(f"step {number} ({' '.join((name, *arguments))}): an amount would be what it can't be")
         changes = [(situation, key, value, tuple(because.get((situation, key), ()))) for situation, key, value in made]
         self.done.append(Done((name, arguments), (*kinds, *asked), tuple(changes), len(facts.log)))
-        before = [s for s, value in self.problem.goal.items() if meets(facts.value(s.situation, s.arguments), value)]
+        goals = self.problem.goal
+        before = {s for s, value in goals.items() if meets(facts.value(s.situation, s.arguments), value)}
         for situation, key, value, _ in changes:
             facts.put(situation, key, value)
-        for symbol, value in self.problem.goal.items():
-            if symbol not in before and meets(facts.value(symbol.situation, symbol.arguments), value):
+        for symbol, value in goals.items():
+            holds = meets(facts.value(symbol.situation, symbol.arguments), value)
+            if holds and symbol not in before:
                 self.achieved[Fact(symbol, value)] = number
+            elif symbol in before and not holds:
+                self.lost[Fact(symbol, value)] = number
 
     def plain(self, condition: Condition, kinds: Mapping[str, str]) -> Iterator[Condition]:
         """Yield a condition that holds now without choices: the individual and the alternative that there are."""
@@ -118,14 +124,17 @@ class Course:
     # -------------------------------------------------------------------------------------------------------- regressing
 
     def rules_of(self) -> Iterator[Rule]:
-        """Yield the rules of each goal: over the steps since the goal before it was achieved."""
-        last = -1
-        starts: dict[int, int] = {}
-        for number in sorted(set(self.achieved.values())):
-            starts[number] = last + 1
-            last = number
+        """Yield the rules of each goal: over the steps since the goal before it was achieved; of one that was lost, since then."""
+        new = {number for fact, number in self.achieved.items() if not self._held(fact)}
         for fact, number in sorted(self.achieved.items()):
-            yield from self.regressed(fact, starts[number], number)
+            before = [self.lost.get(fact, -1)]
+            if not self._held(fact):
+                before += [other for other in new if other < number]
+            yield from self.regressed(fact, max(before) + 1, number)
+
+    def _held(self, goal: Fact) -> bool:
+        """Whether a goal held in the beginning."""
+        return meets(self.problem.initial.get(goal.symbol), goal.value)
 
     def regressed(self, goal: Fact, start: int, end: int) -> Iterator[Rule]:
         """Yield the rules for a goal from the step that achieves it backwards."""
@@ -136,7 +145,7 @@ class Course:
         wanted = ValueCondition(goal.symbol.situation, goal.symbol.arguments, goal.value)
         need: dict[Condition, None] = {wanted: None}
         order: dict[str, None] = dict.fromkeys((*wanted.arguments, wanted.value))
-        steps, level = 0, self.problem.domain.levels[0]
+        steps, level = 0, self.problem.domain.behaviors[self.done[end].ground[0]].level
         for done in reversed(self.done[start : end + 1]):
             after = dict(need)
             while len(facts.log) > done.mark:

@@ -44,6 +44,10 @@ SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
 
+def alone(call: Call) -> None:
+    """Take no advice."""
+
+
 def plan(
     problem: Problem,
     *,
@@ -52,7 +56,7 @@ def plan(
     using: Compiled | None = None,
     watch: Watch = nobody,
     leave_levels: bool = True,
-    ahead: Callable[[Call], bool] | None = None,
+    advised: Callable[[Call], None] = alone,
 ) -> Outcome:
     """Plan fast: goals in series on one table that is changed in place, steps refined from templates.
 
@@ -69,15 +73,15 @@ def plan(
         relaxed reachability disproves nothing.
     leave_levels : bool
         Whether steps of a lower level may stand where a level has no plan that can be refined.
-    ahead : function of a call, optional
-        Does steps before any search, and tells whether all goals are reached then; if not, planning begins anew.
+    advised : function of a call, optional
+        Lets advice in.
 
     Returns
     -------
     Outcome
     """
     with paused_collection():
-        return _plan(problem, limits, improve, using, watch, leave_levels, ahead)
+        return _plan(problem, limits, improve, using, watch, leave_levels, advised)
 
 
 def _plan(
@@ -87,33 +91,26 @@ def _plan(
     using: Compiled | None,
     watch: Watch,
     leave_levels: bool,
-    ahead: Callable[[Call], bool] | None,
+    advised: Callable[[Call], None],
 ) -> Outcome:
     begin = perf_counter()
     deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
     using = using or compiled(problem)
 
-    def begun() -> Call:
-        call = Call(problem, using, deadline, limits.expansions)
-        call.segments.watch = watch
-        return call
-
-    call = begun()
+    call = Call(problem, using, deadline, limits.expansions)
+    call.segments.watch = watch
+    advised(call)
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
         return call.outcome(status, plan, reason, perf_counter() - begin)
 
     try:
-        led = ahead is not None and ahead(call)
-        if ahead is not None and not led:
-            spent, call = call.segments, begun()
-            call.segments.counts, call.segments.expanded = spent.counts, spent.expanded
         levels = call.program.levels if leave_levels else call.program.levels[:1]
         recovery = Recovery(call, levels)
-        if led or call.serialise(recovery.harder) or recovery.anew(levels):
+        if call.serialise(recovery.harder) or recovery.anew(levels):
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
-                    shorten(call, improve, leave_levels)
+                    shorten(call, improve, leave_levels, advised)
             return outcome(Status.SOLVED, call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
@@ -137,13 +134,13 @@ def _plan(
     return outcome(flat.status, flat.plan, flat.reason)
 
 
-def shorten(call: Call, improve: int, leave_levels: bool) -> None:
+def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> None:
     """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
     concerned = concerns(call.refiner, call.steps) if len(call.program.levels) > 1 else []
     if not put_aside(concerned):
         return
     improver = Improver(call.refiner, call.using.shapes, improve)
-    first, call.steps = call.steps, reordered(call)
+    first, call.steps = call.steps, reordered(call, advised)
     if not leave_levels:
         return
     before = call.steps
@@ -153,7 +150,7 @@ def shorten(call: Call, improve: int, leave_levels: bool) -> None:
         call.steps = before
 
 
-def reordered(call: Call) -> list[RefinedStep]:
+def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
@@ -170,6 +167,7 @@ def reordered(call: Call) -> list[RefinedStep]:
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
         other.segments.most_work = max(call.segments.worked / 2, REORDERING)
+        advised(other)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
             done = recovery.together(first) if at_once else other.serialise(recovery.harder)

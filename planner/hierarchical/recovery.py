@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TypeVar
 
 from planner.hierarchical.refinement_cache import WHOLE
-from planner.hierarchical.serialization import LONGER, Asleep, Attempt, Before, Call
+from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, proved
 from planner.plan import Reason, TooLargeError, UnsolvableError
@@ -60,6 +60,8 @@ class Recovery:
     def ladder(self) -> list[tuple[int, Attempt]]:
         """The attempts, each with its level."""
         found: list[tuple[int, Attempt]] = []
+        if self.call.advice is not None:
+            found.append((self.call.program.levels[0], ADVISED))
         for level in self.levels or self.call.program.levels:
             *small, large = self.call.refiner.worlds(level)
             found += [(level, attempt) for attempt in (LONGER, (*small,), (large,), ALL)[: self.attempts]]
@@ -71,10 +73,10 @@ class Recovery:
 
         def candidates() -> Iterator[Cell]:
             none = True
-            for cell in asleep:
-                if all(other in call.kept for other in before.get(cell, ())):
-                    none = False
-                    yield cell
+            ready = [cell for cell in asleep if all(other in call.kept for other in before.get(cell, ()))]
+            for cell in sorted(ready, key=call.advice.waits) if call.advice is not None else ready:
+                none = False
+                yield cell
             if none:  # where goals wait for each other, none waits
                 yield from asleep
 
@@ -84,7 +86,7 @@ class Recovery:
             call.restarts += 1
             return True
         for level, attempt in self.ladder:
-            if attempt is not LONGER and len(call.goal) - len(call.kept) >= COSTLY:
+            if not isinstance(attempt, Effort) and len(call.goal) - len(call.kept) >= COSTLY:
                 call.segments.watch(None)
             if attempt is ALL:
                 if self.together(level):

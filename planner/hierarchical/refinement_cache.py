@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
@@ -52,6 +52,18 @@ class Template:
     open: tuple[OpenRole, ...]
 
 
+class Advice(Protocol):
+    """What may know steps before they are searched, and learns from those that were found."""
+
+    def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
+        """Do steps that achieve the targets and keep the rest; None, and the table as it was, without any."""
+
+    def learn(
+        self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
+    ) -> bool:
+        """Learn from steps that search found, done since a mark; whether that was new."""
+
+
 class Refiner:
     """Does behaviours on a table, by way of their primitives.
 
@@ -76,6 +88,7 @@ class Refiner:
         self.besides: dict[Cell, str] = {}
         """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
         self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
+        self.advice: Advice | None = None
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Do a behaviour, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
@@ -170,8 +183,13 @@ class Refiner:
                 return None
         self.misses += 1
         widths = self.worlds(below)
-        found = self.achieve(below, targets, keep, individuals, SHORT)
-        found = found or self.achieve(below, targets, keep, individuals, widths)
+        mark = len(self.table.trail)
+        found = self.advice.follow(below, targets, keep) if self.advice is not None else None
+        if found is None:
+            found = self.achieve(below, targets, keep, individuals, SHORT)
+            found = found or self.achieve(below, targets, keep, individuals, widths)
+            if found and self.advice is not None:
+                self.advice.learn(below, mark, targets, keep, found)
         if found is None:
             around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]

@@ -14,10 +14,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
+from planner.hierarchical.refinement_cache import Advice, RefinedStep, Refiner, Template
 from planner.hierarchical.subplans import Effort, Segments
 from planner.hierarchical.subproblem import Width
 from planner.plan import Outcome, Plan, Reason, Status, Step
@@ -27,6 +27,8 @@ from reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 
 EASY, LONGER = Effort(depth=1), Effort(depth=3)
 """For a goal that one step achieves, and for one that a few relevant steps do."""
+ADVISED = Effort(depth=0)
+"""By advice alone."""
 Attempt: TypeAlias = "Effort | Sequence[Width]"
 Asleep: TypeAlias = "dict[Cell, None]"
 Before: TypeAlias = "Mapping[Cell, Sequence[Cell]]"
@@ -51,6 +53,16 @@ def compiled(problem: Problem) -> Compiled:
     return Compiled(Program(problem))
 
 
+class GoalAdvice(Advice, Protocol):
+    """What may know steps to goals, too."""
+
+    def rank(self, cell: Cell) -> int:
+        """Return how many steps are promised for a goal; 0 if none are."""
+
+    def waits(self, cell: Cell) -> bool:
+        """Whether another open goal should come first."""
+
+
 class Call:
     """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
 
@@ -71,6 +83,7 @@ class Call:
             if not self.segments.visible(first, cell) and rests[cell[0]] in (None, value)
         }
         """Goals unknown to the most abstract level, and free of rest values: its last step brings them about."""
+        self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
@@ -78,6 +91,10 @@ class Call:
         self.restarts = 0
         self.wary: Callable[[list[RefinedStep], int, Again], list[RefinedStep] | None] | None = None
         """Looks whether steps done since a mark have led astray, and does them again then."""
+
+    def advise(self, advice: GoalAdvice) -> None:
+        """Take advice before any search, for goals and for refinements."""
+        self.advice = self.refiner.advice = advice
 
     def serialise(self, harder: Harder) -> bool:
         """Achieve the goals one after the other, with more effort where these get stuck; whether all are."""
@@ -126,9 +143,12 @@ class Call:
                     self.kept[cell] = self.goal[cell]
                     continue
                 unmet = [other for other in before.get(cell, ()) if other not in self.kept]
+                promised = self.advice.rank(cell) if self.advice is not None and not unmet else 0
                 if unmet:
                     sleep(cell, unmet)
-                elif self.achieve(first, cell, EASY):
+                elif (promised == 1 and self.achieve(first, cell, ADVISED)) or (
+                    promised < 2 and self.achieve(first, cell, EASY)
+                ):
                     wake(mark)
                     mark = len(self.table.trail)
                 else:
@@ -158,7 +178,13 @@ class Call:
         kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
         keep = self.segments.keeping(kept)
         mark = len(self.table.trail)
-        steps = self.refiner.achieve(level, targets, keep, (), attempt)
+        if attempt is ADVISED:
+            steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
+        else:
+            steps = self.refiner.achieve(level, targets, keep, (), attempt)
+            if steps and self.advice is not None and self.advice.learn(level, mark, targets, keep, steps):
+                for attempts in self.failed.values():
+                    attempts.discard((self.program.levels[0], ADVISED))
         if steps is not None and self.wary is not None:
             steps = self.wary(steps, mark, lambda: self.refiner.achieve(level, targets, keep, (), attempt))
         if steps is None:

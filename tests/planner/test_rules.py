@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from planner.experience.advice import Memory, plan
 from planner.experience.evidence import View
 from planner.experience.leading import Guide
@@ -12,6 +13,7 @@ from planner.experience.lessons import compared, rules_in, teach
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.operators import Program
+from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.serialization import Call, compiled
 from planner.plan import Outcome, Status
 from planner.validation import validate
@@ -85,7 +87,8 @@ def test_after_six_small_lessons_a_larger_table_takes_hardly_more_expansions_tha
     alone, led = fast.plan(within, improve=0), plan(within, taught(FAMILIES), improve=0)
     assert led.plan is not None
     assert validate(within, led.plan) == []
-    assert expanded(led) <= max(1.6 * len(led.plan.steps), 1.2 * expanded(alone) + 2 * (10 + len(within.goal)))
+    assert expanded(led) <= 1.5 * len(led.plan.steps)
+    assert expanded(led) <= expanded(alone)
 
 
 @pytest.mark.parametrize("family", ["served", "full", "random"])
@@ -106,7 +109,7 @@ def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
         alone, misled = fast.plan(within), plan(within, inverted(taught()), "leading")
         assert misled.plan is not None
         assert validate(within, misled.plan) == []
-        assert expanded(misled) <= expanded(alone) + 4 * (10 + len(within.goal))
+        assert expanded(misled) <= 1.2 * expanded(alone) + max(rule.steps for rule in taught().rules)
 
 
 def test_a_memory_that_knows_none_of_the_behaviours_is_not_asked() -> None:
@@ -121,8 +124,9 @@ def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> No
     poor.merge(memory.experience)
     kinds = {rule.goals for rule in memory.rules}
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
-    assert expanded(plan(within, Memory(poor))) == expanded(fast.plan(within))
-    assert expanded(plan(within, memory)) < expanded(fast.plan(within))
+    call = Call(within, compiled(within), None, 1000)
+    assert Memory(poor).guide(call, guarded=True).names == set()
+    assert Memory(poor).guide(call, guarded=False).names == memory.guide(call, guarded=True).names != set()
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
@@ -190,7 +194,7 @@ def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
     within, memory = problem("served", 6, 1), taught()
     call = Call(within, compiled(within), None, 1000)
     guide = Guide(call, memory.rules, memory.orders)
-    one, other = guide.next(None)[:2]
+    one, other = guide.candidates(1, guide.open())[:2]
     view = View(Program(within), call.table, call.goal)
     lesson = compared(view, [one], [other])
     assert (one.rule, ITSELF, Tally(chosen=1)) in lesson.counted
@@ -220,9 +224,53 @@ def test_what_comes_first_is_learned_from_several_orders() -> None:
     assert first.reversed not in taught().orders
 
 
-def test_a_way_that_leaves_the_level_teaches_no_rule_of_that_level() -> None:
+def test_where_a_level_is_left_rules_still_act_on_the_level_of_their_behaviours_alone() -> None:
     within = van().problem
-    lower = [name for name, b in within.domain.behaviors.items() if b.level > 1]
     experience = Experience("robot")
     teach(experience, within)
-    assert not {rule.does[0] for rule in rules_in(experience)} & set(lower)
+    guide = Guide(Call(within, compiled(within), None, 1000), rules_in(experience))
+    assert {level for level, _ in guide.by_goal} > {1}
+    assert all(
+        within.domain.behaviors[rule.does[0]].level == level
+        for (level, _), rules in guide.by_goal.items()
+        for rule in rules
+    )
+    alone, led = fast.plan(within), plan(within, Memory(experience))
+    assert led.plan is not None
+    assert validate(within, led.plan) == []
+    assert len(led.given_up) <= len(alone.given_up)
+
+
+def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
+    small, large = (confab.load(f"canal-{size}").problem for size in ("small", "large"))
+    experience = Experience("robot")
+    teach(experience, small)
+    few = replace(large, goal=dict(list(large.goal.items())[:3]))
+    alone, led = fast.plan(few, improve=0), plan(few, Memory(experience), improve=0)
+    assert led.plan is not None
+    assert validate(few, led.plan) == []
+    assert 4 * expanded(led, 2) < expanded(alone, 2)
+
+
+def test_what_search_found_in_a_call_leads_on_in_it() -> None:
+    within = problem("handover", 12, 5000)
+    call = Call(within, compiled(within), None, 10_000)
+    guide = Guide(call, ())
+    call.advise(guide)
+    assert call.serialise(Recovery(call).harder)
+    assert guide.names
+    assert call.segments.counts[1].expanded < expanded(fast.plan(within, improve=0))
+
+
+def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_has_done_ten_times_as_much() -> None:
+    within = problem("swap", 12, 1)
+    call = Call(within, compiled(within), None, 10_000)
+    guide = Guide(call, inverted(taught()).rules)
+    level, before = call.program.levels[0], call.table.state()
+    for cell, value in guide.open().items():
+        if not guide.wasted and guide.follow(level, {cell: value}, call.segments.keeping(call.kept)) is None:
+            assert call.table.state() == before
+    assert guide.wasted > 0
+    assert not guide.ready()
+    call.segments.expanded = 10 * guide.wasted
+    assert guide.ready()
