@@ -53,7 +53,10 @@ class Derived:
             while changed:
                 low = changed & -changed
                 changed ^= low
-                for number in users[low]:
+                came = bool(state & low)
+                for number, mask, opposite in users[low]:
+                    if mask and bool(state & mask) is (came is not opposite):
+                        continue  # it is already what this change could make of it
                     if number not in seen:
                         seen.add(number)
                         heapq.heappush(waiting, number)
@@ -63,8 +66,8 @@ class Derived:
             number = heapq.heappop(waiting)
             new = _worked_out(self.parts[number], state)
             if new != state:
-                wake(new ^ state)
-                state = new
+                changed, state = new ^ state, new
+                wake(changed)
         return state
 
     def fresh(self, state: int, bits: int) -> int:
@@ -106,17 +109,18 @@ class Derived:
         )
 
     @cached_property
-    def _users(self) -> Mapping[int, Sequence[int]]:
-        """For each bit that is needed, the parts that need it and aren't its own."""
-        found: dict[int, dict[int, None]] = defaultdict(dict)
+    def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
+        """For each bit that is needed, the parts that need it and aren't its own: of a part of one bit, that bit and its sense."""
+        found: dict[int, dict[tuple[int, int, bool], None]] = defaultdict(dict)
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)
+            entry = (number, own, part[0].opposite) if len(part) == 1 else (number, 0, False)
             needed = 0
             for bit in part:
                 for wanted in bit.alternatives:
                     needed |= wanted
             for low in _single(needed & ~own):
-                found[low][number] = None
+                found[low][entry] = None
         return {low: tuple(numbers) for low, numbers in found.items()}
 
     @cached_property

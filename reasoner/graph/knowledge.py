@@ -56,7 +56,14 @@ class Remote(Protocol):
 
 
 class KnowledgeError(ValueError):
-    """The knowledge that was given can't be used; the message says what, where, and what to do."""
+    """The knowledge that was given can't be used; the message says what, where, and what to do.
+
+    `node` is the IRI of what is at fault, where the message has another name of it.
+    """
+
+    def __init__(self, message: str = "", node: str = "") -> None:
+        super().__init__(message)
+        self.node = node
 
 
 def text(term: Term) -> str:

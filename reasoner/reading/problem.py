@@ -951,7 +951,8 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
             if iri in changed:
                 who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
                 raise KnowledgeError(
-                    f"<{who}> changes {name}, which is defined by <{min(by)}>; change what that reads, or drop the definition"
+                    f"<{who}> changes {name}, which is defined by <{min(by)}>; change what that reads, or drop the definition",
+                    who,
                 )
             if not situations[name].boolean:
                 raise KnowledgeError(
@@ -971,7 +972,9 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
     for name, other in circles(found):
         raise KnowledgeError(
             f"{name} is defined by {other} not being true, which is defined by {name} in turn: which of them holds can't be told; "
-            "take one of these conditions out of its rule"
+            "take one of these conditions out of its rule",
+            next((rule for iri, rules in written.items() if parts.names.short(iri) == name for rule in rules), None)
+            or parts.names.iri(name),
         )
     return found
 
@@ -1200,7 +1203,7 @@ def _initial(
                 raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
             initial[symbol] = values[0]
             if situation.quantity:
-                _check_amount(symbol, values[0], situation.quantity)
+                _check_amount(symbol, values[0], situation.quantity, names)
     true = [s for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE]
     initial |= dict.fromkeys(sorted(true), TRUE)
     for symbol, value in initial.items():
@@ -1213,15 +1216,16 @@ def _initial(
     return initial
 
 
-def _check_amount(symbol: Symbol, value: str, quantity: Quantity) -> None:
+def _check_amount(symbol: Symbol, value: str, quantity: Quantity, names: Names) -> None:
     """Raise `KnowledgeError` if a symbol has an amount that it can't have."""
+    node = names.iri(symbol.arguments[0]) if symbol.arguments[0] in names else ""
     if not DECIMAL.fullmatch(value):
-        raise KnowledgeError(f"{symbol} is {value[:40]}; wanted a number, like 2 or 1.5")
+        raise KnowledgeError(f"{symbol} is {value[:40]}; wanted a number, like 2 or 1.5", node)
     if not quantity.allows(Fraction(value)):
         limits = [] if quantity.least is None else [f"at least {written(quantity.least)}"]
         limits += [] if quantity.most is None else [f"at most {written(quantity.most)}"]
         limits += ["a whole number"] if quantity.whole else []
-        raise KnowledgeError(f"{symbol} is {value}; it has to be {' and '.join(limits)}: mend the scene")
+        raise KnowledgeError(f"{symbol} is {value}; it has to be {' and '.join(limits)}; mend the scene", node)
 
 
 def _with_goal(problem: Problem, known: Frame) -> Problem:

@@ -134,7 +134,8 @@ class _Imp:
         body = " ^ ".join(f"{local_name(p)}({', '.join(map(self.word, of))})" for p, of in self._atoms("body"))
         head = " ^ ".join(f"{local_name(p)}({', '.join(map(self.word, of))})" for p, of in self._atoms("head"))
         name = f"<{self.iri}>" if ":" in self.iri else f"'{labels[0]}'" if labels else f"{body} -> {head}"
-        return KnowledgeError(f"the SWRL rule {name}: {what}")
+        concluded = (predicate for predicate, _ in self._atoms("head"))
+        return KnowledgeError(f"the SWRL rule {name}: {what}", self.iri if ":" in self.iri else next(concluded, ""))
 
     def word(self, argument: str) -> str:
         return "?" + local_name(argument) if self.variable(argument) else local_name(argument)

@@ -20,6 +20,7 @@ from reasoner.amounts import Amount, Calculation, Expression, Measure, situation
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.problem import Reading
+from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,
     AmountEffect,
@@ -37,7 +38,7 @@ from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 Fault = tuple[str, str, str, str]
 """Node, what, why, remedy."""
 
-BUILT_IN = (OWL, RDF, RDFS, XSD)
+BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"))
 PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
 
 

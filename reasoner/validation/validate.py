@@ -15,6 +15,7 @@ logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothi
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -146,10 +147,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
         yield from (finding for finding in _by_rules(case, places) if finding.rule == "undeclared-term")
         return
     if problem and not any(finding.serious for finding in found):
-        why = "the planner reads the file in the same way"
-        yield Finding(
-            str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", problem, why, "see the message"
-        )
+        yield _unreadable(graph, places, problem)
     if not any(finding.serious for finding in found):
         yield from _measured(graph, places, reading)
     yield from _by_rules(case, places)
@@ -185,13 +183,28 @@ def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) ->
             yield places.finding(rule, name if "://" in name else reading.names.iri(name), what, why, remedy)
 
 
-def _read(graph: KnowledgeGraph) -> tuple[Reading | None, str]:
+def _read(graph: KnowledgeGraph) -> tuple[Reading | None, KnowledgeError | None]:
     try:
-        return read(graph), ""
+        return read(graph), None
     except KnowledgeError as error:
-        return None, str(error)
+        return None, error
     except (KeyError, ValueError) as error:
-        return None, f"{type(error).__name__}: {error}"
+        return None, KnowledgeError(f"{type(error).__name__}: {error}")
+
+
+def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) -> Finding:
+    """Return what the planner says of a file that it can't read, at the node that it names."""
+    why, said = "the planner reads the file in the same way", str(problem)
+    named = [problem.node, *re.findall(r"<([^<>\s]+:[^<>\s]+)>", said)]
+    what, mark, remedy = said.rpartition("; ")
+    for node in filter(None, named):
+        if next(graph.store.quads_for_pattern(ox.NamedNode(node), None, None, None), None) is not None:
+            return places.finding(
+                "unreadable", node, what if mark else said, why, remedy if mark else "see the message"
+            )
+    return Finding(
+        str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", said, why, "see the message"
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------- violations

@@ -1,0 +1,59 @@
+"""Faults in what follows and in amounts, seeded into the theatre of the examples: one line each, with its node, line and mend."""
+
+from pathlib import Path
+
+import pytest
+
+from reasoner.names import local_name
+from reasoner.validation.validate import validate
+from worlds.entailed import implies
+
+THEATRE = Path(__file__).parents[2] / "docs" / "examples" / "theatre"
+CIRCLE = """
+:A a owl:Class, owl:NamedIndividual, c:SituationType . :B a owl:Class, owl:NamedIndividual, c:SituationType .
+:Lamp c:hasSituationType :A, :B .
+:A.rule a owl:NamedIndividual, c:Rule ; c:about :A.lamp ; c:situationType :A ; c:condition :A.not ; rdfs:label "not B"@en .
+:A.lamp a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Lamp .
+:A.not a owl:NamedIndividual, c:ValueCondition ; c:about :A.lamp ; c:situationType :B ; c:negated true ; rdfs:label "not B"@en .
+:B.rule a owl:NamedIndividual, c:Rule ; c:about :B.lamp ; c:situationType :B ; c:condition :B.is ; rdfs:label "A"@en .
+:B.lamp a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Lamp .
+:B.is a owl:NamedIndividual, c:ValueCondition ; c:about :B.lamp ; c:situationType :A ; rdfs:label "A"@en .
+"""
+SWRL = (
+    "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n"
+)
+FREE = SWRL + implies(":Stowed ?prop", ":Cart ?cart").replace("a swrl:Imp", 'a swrl:Imp ; rdfs:label "all stowed"')
+FEE = """
+:FEE a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :fee ; c:unit "EUR" ; c:defaultAmount 1.0 .
+:fee a owl:DatatypeProperty, owl:FunctionalProperty ; rdfs:range xsd:decimal . :Lamp c:hasSituationType :FEE .
+:fee1 a owl:NamedIndividual, c:Calculation ; c:about :Lamp ; c:situationType :FEE .
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file", "node", "what", "remedy"),
+    [
+        ("# What follows.", CIRCLE, "theatre", "A.rule",
+         "A is defined by B not being true, which is defined by A in turn", "take one of these conditions out of its rule"),
+        (":PUSH.cart ; c:situationType :PARKED ; c:value :PUSH.room ; rdfs", ":PUSH.cart ; c:situationType :FULL ; rdfs",
+         "theatre", "PUSH.there", "changes FULL, which is defined by", "change what that reads, or drop the definition"),
+        ("# What follows.", FREE, "theatre", "Stowed",
+         "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
+        ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
+         "SWITCH decreases h and EUR (FEE and HOURS)", "name amounts of one unit"),
+        ("d:hours 0.5", "d:hours -0.5", "first-night", "spot2", "<spot2, HOURS> is -0.5; it has to be at least", "mend the scene"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_told_once_with_line_and_mend(
+    tmp_path: Path, old: str, new: str, file: str, node: str, what: str, remedy: str
+) -> None:
+    for one in THEATRE.glob("*.ttl"):
+        text = one.read_text(encoding="utf-8")
+        more = FEE if "fee1" in new and one.stem == "theatre" else ""
+        (tmp_path / one.name).write_text(text.replace(old, new) + more, encoding="utf-8")
+    found = [f for f in validate([tmp_path / "first-night.ttl"]) if f.serious]
+    said = next(f for f in found if what in f.what)
+    assert (Path(said.file).stem, local_name(said.node)) == (file, node)
+    assert remedy in said.remedy
+    assert f":{node} " in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
+    assert [f for f in found if f.rule == said.rule] == [said]
