@@ -72,7 +72,7 @@ def derived(problem: Problem) -> Iterator[tuple[str, Derived]]:
         for arguments in product(*(problem.classes[kind] for kind in situations[name].arguments))
     ]
     table = Table(problem.domain.situations, problem.initial)
-    Program(problem).bind(table, {})
+    Program(problem).bind(table)
     facts = Facts(problem, problem.initial)
     yield "search", {_row(s) for s in defined if table.now[s.situation].get(key_of(s.arguments)) == TRUE}
     yield "checker", {_row(s) for s in defined if facts.value(s.situation, s.arguments) == TRUE}

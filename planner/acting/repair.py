@@ -225,7 +225,7 @@ def settle(call: Call) -> bool:
         }
         keep = call.segments.keeping({})
         for wanted in ({**targets, **hidden}, targets):
-            steps = call.refiner.achieve(level, wanted, keep, (), RESTING)
+            steps = call.refiner.achieve(level, wanted, keep, RESTING)
             if steps is not None:
                 call.steps.extend(steps)
                 break

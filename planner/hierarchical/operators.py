@@ -95,30 +95,25 @@ class Program:
         self.alike = Alike(problem, self.named)
         self.writer = Writer(problem)
         self.variables = self.writer.variables
-        self.writer.constants |= {"prefer": prefer, "pick": self._picked}
+        self.writer.constants |= {"pick": self._picked}
         self._rules = Rules(self.writer) if self.domain.rules else None
-        self._bind = self.writer.function(self._lines(), "forward, achieve", ", focus, few")
+        self._bind = self.writer.function(self._lines(), "forward, achieve", ", few")
 
-    def bind(self, table: Table, focus: Mapping[str, None], few: int = FEW) -> Bound:
-        """Return the functions over a table; of many that could be enumerated, those in `focus` are preferred.
-
-        Of more than a `few` alike one stands for all.
-        """
+    def bind(self, table: Table, few: int = FEW) -> Bound:
+        """Return the functions over a table; of more than a `few` alike that could be enumerated one stands for all."""
         if self._rules is not None:
             self._rules.define(table)
-        return Bound(*self._bind(table.now, table.who, focus, few))
+        return Bound(*self._bind(table.now, table.who, few))
 
     def _picked(
         self,
         candidates: tuple[str, ...],
-        focus: Mapping[str, None],
         who: Mapping[str, Mapping[Key, None]],
         few: int,
         now: Mapping[str, Mapping[Key, str]],
     ) -> Sequence[str]:
-        found = [term for term in focus if term in candidates] if focus else []
-        if found or len(candidates) <= few:
-            return found or candidates
+        if len(candidates) <= few:
+            return candidates
         return self.alike.unlike(candidates, representatives(self.alike.groups(candidates), who, {}), now)
 
     def size(self, level: int) -> int:
@@ -273,7 +268,7 @@ class Program:
                     constant = self.writer.listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):
                         who = f"{identifier('who', situation)}.get({written(value)}, ())"
-                        found.append((4.0, term, f"prefer({who}, focus)"))
+                        found.append((4.0, term, f"list({who})"))
         for term in free:
             members = self.writer.constant(("members", kinds[term]), self.problem.classes.get(kinds[term], ()))
             found.append((len(self.problem.members(kinds[term])) + 1.0, term, self._pick(members, term, behavior)))
@@ -283,9 +278,9 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an iterable expression for those candidates that are in focus, else free ones of each sort and state."""
+        """Return an iterable expression for the candidates, of many for free ones of each sort and state."""
         taken = next((identifier("who", e.situation) for e in behavior.effects if e.value == term), "{}")
-        return f"pick({candidates}, focus, {taken}, few, now)"
+        return f"pick({candidates}, {taken}, few, now)"
 
     def _static(self, condition: Condition, kinds: Mapping[str, str], behavior: Behavior) -> bool:
         """Whether nothing that this level does can change the truth of a condition."""
@@ -327,15 +322,6 @@ class Program:
                 kind = self.problem.members(condition.kind)
                 found = found - kind if condition.negated else found & kind
         return found
-
-
-def prefer(candidates: Sequence[str] | Mapping[Key, None], focus: Mapping[str, None]) -> Sequence[str]:
-    """Return those of the candidates that are in focus, or all if none is."""
-    if focus:
-        found = [term for term in focus if term in candidates]
-        if found:
-            return found
-    return list(candidates)  # type: ignore[arg-type]
 
 
 def named(problem: Problem) -> list[str]:

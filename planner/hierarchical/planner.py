@@ -24,7 +24,7 @@ from time import perf_counter
 from planner.hierarchical.concerns import concerns, put_aside
 from planner.hierarchical.postoptimization import Improver, length
 from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.subplans import Watch, nobody
 from planner.levels import levels_left
@@ -38,8 +38,6 @@ IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
 DETOURS = 1.25
 """A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
-REORDERING = 1_000_000
-"""The work that each of two other orders may cost, in states of small worlds times operators; or half that of the first plan."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -166,7 +164,7 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
-        other.segments.most_work = max(call.segments.worked / 2, REORDERING)
+        other.segments.most_work = max(call.segments.worked / 2, MUCH)
         advised(other)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):

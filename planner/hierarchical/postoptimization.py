@@ -38,7 +38,7 @@ LARGEST = 7
 OPERATORS = 400
 """The largest world in which steps are planned anew, in operators; in rows of a join on the way to them fifty times as many."""
 STATES = 2_500
-"""So many states are expanded for a cluster or a whole plan, and in all, for each cluster allowed."""
+"""So many states are expanded for each cluster allowed."""
 WHOLE_BITS = 48
 """The largest world that is planned anew as a whole, in bits of a state if every symbol could take every value."""
 
@@ -98,7 +98,6 @@ class Improver:
     def __post_init__(self) -> None:
         self.table = self.refiner.table
         self.segments = self.refiner.segments
-        self.states = min(STATES * self.clusters_left, 40 * STATES)
         self.work = STATES * self.clusters_left
         self.lowest = self.segments.program.levels[-1]
         self.bound: dict[int, Domain] = {}
@@ -148,7 +147,7 @@ class Improver:
         }
         goal = {s: value for s, value in initial.items() if (s.situation, key_of(s.arguments)) not in targets}
         goal |= {Symbol(s, arguments_of(key)): value for (s, key), value in self.segments.goal.items()}
-        shortest = self._shortest(replace(problem, initial=initial, goal=goal), level, self.states, steps)
+        shortest = self._shortest(replace(problem, initial=initial, goal=goal), level, steps)
         if not shortest:
             return None if shortest is None else list(steps)
         found = []
@@ -159,7 +158,7 @@ class Improver:
             found.append(step)
         return found
 
-    def _shortest(self, problem: Problem, level: int, states: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
+    def _shortest(self, problem: Problem, level: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
         from planner.grounded.grounding import ground
         from planner.grounded.shortest import shortest, ways
@@ -173,7 +172,7 @@ class Improver:
             return None
         task = replace(task, costs=[1.0] * len(task))
         upper = length(old, level)
-        found = shortest(task, ways(task), upper, min(states, self.work), self.segments.deadline)
+        found = shortest(task, ways(task), upper, self.work, self.segments.deadline)
         self.work -= found.states
         if found.plan is not None:
             return [task.describe(operator)[:2] for operator in found.plan]
@@ -370,5 +369,5 @@ class Improver:
         few = {m for members in program.problem.classes.values() if len(members) <= FEW for m in members}
         small = problem_of(self.segments, level, {*roles, *few, *program.named})
         goal = {s: targets.get((s.situation, key_of(s.arguments)), value) for s, value in small.initial.items()}
-        steps = self._shortest(replace(small, goal=goal), level, self.states, old)
+        steps = self._shortest(replace(small, goal=goal), level, old)
         return self.refiner.template(steps, roles) if steps else None

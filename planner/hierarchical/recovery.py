@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
-from planner.hierarchical.refinement_cache import WHOLE
+from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, proved
@@ -19,8 +19,6 @@ from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell
 from reasoner.symbols import State
 
-MOST_TOGETHER = 20_000
-"""The largest level, in quantified behaviours, on which all goals are searched at once."""
 ALL = (WHOLE,)
 """All goals at once in the whole world."""
 COSTLY = 4
@@ -189,7 +187,7 @@ class Recovery:
     def together(self, level: int) -> bool:
         """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
         call = self.call
-        if call.program.size(level) > MOST_TOGETHER or self._tried.get(level) == len(call.steps):
+        if call.program.size(level) > MOST_OPERATORS or self._tried.get(level) == len(call.steps):
             return False
         self._tried[level] = len(call.steps)
         return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, ALL)

@@ -186,8 +186,8 @@ class Refiner:
         mark = len(self.table.trail)
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
-            found = self.achieve(below, targets, keep, individuals, SHORT)
-            found = found or self.achieve(below, targets, keep, individuals, widths)
+            found = self.achieve(below, targets, keep, SHORT)
+            found = found or self.achieve(below, targets, keep, widths)
             if found and self.advice is not None:
                 self.advice.learn(below, mark, targets, keep, found)
         if found is None:
@@ -209,7 +209,6 @@ class Refiner:
         level: int,
         targets: Mapping[Cell, str],
         keep: Keep,
-        individuals: Sequence[str],
         effort: Effort | Sequence[Width],
     ) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any.
@@ -217,7 +216,7 @@ class Refiner:
         A step that can't be refined is forbidden where it stands, and the steps are searched again.
         """
         if isinstance(effort, Effort):
-            return self._by_relevance(level, targets, keep, individuals, effort)
+            return self._by_relevance(level, targets, keep, effort)
         insides = [focus(self.segments, level, targets, width) for width in effort]
         for width, inside, following in zip(effort, insides, [*insides[1:], set()], strict=True):
             if inside != following:  # else the next search sees the same world, and longer
@@ -227,21 +226,13 @@ class Refiner:
         return None
 
     def _by_relevance(
-        self, level: int, targets: Mapping[Cell, str], keep: Keep, individuals: Sequence[str], effort: Effort
+        self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort
     ) -> list[RefinedStep] | None:
         segments, table = self.segments, self.table
         forbidden: set[Forbidden] = set()
-        outer = dict(segments.focus)
         mark = len(table.trail)
         for _ in range(ATTEMPTS):
-            segments.focus.clear()
-            segments.focus.update(dict.fromkeys(individuals))
             found = segments.find(level, targets, keep, effort, forbidden)
-            if found is None and individuals and not forbidden:
-                segments.focus.clear()
-                found = segments.find(level, targets, keep, effort, forbidden)
-            segments.focus.clear()
-            segments.focus.update(outer)
             if found is None:
                 return None
             steps: list[RefinedStep] = []

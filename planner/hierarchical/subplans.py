@@ -85,8 +85,7 @@ class Segments:
         self.expanded = self.worked = 0
         self.tidy: frozenset[Cell] = frozenset()
         """What refinements leave as it was, though it might be anything in the end."""
-        self.focus: dict[str, None] = {}
-        bound = self.program.bind(self.table, self.focus)
+        bound = self.program.bind(self.table)
         self.forward, self.achieve = bound.forward, bound.achieve
         self.wants = Wants(self.program, self.table, self.goal)
         self.counts = {level: Counts() for level in self.program.levels}

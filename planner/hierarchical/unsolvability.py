@@ -62,7 +62,7 @@ def unattainable(segments: Segments) -> Reason | None:
     program = segments.program
     level = program.levels[-1]
     asked: Asked = {}
-    achieve = program.bind(segments.table, {}, few=sys.maxsize).achieve
+    achieve = program.bind(segments.table, few=sys.maxsize).achieve
     for cell, value in segments.goal.items():
         if not _attainable(segments, achieve, level, cell, value, asked):
             return _reason(segments, achieve, level, cell, value, asked)

@@ -62,7 +62,7 @@ def walk(problem: Problem, rng: Random, steps: int) -> Iterator[State]:
 def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
     problem = language(seed, defined=True)
     table = Table(problem.domain.situations, problem.initial)
-    Program(problem).bind(table, {})
+    Program(problem).bind(table)
     task = ground(replace(problem, goal={}))
     assert isinstance(task, Task)
     state, checked = task.initial, Facts(problem, problem.initial)
@@ -155,7 +155,7 @@ def test_a_chain_of_a_thousand_is_followed_to_its_end_by_all() -> None:
     domain = Domain(situations, {"OPEN": opened}, rules={"INSIDE": rules})
     problem = Problem("boxes", domain, {"Box": boxes, "IN": boxes}, {}, initial, {})
     table = Table(situations, initial)
-    Program(problem).bind(table, {})
+    Program(problem).bind(table)
     facts_ = Facts(problem, initial)
     for pair_, held in (((boxes[0], boxes[-1]), TRUE), ((boxes[-1], boxes[0]), FALSE)):
         assert table.now["INSIDE"].get(pair_) == held

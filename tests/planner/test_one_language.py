@@ -70,7 +70,7 @@ def by_operators(problem: Problem) -> After:
     for behavior in problem.domain.behaviors.values():
         for arguments in product(*(problem.classes[p.kind] for p in behavior.parameters)):
             table = Table(problem.domain.situations, problem.initial)
-            done = program.bind(table, {}).forward[behavior.name](*arguments)
+            done = program.bind(table).forward[behavior.name](*arguments)
             if done is not None:
                 for change in done[1]:
                     table.put(*change)
