@@ -25,17 +25,31 @@ inequalities.
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, reduce
-from itertools import combinations, product
+from itertools import product
 from math import prod
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
 from reasoner.derivation import circles
-from reasoner.pddl.syntax import CHANGES, COMPARISONS, Action, Form, Pddl, PddlError, Typed, Word, either, is_number
+from reasoner.pddl.forms import (
+    Atom,
+    Effect,
+    NumericEffect,
+    atoms_in,
+    conjuncts,
+    effects_of,
+    functions_read,
+    numeric_of,
+    typed_in,
+    words_in,
+    words_of,
+)
+from reasoner.pddl.invariants import Invariants, Part
+from reasoner.pddl.syntax import COMPARISONS, Form, Pddl, PddlError, Typed, Word, is_number
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -61,45 +75,10 @@ from reasoner.symbols import (
 THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
 REACH_GOAL = "reach-goal"
-COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
-"""For a predicate's number of arguments, which one may be the object and which one the value."""
 MOST_COSTS = 200  # of one action; with more it has their mean
 WORLD, THE_WORLD = "World", "the_world"
 """The class, and its only individual, that a predicate without arguments is about."""
 BASE = "https://w3id.org/confab/pddl/"
-
-Atom = tuple[str, ...]
-"""A predicate and its terms."""
-
-
-@dataclass(frozen=True)
-class Effect:
-    """An atom made true or false, where its condition holds."""
-
-    atom: Atom
-    true: bool
-    when: tuple[Form, ...] = ()
-    variables: tuple[Typed, ...] = ()
-
-
-@dataclass(frozen=True)
-class NumericEffect:
-    """A function changed as `head` (of `CHANGES`) says, where its condition holds."""
-
-    head: str
-    function: Form
-    amount: Word | Form
-    when: tuple[Form, ...] = ()
-    variables: tuple[Typed, ...] = ()
-
-
-@dataclass(frozen=True)
-class Part:
-    """A predicate in an invariant: which of its arguments is the object, and which one counts (none: a value by itself)."""
-
-    predicate: str
-    key: int
-    counted: int | None
 
 
 @dataclass(frozen=True)
@@ -156,11 +135,11 @@ class _Import:
     variables: dict[str, str] = field(default_factory=dict)  # ours to PDDL's
 
     def __post_init__(self) -> None:
-        self.effects = {name: tuple(_effects(action.effect)) for name, action in self.pddl.actions.items()}
-        self.numeric = {name: tuple(_numeric(action.effect)) for name, action in self.pddl.actions.items()}
+        self.effects = {name: tuple(effects_of(action.effect)) for name, action in self.pddl.actions.items()}
+        self.numeric = {name: tuple(numeric_of(action.effect)) for name, action in self.pddl.actions.items()}
         forms = [f for a in self.pddl.actions.values() for f in (a.precondition, a.effect)]
         forms += [axiom.condition for axiom in self.pddl.axioms]
-        read = {word for form in (*forms, self.pddl.goal) for word in _functions_read(form)}
+        read = {word for form in (*forms, self.pddl.goal) for word in functions_read(form)}
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
         self.weights = self.costing(changed)
         self.amounts = changed & (read | (changed - self.weights.keys()))
@@ -170,7 +149,7 @@ class _Import:
         whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
         whens += [f for effects in self.effects.values() for e in effects for f in e.when]
         asked = [self.pddl.goal, *conditions, *whens, *(a for a in counted if isinstance(a, Form))]
-        heads = {form.head for form in asked if form} | {word for form in asked for word in _functions_read(form)}
+        heads = {form.head for form in asked if form} | {word for form in asked for word in functions_read(form)}
         self.measures = (heads & self.pddl.functions.keys()) - self.amounts
         self.derived = {axiom.predicate for axiom in self.pddl.axioms}
         self.changing = {effect.atom[0] for effects in self.effects.values() for effect in effects} | self.derived
@@ -238,7 +217,7 @@ class _Import:
         goal, reach = self.goal(situations)
         if reach:
             behaviors[reach.name] = reach
-        elif not list(_conjuncts(self.pddl.goal)):
+        elif not list(conjuncts(self.pddl.goal)):
             initial |= goal
         rules = self.rules()
         if any(s.arguments == (WORLD,) for s in situations.values()):
@@ -259,7 +238,7 @@ class _Import:
         for axiom in self.pddl.axioms:
             name, variables = self.places[axiom.predicate].situation, _Variables(self)
             parameters = [Parameter(self.term(p.name), self.kind(p.type)) for p in axiom.parameters]
-            conditions = tuple(c for form in _conjuncts(axiom.condition) for c in variables.condition(form))
+            conditions = tuple(c for form in conjuncts(axiom.condition) for c in variables.condition(form))
             head = tuple(parameters) or (Parameter("?the_world", WORLD),)
             found[name] = (*found.get(name, ()), Rule(name, head, (), tuple(dict.fromkeys(conditions))))
         for one, other in circles(found):
@@ -275,7 +254,8 @@ class _Import:
     ) -> dict[str, SituationType]:
         """Return the situation types, invariants first, and say in `places` where each predicate went."""
         found: dict[str, SituationType] = {}
-        for parts in self.invariants():
+        candidates = frozenset(self.changing - self.derived)
+        for parts in Invariants(self.pddl, self.effects, candidates, frozenset(self.changing), self.sets).found():
             name = self.name("situation", "+".join(p.predicate for p in parts), parts[0].predicate.upper())
             own = []
             for part in parts:
@@ -338,7 +318,7 @@ class _Import:
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
         """Return the goal, and the behaviour that reaches it if it isn't a conjunction of facts: none if it is empty."""
         found: dict[Symbol, str] = {}
-        parts = list(_conjuncts(self.pddl.goal))
+        parts = list(conjuncts(self.pddl.goal))
         plain = all(self.plain(part, situations, found) for part in parts)
         if parts and plain:
             return found, None
@@ -361,7 +341,7 @@ class _Import:
             function, limit = part.items[1:]
             if not isinstance(function, Form) or function.head not in self.amounts or not isinstance(limit, Word):
                 return False
-            terms = tuple(self.term(w) for w in _words(function)[1:]) or (THE_WORLD,)
+            terms = tuple(self.term(w) for w in words_of(function)[1:]) or (THE_WORLD,)
             symbol = Symbol(self.name("situation", f"({function.head})"), terms)
             wanted = f"{part.head}{limit.text}"
             found[symbol] = bounds_written(f"{found[symbol]},{wanted}" if symbol in found else wanted)
@@ -369,79 +349,11 @@ class _Import:
         inner = part.items[1] if part.head == "not" else part
         if not isinstance(inner, Form) or inner.head not in self.places:
             return False
-        condition = self.atom(_words(inner))
+        condition = self.atom(words_of(inner))
         if part.head == "not" and not situations[condition.situation].boolean:
             return False
         value = FALSE if part.head == "not" else condition.value
         return found.setdefault(Symbol(condition.situation, condition.arguments), value) == value
-
-    # --------------------------------------------------------------------------------------------- invariants
-
-    def invariants(self) -> list[tuple[Part, ...]]:
-        """Return disjoint invariants: tuples of parts, of which at most one fact holds for an object."""
-        candidates: list[tuple[Part, ...]] = [
-            (Part(predicate, key, counted),)
-            for predicate, signature in self.pddl.predicates.items()
-            if predicate in self.changing - self.derived
-            for key, counted in COUNTED.get(len(signature), ())
-        ]
-        proved: list[tuple[Part, ...]] = []
-        seen = set(candidates)
-        while candidates:
-            parts = candidates.pop(0)
-            extra = self.unbalanced(parts)
-            if extra is None:
-                proved.append(parts)
-            for part in extra or ():
-                larger = tuple(sorted((*parts, part), key=lambda p: p.predicate))
-                if larger not in seen and len(seen) < 300 and len({p.predicate for p in larger}) == len(larger):
-                    seen.add(larger)
-                    candidates.append(larger)
-        proved = [parts for parts in proved if self.at_most_one(parts) and any(p.counted is not None for p in parts)]
-        proved = [parts for parts in proved if self.distinguishable(parts)]
-        proved.sort(key=lambda parts: (-len(parts), sum(p.key for p in parts), [p.predicate for p in parts]))
-        used: set[str] = set()
-        found = []
-        for parts in proved:
-            if not used & {p.predicate for p in parts}:
-                used |= {p.predicate for p in parts}
-                order = {predicate: i for i, predicate in enumerate(self.pddl.predicates)}
-                found.append(tuple(sorted(parts, key=lambda p: (p.counted is None, order[p.predicate]))))
-        return found
-
-    def at_most_one(self, parts: Sequence[Part]) -> bool:
-        """Return whether initially at most one fact of the parts holds of each object."""
-        of = {part.predicate: part for part in parts}
-        count = Counter(fact[1 + of[fact[0]].key] for fact in self.facts if fact[0] in of)
-        return all(number == 1 for number in count.values())
-
-    def distinguishable(self, parts: Sequence[Part]) -> bool:
-        """Return whether object and value together tell which predicate they belong to, wherever one is mentioned."""
-        counted = [p for p in parts if p.counted is not None]
-        of = {p.predicate: p for p in counted}
-        for predicate, domains in self.mentioned:
-            for other in counted:
-                if predicate in of and other.predicate != predicate:
-                    part = of[predicate]
-                    keys = domains[part.key] & self.possible[other.predicate][other.key]
-                    values = domains[part.counted or 0] & self.possible[other.predicate][other.counted or 0]
-                    if keys and values:
-                        return False
-        return True
-
-    @cached_property
-    def possible(self) -> dict[str, list[frozenset[str]]]:
-        """For each argument of a predicate, the objects with which it may ever hold."""
-        found = {name: [set[str]() for _ in signature] for name, signature in self.pddl.predicates.items()}
-        for fact in self.facts:
-            for position, thing in enumerate(fact[1:]):
-                found[fact[0]][position].add(thing)
-        for name, action in self.pddl.actions.items():
-            for effect in self.effects[name]:
-                own = {v.name: self.sets[v.type] for v in effect.variables}
-                for position, term in enumerate(effect.atom[1:]):
-                    found[effect.atom[0]][position] |= own.get(term) or self.domain_of(action, term)
-        return {name: [frozenset(things) for things in positions] for name, positions in found.items()}
 
     @cached_property
     def signatures(self) -> dict[str, list[str]]:
@@ -452,103 +364,12 @@ class _Import:
         for parameters, forms in parts:
             types = {p.name: p.type for p in parameters}
             for form in forms:
-                for atom, own in self.atoms_in(form, types) if form else ():
+                for atom, own in atoms_in(form, self.pddl.predicates, types) if form else ():
                     kinds = found[atom[0]]
                     for position, term in enumerate(atom[1:]):
                         if term in own:
                             kinds[position] = self.common([kinds[position], own[term]])
         return found
-
-    @cached_property
-    def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
-        """Every atom in a condition, an effect or the goal: its predicate, and the objects each term may stand for."""
-        found = []
-        for _name, action in self.pddl.actions.items():
-            forms = [form for form in (action.precondition, action.effect) if form]
-            for atom, own in [pair for form in forms for pair in self.atoms_in(form, {})]:
-                found.append(
-                    (atom[0], [self.sets[own[t]] if t in own else self.domain_of(action, t) for t in atom[1:]])
-                )
-        others = [(axiom.condition, {p.name: p.type for p in axiom.parameters}) for axiom in self.pddl.axioms]
-        for form, types in [*others, *([(self.pddl.goal, dict[str, str]())] if self.pddl.goal else [])]:
-            for atom, own in self.atoms_in(form, types):
-                found.append((atom[0], [self.sets[own[t]] if t in own else frozenset({t}) for t in atom[1:]]))
-        return found
-
-    def atoms_in(self, form: Form, own: dict[str, str]) -> list[tuple[Atom, dict[str, str]]]:
-        """Return the atoms of a formula, each with the types of the quantified variables around it."""
-        if form.head in ("exists", "forall"):
-            own = own | {t.name: t.type for t in _typed(form.items[1])}  # type: ignore[arg-type]
-        elif form.head in self.pddl.predicates:
-            return [(_words(form), own)]
-        return [found for item in form.items[1:] if isinstance(item, Form) for found in self.atoms_in(item, own)]
-
-    def domain_of(self, action: Action, term: str) -> frozenset[str]:
-        """Return the objects that a term of an action may stand for, by its type and static predicates of one argument."""
-        if not term.startswith("?"):
-            return frozenset({term})
-        kind = next((p.type for p in action.parameters if p.name == term), "object")
-        domain = self.sets[kind]
-        for form in _conjuncts(action.precondition):
-            words = _words(form) if form.head in self.pddl.predicates else ()
-            if len(words) == 2 and words[1] == term and words[0] not in self.changing:
-                domain &= {fact[1] for fact in self.facts if fact[0] == words[0]}
-        return domain
-
-    def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action keeps "at most one", else parts that might mend it (none: nothing can)."""
-        of = {part.predicate: part for part in parts}
-        for name, action in self.pddl.actions.items():
-            effects = self.effects[name]
-            adds = [e for e in effects if e.true and e.atom[0] in of]
-            needed = {_words(form) for form in _conjuncts(action.precondition) if form.head not in ("not", "or", "=")}
-            for one, other in combinations(adds, 2):
-                same_key = self.may_be_one(
-                    action, one.atom[1 + of[one.atom[0]].key], other.atom[1 + of[other.atom[0]].key]
-                )
-                if one.atom != other.atom and same_key:
-                    return []
-            spent: set[Atom] = set()
-            for add in adds:
-                key = add.atom[1 + of[add.atom[0]].key]
-                if add.variables and not {t for t in add.atom if t in [v.name for v in add.variables]} <= {key}:
-                    return []
-                held = needed | {_words(f) for form in add.when for f in _conjuncts(form)}
-                if add.atom in held:
-                    continue
-                deleted = [
-                    e.atom
-                    for e in effects
-                    if not e.true
-                    and e.atom in held
-                    and e.atom not in spent
-                    and e.atom != add.atom
-                    and (not e.when or e.when == add.when)
-                    and e.variables in ((), add.variables)
-                ]
-                match = next((a for a in deleted if a[0] in of and a[1 + of[a[0]].key] == key), None)
-                if match:
-                    spent.add(match)
-                    continue
-                return [
-                    Part(atom[0], position, counted)
-                    for atom in deleted
-                    if atom[0] not in of and len(atom) <= 3
-                    for position, term in enumerate(atom[1:])
-                    if term == key
-                    for counted in ([None] if len(atom) == 2 else [1 - position])
-                ]
-        return None
-
-    def may_be_one(self, action: Action, one: str, other: str) -> bool:
-        """Return whether two terms of an action may stand for the same object."""
-        if one == other:
-            return True
-        for form in _conjuncts(action.precondition):
-            inner = form.items[1] if form.head == "not" else form
-            if form is not inner and isinstance(inner, Form) and {*_words(inner)} == {"=", one, other}:
-                return False
-        return bool(self.domain_of(action, one) & self.domain_of(action, other))
 
     # ---------------------------------------------------------------------------------------------- behaviours
 
@@ -564,11 +385,11 @@ class _Import:
         """Yield the behaviour of an action: one, or one per cost."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
-        conditions = tuple(c for form in _conjuncts(action.precondition) for c in variables.condition(form))
+        conditions = tuple(c for form in conjuncts(action.precondition) for c in variables.condition(form))
         conditions = tuple(dict.fromkeys(conditions))
         effects = self.value_effects(name, variables, conditions)
         amounts = self.amount_effects(name, variables)
-        used = {word for atom in _words_in(action.precondition, action.effect) for word in atom}
+        used = {word for atom in words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
         named = self.name("action", name, name.upper())
@@ -582,7 +403,7 @@ class _Import:
                 number = Fraction(effect.amount.text) * self.weights[effect.function.head]
                 constant += float(number if effect.head == "increase" else -number)
             elif effect.amount.head in self.pddl.functions and effect.amount.head not in self.amounts:
-                functions.append(_words(effect.amount))
+                functions.append(words_of(effect.amount))
             elif effect.function.head == "total-cost":
                 raise PddlError(f"action '{name}': a cost that is calculated is not supported")
         constant = max(constant, 0.0)
@@ -634,7 +455,7 @@ class _Import:
             if len(parts) == 1:
                 parts.insert(0, Fraction(0))
             return reduce(lambda left, right: Calculation(item.head, left, right), parts)
-        terms = tuple(named.get(t, t) for t in map(self.term, _words(item)[1:]))
+        terms = tuple(named.get(t, t) for t in map(self.term, words_of(item)[1:]))
         if item.head in self.amounts:
             return Amount(self.name("situation", f"({item.head})"), terms or (THE_WORLD,))
         return Measure(self.name("static", f"({item.head})"), terms)
@@ -652,7 +473,7 @@ class _Import:
                 )
             for named in self.instances(effect):
                 when = tuple(
-                    c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, named)
+                    c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
                 )
                 at, by = self.number(effect.function, named), self.number(effect.amount, named)
                 assert isinstance(at, Amount)
@@ -676,7 +497,7 @@ class _Import:
         effects = self.effects[name]
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
             when = tuple(
-                c for form in effect.when for part in _conjuncts(form) for c in variables.condition(part, named)
+                c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
             )
             at = self.atom(effect.atom)
             put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
@@ -742,11 +563,11 @@ class _Variables:
             groups = [tuple(self.condition(part, named, head == "imply" and i == 0)) for i, part in enumerate(rest)]
             yield AnyOf(tuple(groups), negated)
         elif head in ("exists", "forall"):
-            typed = _typed(form.items[1])  # type: ignore[arg-type]
+            typed = typed_in(form.items[1])  # type: ignore[arg-type]
             inner = dict(named) | self.renamed(typed)
             flip = head == "forall"
-            parts = [rest[1]] if flip else list(_conjuncts(rest[1]))
-            pieces = [({w for ws in _words_in(p) for w in ws}, tuple(self.condition(p, inner, flip))) for p in parts]
+            parts = [rest[1]] if flip else list(conjuncts(rest[1]))
+            pieces = [({w for ws in words_in(p) for w in ws}, tuple(self.condition(p, inner, flip))) for p in parts]
             found = self.nested(pieces, {t.name: t for t in typed}, inner)
             if negated is flip:
                 yield from found
@@ -758,7 +579,7 @@ class _Variables:
             left, right = (self.table.number(item, named) for item in form.items[1:])
             yield Comparison(left, head, right, negated)
         else:
-            yield from self.literal(_words(form), named, negated)
+            yield from self.literal(words_of(form), named, negated)
 
     def nested(
         self, pieces: list[tuple[set[str], tuple[Condition, ...]]], typed: dict[str, Typed], named: Mapping[str, str]
@@ -793,92 +614,6 @@ class _Variables:
         else:
             relation = table.names["static", atom[0]]
             yield RelationCondition(relation, put([table.term(t) for t in atom[1:]]), negated)
-
-
-def _typed(form: Form) -> list[Typed]:
-    """Return the variables of a quantifier, which have been checked before."""
-    found: list[Typed] = []
-    waiting: list[Word] = []
-    items = iter(form.items)
-    for item in items:
-        assert isinstance(item, Word)
-        if item.text == "-":
-            kind = next(items)
-            found += [
-                Typed(w.text, kind.text if isinstance(kind, Word) else either(_words(kind)[1:]), w) for w in waiting
-            ]
-            waiting = []
-        else:
-            waiting.append(item)
-    return [*found, *(Typed(w.text, "object", w) for w in waiting)]
-
-
-def _words(form: Form) -> Atom:
-    return tuple(item.text for item in form.items if isinstance(item, Word))
-
-
-def _words_in(*forms: Form | None) -> Iterator[Atom]:
-    """Yield the words of all lists in some forms."""
-    for form in forms:
-        if form is not None:
-            yield _words(form)
-            yield from _words_in(*(item for item in form.items if isinstance(item, Form)))
-
-
-def _conjuncts(form: Form | None) -> Iterator[Form]:
-    if form is None:
-        return
-    if form.head == "and":
-        for item in form.items[1:]:
-            assert isinstance(item, Form)
-            yield from _conjuncts(item)
-    elif form.items:
-        yield form
-
-
-def _effects(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Effect]:
-    if form is None or not form.items:
-        return
-    rest = [item for item in form.items[1:] if isinstance(item, Form)]
-    if form.head == "and":
-        for item in rest:
-            yield from _effects(item, when, variables)
-    elif form.head == "when":
-        yield from _effects(rest[1], (*when, rest[0]), variables)
-    elif form.head == "forall":
-        yield from _effects(rest[1], when, (*variables, *_typed(rest[0])))
-    elif form.head == "not":
-        yield Effect(_words(rest[0]), False, when, variables)
-    elif form.head not in CHANGES:
-        yield Effect(_words(form), True, when, variables)
-
-
-def _numeric(
-    form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()
-) -> Iterator[NumericEffect]:
-    """Yield the effects on functions."""
-    rest = [] if form is None else [item for item in form.items[1:] if isinstance(item, Form)]
-    if form is None or form.head in ("", "not"):
-        return
-    if form.head == "and":
-        for item in rest:
-            yield from _numeric(item, when, variables)
-    elif form.head == "when":
-        yield from _numeric(rest[1], (*when, rest[0]), variables)
-    elif form.head == "forall":
-        yield from _numeric(rest[1], when, (*variables, *_typed(rest[0])))
-    elif form.head in CHANGES:
-        yield NumericEffect(form.head, rest[0], form.items[2], when, variables)
-
-
-def _functions_read(form: Form | None) -> Iterator[str]:
-    """Yield the heads of all lists in a form, but for the functions that an effect changes."""
-    if form is None:
-        return
-    for item in form.items[2 if form.head in CHANGES else 0 :]:
-        if isinstance(item, Form):
-            yield item.head
-            yield from _functions_read(item)
 
 
 def _slug(text: str) -> str:

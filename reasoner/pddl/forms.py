@@ -1,0 +1,130 @@
+"""Conditions and effects of PDDL as lists of words: what is in them, flat."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+from reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
+
+Atom = tuple[str, ...]
+"""A predicate and its terms."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An atom made true or false, where its condition holds."""
+
+    atom: Atom
+    true: bool
+    when: tuple[Form, ...] = ()
+    variables: tuple[Typed, ...] = ()
+
+
+@dataclass(frozen=True)
+class NumericEffect:
+    """A function changed as `head` (of `CHANGES`) says, where its condition holds."""
+
+    head: str
+    function: Form
+    amount: Word | Form
+    when: tuple[Form, ...] = ()
+    variables: tuple[Typed, ...] = ()
+
+
+def typed_in(form: Form) -> list[Typed]:
+    """Return the variables of a quantifier, which have been checked before."""
+    found: list[Typed] = []
+    waiting: list[Word] = []
+    items = iter(form.items)
+    for item in items:
+        assert isinstance(item, Word)
+        if item.text == "-":
+            kind = next(items)
+            found += [
+                Typed(w.text, kind.text if isinstance(kind, Word) else either(words_of(kind)[1:]), w) for w in waiting
+            ]
+            waiting = []
+        else:
+            waiting.append(item)
+    return [*found, *(Typed(w.text, "object", w) for w in waiting)]
+
+
+def words_of(form: Form) -> Atom:
+    """Return the words of a list, without the lists inside it."""
+    return tuple(item.text for item in form.items if isinstance(item, Word))
+
+
+def words_in(*forms: Form | None) -> Iterator[Atom]:
+    """Yield the words of all lists in some forms."""
+    for form in forms:
+        if form is not None:
+            yield words_of(form)
+            yield from words_in(*(item for item in form.items if isinstance(item, Form)))
+
+
+def conjuncts(form: Form | None) -> Iterator[Form]:
+    """Yield what a conjunction consists of."""
+    if form is None:
+        return
+    if form.head == "and":
+        for item in form.items[1:]:
+            assert isinstance(item, Form)
+            yield from conjuncts(item)
+    elif form.items:
+        yield form
+
+
+def effects_of(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Effect]:
+    """Yield the effects that make atoms true or false."""
+    if form is None or not form.items:
+        return
+    rest = [item for item in form.items[1:] if isinstance(item, Form)]
+    if form.head == "and":
+        for item in rest:
+            yield from effects_of(item, when, variables)
+    elif form.head == "when":
+        yield from effects_of(rest[1], (*when, rest[0]), variables)
+    elif form.head == "forall":
+        yield from effects_of(rest[1], when, (*variables, *typed_in(rest[0])))
+    elif form.head == "not":
+        yield Effect(words_of(rest[0]), False, when, variables)
+    elif form.head not in CHANGES:
+        yield Effect(words_of(form), True, when, variables)
+
+
+def numeric_of(
+    form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()
+) -> Iterator[NumericEffect]:
+    """Yield the effects on functions."""
+    rest = [] if form is None else [item for item in form.items[1:] if isinstance(item, Form)]
+    if form is None or form.head in ("", "not"):
+        return
+    if form.head == "and":
+        for item in rest:
+            yield from numeric_of(item, when, variables)
+    elif form.head == "when":
+        yield from numeric_of(rest[1], (*when, rest[0]), variables)
+    elif form.head == "forall":
+        yield from numeric_of(rest[1], when, (*variables, *typed_in(rest[0])))
+    elif form.head in CHANGES:
+        yield NumericEffect(form.head, rest[0], form.items[2], when, variables)
+
+
+def functions_read(form: Form | None) -> Iterator[str]:
+    """Yield the heads of all lists in a form, but for the functions that an effect changes."""
+    if form is None:
+        return
+    for item in form.items[2 if form.head in CHANGES else 0 :]:
+        if isinstance(item, Form):
+            yield item.head
+            yield from functions_read(item)
+
+
+def atoms_in(form: Form, predicates: Collection[str], own: dict[str, str]) -> list[tuple[Atom, dict[str, str]]]:
+    """Return the atoms of a formula, each with the types of the quantified variables around it."""
+    if form.head in ("exists", "forall"):
+        own = own | {t.name: t.type for t in typed_in(form.items[1])}  # type: ignore[arg-type]
+    elif form.head in predicates:
+        return [(words_of(form), own)]
+    return [found for item in form.items[1:] if isinstance(item, Form) for found in atoms_in(item, predicates, own)]
