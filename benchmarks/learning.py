@@ -1,0 +1,113 @@
+"""Problems to learn from and problems to test on, as the learning track of the IPC has them: with memory, without, and lama-first.
+
+    python -m benchmarks learning                      domains in ../shared/pddl
+    CONFAB_PDDL=FOLDER python -m benchmarks learning   any folder of that form: ``…/domain.pddl``, ``training…``, ``testing…``
+    CONFAB_ALL=1 …                                     every problem to test on, not only four per folder
+
+The problems to learn from are taken in their order until a minute of CPU is over; what was learned is one file, which each call
+reads. A call has 30 s of CPU and 4 GB, from the start of its process on. Each plan is checked.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+
+from benchmarks.pddl import ROOT, SECONDS, Run, kept, peers, planners, problems, run
+
+TEACHING = 60.0
+SERIES = "without memory", "with memory", "lama-first"
+
+
+def main() -> None:
+    """Print the table."""
+    folder = Path(os.environ.get("CONFAB_PDDL", ROOT.parent / "shared" / "pddl"))
+    lama = planners(peers())["lama-first"]
+    print(
+        "Solved of so many, CPU seconds over what was solved, steps over those of lama-first where both solve; rules, and the"
+    )
+    print("CPU seconds of learning them.\n")
+    print(f"| problems | {' | '.join(SERIES)} | rules |\n|---|---|---|---|---|", flush=True)
+    for domain, training, places in domains(folder):
+        with tempfile.TemporaryDirectory() as made:
+            memory = Path(made) / "memory.ttl"
+            learned = teach(domain, training, memory)
+            ours = [sys.executable, "-m", "benchmarks.learning", "{domain}", "{problem}", "{plan}"]
+            for place, tests in places.items():
+                runs: dict[str, list[Run]] = {name: [] for name in SERIES}
+                for problem in tests:
+                    runs[SERIES[0]].append(run(ours, domain, problem))
+                    runs[SERIES[1]].append(run([*ours, str(memory)], domain, problem))
+                    runs[SERIES[2]].append(kept("lama-first", lama, domain, problem))
+                said = [_said(runs[name], runs[SERIES[2]]) for name in SERIES]
+                print(f"| {place}: {len(tests)} | {' | '.join(said)} | {learned} |", flush=True)
+
+
+def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Path]]]]:
+    """Yield each domain with what there is to learn from, and what to test on by folder."""
+    places: dict[Path, dict[str, list[Path]]] = {}
+    for place, domain, problem in problems(folder):
+        if place.rpartition("/")[2].startswith("testing"):
+            places.setdefault(domain, {}).setdefault(place, []).append(problem)
+    for domain, tests in places.items():
+        training = [file for p in sorted(domain.parent.glob("training*")) for file in sorted(p.glob("*.pddl"))]
+        if training:
+            yield domain, training, tests
+
+
+def teach(domain: Path, training: list[Path], target: Path) -> str:
+    """Learn from problems as long as there is time, write what was learned, and say how much."""
+    from planner.experience.lessons import rules_in
+    from planner.experience.lessons import teach as learn
+    from reasoner.memory.experience import Experience
+    from reasoner.memory.experience_file import save
+    from reasoner.names import Names
+    from reasoner.pddl.importing import imported
+    from reasoner.pddl.syntax import parse_files
+
+    experience, begin = Experience("lesson"), process_time()
+    for file in training:
+        if process_time() < begin + TEACHING:
+            learn(experience, imported(parse_files(domain, file)).problem)
+    save(target, experience, Names(()), "https://example.org/pddl")
+    return f"{len(rules_in(experience))} in {process_time() - begin:.0f} s"
+
+
+def _said(runs: list[Run], lama: list[Run]) -> str:
+    """Return how many were solved, in what time, and how long their plans are beside lama-first's."""
+    solved = [done for done in runs if done.plan is not None]
+    both = [(len(a.plan), len(b.plan)) for a, b in zip(runs, lama, strict=True) if a.plan and b.plan]
+    length = f", × {sum(a for a, _ in both) / sum(b for _, b in both):.2f}" if both and runs is not lama else ""
+    return f"{len(solved)} ({sum(done.seconds for done in solved):.0f} s{length})"
+
+
+def solve(domain: str, problem: str, target: str, memory: str | None = None) -> None:
+    """Solve one problem, and write its plan (what a benchmarked process does)."""
+    from planner.experience.advice import Memory, plan
+    from planner.plan import Limits
+    from planner.validation import validate
+    from reasoner.memory.experience_file import load
+    from reasoner.names import Names
+    from reasoner.pddl.importing import imported
+    from reasoner.pddl.syntax import parse_files
+
+    scene = imported(parse_files(Path(domain), Path(problem)))
+    known = None if memory is None else Memory(load(Path(memory), Names(())))
+    left = SECONDS - 1 - process_time()
+    outcome = plan(scene.problem, known, limits=Limits(expansions=10**9, seconds=left))
+    print(outcome.status, outcome.search)
+    if outcome.plan is not None:
+        if validate(scene.problem, outcome.plan):
+            raise AssertionError("no plan was returned as one")
+        lines = (scene.line(step.behavior, step.arguments) for step in outcome.plan.steps)
+        part = Path(f"{target}.part")
+        part.write_text("".join(f"({line})\n" for line in lines if line))
+        part.replace(target)
+
+
+if __name__ == "__main__":
+    solve(*sys.argv[1:])
