@@ -48,8 +48,11 @@ class Labels:
             return f"{self.words[situation]} of {of} is {self.name(fact.value)}"
         verb = self.verbs.get(situation, situation)
         value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
+        verb = _chosen(verb, self.name(fact.value)) if not rest and value else verb
+        if verb.endswith(f" {self.name(fact.value)}"):
+            value = []
         words = [*([self.name(about)] if about else []), verb, *map(self.name, (*rest, *value))]
-        return ("not: " if boolean and fact.value == FALSE else "") + _joined(words)
+        return denied(_joined(words)) if boolean and fact.value == FALSE else _joined(words)
 
     def about(self, symbol: Symbol) -> str:
         """Return the beginning of a sentence that a value of a symbol ends: "cup 1 is at"."""
@@ -102,6 +105,33 @@ def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | N
     else:
         pattern = re.compile(rf"\b()(?:the |an? )?{re.escape(name)}\b", re.IGNORECASE)
     return pattern if pattern.search(label) else None
+
+
+def _chosen(verb: str, value: str) -> str:
+    """Return a property's label that names the values with the one that there is.
+
+    >>> _chosen("is tied up or loose", "loose"), _chosen("is clean or dirty", "clean"), _chosen("is at", "cup 1")
+    ('is loose', 'is clean', 'is at')
+    """
+    first, _, alternatives = verb.partition(" ")
+    return f"{first} {value}" if value in alternatives.split(" or ") and " or " in alternatives else verb
+
+
+DENIALS = {"is": "isn't", "has": "doesn't have", "can": "can't", "holds": "doesn't hold", "carries": "doesn't carry"}
+"""What says the opposite, by the first word that says what is so."""
+
+
+def denied(sentence: str) -> str:
+    """Return the opposite of a sentence.
+
+    >>> denied("cup 1 is at location 7"), denied("ferry EMPTY")
+    ("cup 1 isn't at location 7", 'not: ferry EMPTY')
+    """
+    words = sentence.split(" ")
+    place = next((i for i, word in enumerate(words) if i and word in DENIALS), None)
+    if place is None:
+        return f"not: {sentence}"
+    return " ".join((*words[:place], DENIALS[words[place]], *words[place + 1 :]))
 
 
 def _joined(parts: Sequence[str]) -> str:

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
-from confab.labels import Labels
+from confab.labels import Labels, denied
 from planner.levels import said as plainly
 from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
-from reasoner.symbols import Condition, Domain, Fact, Symbol
+from reasoner.symbols import (
+    AnyOf,
+    Condition,
+    Domain,
+    EqualityCondition,
+    Fact,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
 
 MOST_SAID = 6
 """So many conditions of a rule are said; how many more it asks for is counted."""
@@ -46,7 +57,38 @@ class Sayings:
 
     def condition(self, condition: Condition) -> str:
         """Return a condition as a sentence."""
-        return plainly(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.name(what))
+        match condition:
+            case Witness(variable, kind, inner, negated):
+                return self._somebody(variable, kind, inner, "no" if negated else "some")
+            case ValueCondition() | RelationCondition():
+                text = plainly(replace(condition, negated=False), self._words)
+                return denied(text) if condition.negated else text
+            case AnyOf(alternatives, False):
+                return " or ".join(" and ".join(map(self.condition, those)) for those in alternatives)
+        return plainly(condition, self._words)
+
+    def _words(self, what: object) -> str:
+        return self.fact(what) if isinstance(what, Fact) else self.name(str(what))
+
+    def _somebody(self, variable: str, kind: str, conditions: Sequence[Condition], which: str) -> str:
+        """Return that somebody is so, or nobody, or everybody: "no movable but the cup is at the location"."""
+        but = [
+            c for c in conditions if isinstance(c, EqualityCondition) and c.negated and variable in (c.left, c.right)
+        ]
+        asked = sorted((c for c in conditions if c not in but), key=lambda c: getattr(c, "negated", False))
+        if not asked:
+            return f"there is {which} {self.name(kind)}"
+        last = asked.pop()
+        if which == "no" and isinstance(last, ValueCondition | RelationCondition) and last.negated:
+            which, last = "every", replace(last, negated=False)  # nobody isn't: everybody is
+        others = " and ".join(self.name(c.right if c.left == variable else c.left) for c in but)
+        who = f"{which} {self.name(kind)}{f' but {others}' if but else ''}"
+        subject = f"{self.name(variable)} "
+        said, end = list(map(self.condition, asked)), self.condition(last)
+        if not all(text.startswith(subject) for text in (*said, end)):
+            return f"{who} is such that {' and '.join((*said, end))}"
+        that = " and ".join(text.removeprefix(subject) for text in said)
+        return f"{who}{f' that {that}' if that else ''} {end.removeprefix(subject)}"
 
     def fact(self, fact: Fact) -> str:
         """Return a fact about roles."""
@@ -70,8 +112,12 @@ class Sayings:
 
     def rule(self, rule: Rule, beyond: Collection[Condition] = ()) -> str:
         """Return a rule as a sentence; conditions that its successor asks for, too, may be left out."""
-        asks = [self.condition(c) for c in rule.asks if c not in beyond]
-        more = f" and {len(asks) - MOST_SAID} things more" if len(asks) > MOST_SAID else ""
+        said = sorted(
+            (c for c in rule.asks if c not in beyond), key=lambda c: isinstance(c, Witness | RelationCondition)
+        )
+        asks = [self.condition(c) for c in said]
+        left = len(asks) - MOST_SAID
+        more = f" and {left} thing{'s' * (left > 1)} more" if left > 0 else ""
         when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""
         steps = "the last step" if rule.steps == 1 else f"{rule.steps} steps to go"
         return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)} ({steps})"
@@ -87,7 +133,8 @@ class Sayings:
             case Method(behavior, _, steps, _):
                 return f"{self.name(behavior)} by {', '.join(self.name(name) for name, _ in steps)}"
             case GoalKind(situation, classes):
-                return f"{self.name(situation)} of {', '.join(map(self.name, classes))}"
+                what = self.name(situation)
+                return " of ".join((what, *(name for name in map(self.name, classes) if name not in what.split(" "))))
         raise TypeError(one)
 
     def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:

@@ -278,7 +278,9 @@ class Memory:
         for rule in sorted(rules, key=lambda r: (r.goals.situation, r.goals.classes, r.steps, r.name)):
             t = totals.get(rule.name, {}).get(ITSELF, Tally())
             kind = totals.get(rule.goals.name, {}).get(ITSELF, Tally())
-            record = f"{say.said(rule.goals)} ({kind.chosen} of {kind.chosen + kind.failed})"
+            record = say.said(rule.goals)
+            if kind.chosen + kind.failed:
+                record += f" ({kind.chosen} of {kind.chosen + kind.failed} reached by rules alone)"
             then = after.get(rule.name)
             text = say.rule(rule, then.asks if then is not None else ())
             text += "" if rule.name not in self.experience.disabled else " – disabled"
@@ -290,9 +292,11 @@ class Memory:
         lines, last = [self.said()], None
         for record, rule, chosen, passed, failed in list(self.advice(most)):
             if record != last:
-                lines += ["", f"{record} reached by rules alone:"]
+                lines += ["", f"{record}:"]
                 last = record
-            lines.append(f"  – {rule}. Chosen {chosen}, passed over {passed}, failed {failed} times.")
+            counts = (("chosen", chosen), ("passed over", passed), ("failed", failed))
+            said = ", ".join(f"{what} {times} time{'s' * (times != '1')}" for what, times in counts if times != "0")
+            lines.append(f"  – {rule}.{' ' + said.capitalize() + '.' if said else ''}")
         others = self.also()[:most]
         return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
 

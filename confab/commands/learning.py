@@ -126,8 +126,12 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 def show(memory: str, most: int, as_json: bool) -> None:
     """Show what a memory advises: rules by kind of goal, orders of goals and methods."""
     from confab.memory import Memory
+    from confab.scene import scenes
 
     loaded = Memory.load(memory)
+    name = loaded.scene.rpartition("/")[2]
+    if name in scenes():  # then its labels are at hand
+        loaded = Memory.load(memory, load_scene(name))
     if as_json:
         rules, also = loaded.advice(most).records(), loaded.also()[:most]
         show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also})

@@ -208,18 +208,17 @@ class Course:
             if isinstance(c, ClassCondition) and not c.negated:
                 narrow(c.term, c.kind)
         situations = self.problem.domain.situations
-        for c in (goal, *need):
-            for inner in walk(c):
-                if isinstance(inner, ValueCondition):
-                    kind = situations[inner.situation]
-                    for who, of in zip((*inner.arguments, inner.value), (*kind.arguments, kind.range), strict=True):
-                        if who not in kinds and not who.startswith("?"):
-                            narrow(who, of)
-                elif isinstance(inner, RelationCondition):
-                    for who in inner.arguments:
-                        if who not in kinds and not who.startswith("?"):
-                            of = next((k for k in self.problem.classes if who in members(k)), "")
-                            narrow(who, of)
+        asked = [inner for c in (goal, *need) for inner in walk(c)]
+        for inner in sorted(asked, key=lambda inner: isinstance(inner, RelationCondition)):
+            ends: Iterable[tuple[str, str]] = ()
+            if isinstance(inner, ValueCondition):
+                kind = situations[inner.situation]
+                ends = zip((*inner.arguments, inner.value), (*kind.arguments, kind.range), strict=True)
+            elif isinstance(inner, RelationCondition):
+                ends = ((who, "") for who in inner.arguments)
+            for who, of in ends:
+                if who not in kinds and not who.startswith("?"):
+                    narrow(who, self.plainest(who, of))
         roles: dict[str, str] = {}
         for who in order:
             if who in kinds:
@@ -247,6 +246,18 @@ class Course:
             steps,
             tuple((role, kinds[who]) for who, role in roles.items() if self._used(role, asks, own)),
         )
+
+    def plainest(self, who: str, of: str) -> str:
+        """Return the widest class of somebody, within another one, that isn't made of the values of a situation type."""
+        members, situations = self.problem.members, self.problem.domain.situations
+        if of and of not in situations:
+            return of
+        within = [
+            k
+            for k in self.problem.classes
+            if k not in situations and who in members(k) and (not of or members(k) <= members(of))
+        ]
+        return max(within, key=lambda k: len(members(k)), default=of)
 
     def _used(self, role: str, asks: Iterable[Condition], own: Mapping[str, str]) -> bool:
         return role in own.values() or any(role in terms(inner) for c in asks for inner in walk(c))

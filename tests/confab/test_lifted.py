@@ -1,0 +1,70 @@
+"""What was learned is said as people say it: of nobody, of everybody, what isn't so, and in the labels of shipped scenes."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import confab
+from confab.cli import app
+from confab.labels import Labels, denied
+from confab.lifted import Sayings
+from reasoner.symbols import (
+    Condition,
+    Domain,
+    EqualityCondition,
+    Fact,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+
+LABELS = Labels(
+    {"Gate": "gate", "Lock": "lock", "open": "open", "shut": "shut", "gateOf": "is a gate of"},
+    {"GATE": "is open or shut", "IN": "is in", "MOORING": "is tied up or loose"},
+    Domain({}, {}),
+)
+SHUT = ValueCondition("GATE", ("?other",), "shut", negated=True)
+OF_LOCK = RelationCondition("gateOf", ("?other", "?lock"))
+
+
+@pytest.mark.parametrize(
+    ("condition", "sentence"),
+    [
+        (Witness("?x", "Boat", (ValueCondition("IN", ("?x",), "?lock"),), negated=True), "no Boat is in lock"),
+        (Witness("?x", "Boat", (ValueCondition("IN", ("?x",), "?lock"),)), "some Boat is in lock"),
+        (Witness("?other", "Gate", (SHUT, OF_LOCK), negated=True), "every gate that is a gate of lock is shut"),
+        (
+            Witness(
+                "?other", "Gate", (EqualityCondition("?other", "?gate", negated=True), OF_LOCK, SHUT), negated=True
+            ),
+            "every gate but gate that is a gate of lock is shut",
+        ),
+        (RelationCondition("gateOf", ("?gate", "?lock"), negated=True), "gate isn't a gate of lock"),
+        (ValueCondition("GATE", ("?gate",), "open", negated=True), "gate isn't open"),
+    ],
+)
+def test_conditions_are_said_of_nobody_and_everybody(condition: Condition, sentence: str) -> None:
+    assert Sayings(LABELS).condition(condition) == sentence
+
+
+def test_of_a_property_that_names_its_values_only_the_one_there_is_is_said() -> None:
+    assert LABELS.fact(Fact(Symbol("GATE", ("g",)), "shut")) == "g is shut"
+    assert LABELS.fact(Fact(Symbol("MOORING", ("b",)), "tied up")) == "b is tied up"
+    assert LABELS.fact(Fact(Symbol("IN", ("b",)), "shut")) == "b is in shut"
+
+
+def test_the_opposite_is_said_by_the_verb() -> None:
+    assert denied("hand can reach location") == "hand can't reach location"
+    assert denied("FERRY EMPTY") == "not: FERRY EMPTY"
+
+
+def test_a_memory_of_a_shipped_scene_is_shown_in_its_labels_without_naming_the_scene(tmp_path: Path) -> None:
+    scene = confab.load("two-cups")
+    memory = confab.Memory.of(scene)
+    memory.teach(scene, scene.plan().plan)
+    memory.save(tmp_path / "memory.ttl")
+    shown = CliRunner().invoke(app, ["memory", "show", str(tmp_path / "memory.ttl")]).output
+    assert "is at location" in " ".join(shown.split())
+    assert "B1_MOVE" not in shown
