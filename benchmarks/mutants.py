@@ -39,6 +39,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "planner/acting/repair.py": ("tests/planner/test_repair.py",),
     "planner/acting/schedule.py": ("tests/planner/test_schedule.py",),
     "reasoner/memory/experience_file.py": ("tests/reasoner/test_experience.py", "tests/reasoner/test_remembering.py"),
+    "reasoner/memory/rules_file.py": ("tests/reasoner/test_experience.py", "tests/reasoner/test_remembering.py"),
     "reasoner/memory/links_file.py": ("tests/reasoner/test_memory.py",),
 }
 SAME = ("Eq_Is", "Eq_IsNot")

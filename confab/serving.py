@@ -162,7 +162,7 @@ class Server(ThreadingHTTPServer):
     """A server that keeps no more than so many connections at once."""
 
     daemon_threads = True
-    request_queue_size = 128
+    request_queue_size = 1024  # as many wait for a place; who comes after them would be dropped
     allow_reuse_address = True
 
     def __init__(self, port: int, service: Service) -> None:

@@ -252,6 +252,11 @@ class Definitions:
     def _rule(
         situation: str, kinds: Sequence[str], conditions: tuple[Condition, ...], variables: tuple[Parameter, ...]
     ) -> Rule:
+        if len(kinds) != 2:
+            raise KnowledgeError(
+                f"{situation} follows from axioms about its value property, so that it is about two individuals; "
+                "say by :hasSituationType which class has it"
+            )
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
     def _between(self, one: str, other: str) -> str:

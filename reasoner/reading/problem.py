@@ -841,6 +841,8 @@ class _Schema:
 
     def effect(self, iri: str) -> Effect:
         """Return an effect; with a class in the place of an individual it is made for each of the class for which `when` holds."""
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
         kinds = self.classes_in(iri)
         if len(kinds) > 1:
             raise KnowledgeError(

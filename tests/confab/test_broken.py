@@ -17,6 +17,7 @@ from confab.authoring import migrate, new_domain
 from confab.cli import main
 from confab.memory import Memory
 from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES
+from ontology import ROOT
 from ontology import scenes as shipped_scenes
 from reasoner.files import alone, write_whole
 from reasoner.generate import write_scene
@@ -303,6 +304,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
             "c:precondition :B1_CARRY.fre",
             "B1_CARRY.fre> is used as a condition but",
         ),
+        ("", "c:postcondition :B1_CARRY.carried", "c:postcondition :B1_CARRY.carry", "carry> is used as an effect but"),
         ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
         ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY speaks of PLACE with 0 arguments; it has 1"),
         ("", "c:value :dirty", "c:value :dirt", "tearoom#dirt> is named in a behaviour, but isn't declared"),
@@ -327,6 +329,19 @@ def test_a_goal_about_too_few_individuals_is_refused(tmp_path: Path, ask: Ask) -
     code, out, err = ask("plan", scene, "--optimal")
     assert (code, out, err.count("\n")) == (MISUSE, "", 1)
     assert "<casket, INSIDE>: a goal about 1 individuals; INSIDE is about 2" in err
+
+
+def test_what_follows_from_axioms_about_a_property_has_an_owner(tmp_path: Path, ask: Ask) -> None:
+    for name, file in (("gallery", "domains/gallery.ttl"), ("scene", "scenes/gallery-small.ttl")):
+        (tmp_path / f"{name}.ttl").write_text((ROOT / file).read_text())
+    change(tmp_path / "gallery.ttl", "c:hasSituationType :JOINED, :WAY", "c:hasSituationType :JOINED")
+    (tmp_path / "catalog-v001.xml").write_text(
+        '<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">'
+        '<uri name="https://w3id.org/confab/gallery" uri="gallery.ttl"/></catalog>'
+    )
+    code, out, err = ask("plan", tmp_path / "scene.ttl")
+    assert (code, out, err.count("\n")) == (MISUSE, "", 1)
+    assert "WAY follows from axioms about its value property" in err
 
 
 def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> None:
