@@ -46,7 +46,9 @@ class Labels:
         if situation not in self.verbs and situation in self.words and about and not boolean:
             of = " ".join(map(self.name, (about, *rest)))
             return f"{self.words[situation]} of {of} is {self.name(fact.value)}"
-        verb = self.verbs.get(situation, situation)
+        named = self.words.get(situation, "")
+        of_itself = f"is {named.removeprefix('being ')}" if boolean and named.startswith("being ") else situation
+        verb = self.verbs.get(situation, of_itself)
         value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
         verb = _chosen(verb, self.name(fact.value)) if not rest and value else verb
         if verb.endswith(f" {self.name(fact.value)}"):

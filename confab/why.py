@@ -279,6 +279,8 @@ def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Lab
 
 def _sentence(need: Need, steps: Mapping[tuple[int, ...], Step], plan: Plan, labels: Labels) -> str:
     facts = " and ".join(labels.fact(change.fact) for change in need.gives)
+    if need.kind is Kind.GOAL and need.conditions:
+        return f"it is wanted that {' and '.join(map(labels.condition, need.conditions))}: that follows since {facts}"
     if need.kind is Kind.GOAL:
         return f"it is wanted that {facts}"
     if need.kind is Kind.REST:

@@ -19,7 +19,7 @@ from fractions import Fraction
 from planner.plan import Plan, Step
 from planner.validation import Arguments, Cell, Facts, Rules
 from reasoner.amounts import meets, written
-from reasoner.symbols import Condition, Fact, Problem, Symbol, substituted
+from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 
 Path = tuple[int, ...]
 
@@ -47,7 +47,7 @@ class Need:
 
     `gives` are the facts at issue; `by` is the path of the step that needs them, empty for the goal and for what is at rest in the
     end of the whole plan. `conditions` are the preconditions of a later step that fail without them, with individuals put in; none
-    where it could be done all the same and would do something else.
+    where it could be done all the same and would do something else. Of the goal, they are what follows from the facts.
     """
 
     kind: Kind
@@ -164,6 +164,7 @@ class _Course:
         if self.whole:
             goal = {(symbol.situation, symbol.arguments): value for symbol, value in self.problem.goal.items()}
             found += self.left((), 0, 0, 0, goal)
+            found += [need for cell, value in goal.items() for need in self.followed(cell, value)]
         needed = {(path, change.fact) for path, need in found for change in need.gives}
         for writer, number, changes, differs in reversed(deeds):
             step = self.steps[number]
@@ -278,6 +279,39 @@ class _Course:
             else:
                 continue
             yield self.steps[written.by].path, Need(why, (Change(Fact(symbol, value), written.before),), path)
+
+    def followed(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
+        """Yield who gave what a goal follows from that is defined: what it read, without which it wouldn't be as it is wanted."""
+        if cell[0] not in self.problem.domain.rules:
+            return
+        facts = self.facts
+        facts.cells, facts.of_value = {}, {}
+        facts.value(*cell)
+        read = dict.fromkeys(other for other in facts.cells if other in self.written)
+        for held in facts.of_value:
+            read.update(self.having.get(held, {}))
+        condition = ValueCondition(cell[0], cell[1], TRUE, wanted == FALSE)
+        by: dict[int, list[Cell]] = {}
+        for other in read:
+            by.setdefault(self.written[other].by, []).append(other)
+        for writer, cells in sorted(by.items()):
+            alone = [changes for one in cells if (changes := self.otherwise(cell, wanted, [one]))]
+            if not alone and len(cells) > 1:
+                alone = [changes for changes in (self.otherwise(cell, wanted, cells),) if changes]
+            for changes in alone:
+                yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
+
+    def otherwise(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[Change, ...]:
+        """Return what some cells were changed by, if what is defined would be otherwise without that; else nothing."""
+        facts, mark = self.facts, len(self.facts.log)
+        now = {other: str(facts.value(*other)) for other in cells}
+        for other in cells:
+            facts.put(*other, self.written[other].before)
+        lacking = facts.value(*cell) != wanted
+        for other, had in now.items():
+            facts.put(*other, had)
+        del facts.log[mark:]
+        return tuple(Change(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
 
     def fact_of(self, number: int, cell: Cell) -> Fact | None:
         """Return the fact that a step gives to a cell."""

@@ -11,6 +11,7 @@ level should have been applicable that makes this change, maybe together with th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 from planner.plan import Broken, Left, Plan, Step
@@ -231,6 +232,10 @@ def said(condition: Condition, words: Words = str) -> str:
             return f"{words(term)} is {'no' if negated else 'a'} {words(kind)}"
         case EqualityCondition(left, right, negated):
             return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
+        case Witness(variable, kind, (*others, last), True) if variable.startswith("?each"):
+            of = f" with {all_(others)}" if others else ""
+            one = substituted(replace(last, negated=not last.negated), {variable: f"the {words(kind)}"})
+            return f"of each {words(kind)}{of}: {said(one, words)}"
         case Witness(variable, kind, conditions, negated):
             return f"there is {'no' if negated else 'a'} {words(kind)} {words(variable)} with {all_(conditions)}"
         case AnyOf(alternatives, negated):

@@ -1,0 +1,33 @@
+"""What follows is explained by what it follows from, in the ontology's labels."""
+
+from pathlib import Path
+
+import confab
+
+THEATRE = Path(__file__).parents[2] / "docs" / "examples" / "theatre" / "first-night.ttl"
+
+
+def needs(scene: str | Path, step: str) -> list[str]:
+    result = confab.load(scene).plan()
+    return list(result.why(step).needs)
+
+
+def test_a_goal_that_is_defined_needs_what_it_follows_from() -> None:
+    assert needs("packing-small", "L1#3") == [
+        "it is wanted that ring is stored away: that follows since chest lies in vault"
+    ]
+    assert needs("packing-small", "L1#1") == [
+        "it is wanted that ring is inside casket: that follows since ring lies in casket",
+        "it is wanted that ring is stored away: that follows since ring lies in casket",
+    ]
+
+
+def test_a_condition_that_is_defined_is_told_with_what_changed_it() -> None:
+    asks = "“put ring into casket” (L1#1) asks that not casket is out of reach; before: chest is shut"
+    assert asks in needs("packing-small", "L1#0")
+
+
+def test_a_condition_on_all_of_a_class_says_so() -> None:
+    asked = needs(THEATRE, "unload cloud")
+    assert asked[0] == "it is wanted that not cloud is stowed: that follows since not: cart carries cloud"
+    assert asked[1].startswith("“switch back on” (L1#19) asks that of each prop: not the prop is stowed")
