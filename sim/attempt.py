@@ -112,7 +112,8 @@ class Attempt:
             reacher = self.reacher(opening=opening)
             left, solved = np.arange(len(stages[0].poses)), list[Array]()
             for stage in stages:
-                q, valid = replace(reacher, joint_margin=reacher.joint_margin + stage.slack).solve(stage.poses[left])
+                spare = replace(reacher, joint_margin=reacher.joint_margin + stage.slack, fold=stage.fold)
+                q, valid = spare.solve(stage.poses[left])
                 left, solved = left[valid], [before[valid] for before in (*solved, q)]
                 if not len(left):
                     missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)

@@ -25,6 +25,12 @@ from sim.verdict import SkillError
 RATE = 240.0
 """Simulation steps per second."""
 
+CLINGING = 0.005
+"""Metres by which two bodies may shift along each other before a contact between them is looked for anew.
+
+Bullet's own 2 cm are for larger things: a finger's edge that had touched a ledge would go on to press where the ledge was.
+"""
+
 LAG = 0.08
 """Radians that a joint may stay behind its command."""
 
@@ -98,6 +104,7 @@ class Engine:
             fixedTimeStep=1 / RATE,
             numSolverIterations=50,
             deterministicOverlappingPairs=1,
+            contactBreakingThreshold=CLINGING,
             physicsClientId=self.client,
         )
 

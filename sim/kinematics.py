@@ -25,6 +25,9 @@ from sim.urdf import Array, Model, rotation
 
 Flags: TypeAlias = NDArray[np.bool_]
 
+STRETCHED = 0.9999
+"""Cosine of the angle between where a joint is and where its two solutions meet, up to which they are told apart."""
+
 DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 
 
@@ -173,7 +176,7 @@ def hand_frames(arm: Arm, q: Array) -> tuple[Array, Array]:
     return r[:, 6] @ arm.tip_rotation, np.einsum("nij,j->ni", r[:, 6], arm.tip) + t[:, 6]
 
 
-def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) -> tuple[Array, Array]:
+def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Array]:
     """Return postures (n, 7) that put the hand at rotations `r`, points `p` with elbow `swivel`, and which are valid.
 
     Parameters
@@ -182,6 +185,8 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) ->
     r, p, swivel : arrays (n, 3, 3), (n, 3) metres, (n,) radians
     margin : float
         Distance in radians that every joint keeps from its limits.
+    fold : float
+        Distance in radians that a joint keeps from where its two solutions meet: beyond it a point is out of reach.
 
     Returns
     -------
@@ -191,11 +196,12 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0) ->
         The point is in reach and every joint within its limits. Of the two postures of a sphere only the one that has the
         middle joint within ±90° (or between 0° and 180°) is considered, so neighbouring poses give neighbouring postures.
     """
-    q, valid = (_by_elbow if arm.spherical else _by_last_joint)(arm, r, p, swivel)
+    most = min(STRETCHED, float(np.cos(fold)))
+    q, valid = (_by_elbow if arm.spherical else _by_last_joint)(arm, r, p, swivel, most)
     return q, valid & np.all((q >= arm.lower + margin) & (q <= arm.upper - margin), axis=-1)
 
 
-def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags]:
+def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
     """Return postures with the elbow at a swivel about the line from shoulder to wrist, and which are in reach."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
@@ -204,8 +210,8 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags
     distance = np.maximum(np.linalg.norm(reach, axis=-1), 1e-9)
     n = reach / distance[:, None]
     cosine = (a * a + distance**2 - b * b) / (2 * a * distance)
-    valid = np.abs(cosine) < 0.9999
-    cosine = np.clip(cosine, -0.9999, 0.9999)
+    valid = np.abs(cosine) < most
+    cosine = np.clip(cosine, -STRETCHED, STRETCHED)
     hang = DOWN - (n @ DOWN)[:, None] * n
     hang = hang / np.maximum(np.linalg.norm(hang, axis=-1), 1e-9)[:, None]
     out = np.cos(swivel)[:, None] * hang + np.sin(swivel)[:, None] * cross(n, hang)
@@ -224,7 +230,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags
     return q, valid
 
 
-def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, Flags]:
+def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
     """Return postures with the last joint at `swivel` and the hand's roll from the middle of its limits, and which are in reach.
 
     The last angle gives where the wrist is (w) and where the sixth axis points (e). The wrist's distance from the shoulder
@@ -238,12 +244,12 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array) -> tuple[Array, 
     e = before @ sixth
     upper, lower = arm.origins[3] - shoulder, arm.wrist - arm.origins[3]
     elbow, reached = _angles_of(
-        fourth, upper[None], lower, (np.einsum("ni,ni->n", w, w) - upper @ upper - lower @ lower) / 2
+        fourth, upper[None], lower, (np.einsum("ni,ni->n", w, w) - upper @ upper - lower @ lower) / 2, most
     )
     elbow = elbow[:, 1 if _wrapped(arm.middle[3] - _phase(fourth, upper, lower)) > 0 else 0]
     bent = turn(fourth, elbow)
     v = np.swapaxes(bent, -1, -2) @ upper + lower  # from shoulder to wrist as the forearm sees it
-    both, met = _angles_of(fifth, v, sixth, np.einsum("ni,ni->n", w, e))
+    both, met = _angles_of(fifth, v, sixth, np.einsum("ni,ni->n", w, e), most)
     found = []
     for angle in both.T:
         forearm = bent @ turn(fifth, angle)
@@ -276,14 +282,17 @@ def _phase(axis: Array, a: Array, b: Array) -> float:
     return float(np.arctan2(a @ np.cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
 
 
-def _angles_of(axis: Array, a: Array, b: Array, product: Array) -> tuple[Array, Flags]:
-    """Return both angles (n, 2) about an axis at which the turned `b` (3,) has a product with `a` (n, 3), and where there are."""
+def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
+    """Return both angles (n, 2) about an axis at which the turned `b` (3,) has a product with `a` (n, 3), and where there are.
+
+    Of what their cosine would be, at most `most` counts.
+    """
     cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ np.cross(axis, b)
     reach = np.maximum(np.hypot(cosine, sine), 1e-9)
     share = (product - (a @ axis) * (b @ axis)) / reach
     half = np.arccos(np.clip(share, -1, 1))
     middle = np.arctan2(sine, cosine)
-    return _wrapped(np.stack([middle - half, middle + half], -1)), np.abs(share) < 0.9999
+    return _wrapped(np.stack([middle - half, middle + half], -1)), np.abs(share) < most
 
 
 def _frame(a: Array, b: Array) -> Array:

@@ -47,12 +47,16 @@ class Blocked:
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among its surroundings: answers which paths are possible. `margin` metres keep it off everything."""
+    """An arm among its surroundings: answers which paths are possible. `margin` metres keep it off everything.
+
+    Every joint keeps `joint_margin` radians from its limits, and `fold` from where the arm would be stretched.
+    """
 
     mover: Mover
     around: Surroundings
     margin: float = 0.008
     joint_margin: float = 0.03
+    fold: float = 0.0
 
     @property
     def arm(self) -> Arm:
@@ -61,7 +65,7 @@ class Reacher:
 
     def solve(self, poses: Array) -> tuple[Array, Array]:
         """Return postures of the poses and which are within reach and limits."""
-        return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin)
+        return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
     def free(self, q: Array) -> Array:
         """Return which postures touch nothing."""

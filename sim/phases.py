@@ -56,6 +56,9 @@ ASIDE = sorted(
 SLACK = 0.1
 """Radians kept from the limits of the arm's joints in planning a joint's path, for what will have to be corrected on the way."""
 
+GROPING = 120
+"""Steps after which a hand that has met a handle with one finger only takes hold anew."""
+
 LOOKING = 6
 """Steps between looks at what the fingers feel."""
 
@@ -216,6 +219,8 @@ def _grasp(run: Run, phase: Phase) -> None:
     while pressed < run.numbers["hold"] * world.rate:
         if waited > CLOSING:
             raise SkillError("no grasp", (name,), force_n=finger_force(run, name), opening_m=sum(hand.openings()))
+        if name not in world.bodies and waited and waited % GROPING == 0 and not pressed:
+            _grope(run)
         world.run(LOOKING)
         waited += LOOKING
         pressed = pressed + LOOKING if finger_force(run, name) >= run.numbers["force"] else 0
@@ -229,20 +234,34 @@ def _grasp(run: Run, phase: Phase) -> None:
     run.measured |= {"force_n": finger_force(run, name), "seconds": waited / world.rate}
 
 
+def _grope(run: Run) -> None:
+    """Take hold anew of what one finger has met and the other closed beside: around where it was met."""
+    hand, shift = run.attempt.hand, _off_centre(run)
+    hand.open(run.spread)
+    run.world.run(CLOSING // 6)
+    _shift(run, shift)
+    hand.close()
+
+
 def _centre(run: Run) -> None:
     """Shift the hand until both fingers have closed equally far: what they hold stands fast, so the hand gives way."""
-    hand, world = run.attempt.hand, run.world
+    hand = run.attempt.hand
     for _ in range(3):
         first, second = hand.openings()
-        if abs(first - second) < CENTRED:
+        if abs(first - second) < CENTRED or not _shift(run, _off_centre(run)):
             return
-        pose = hand.pose
-        pose[:3] += _off_centre(run)
-        q, valid = run.attempt.reacher(margin=-np.inf).solve(np.stack([hand.pose, pose]))
-        if not valid.all():
-            return
+        run.world.run(2 * LOOKING)
+
+
+def _shift(run: Run, shift: Array) -> bool:
+    """Shift the hand by some metres, if the arm allows it."""
+    hand = run.attempt.hand
+    pose = hand.pose
+    pose[:3] += shift
+    q, valid = run.attempt.reacher(margin=-np.inf).solve(np.stack([hand.pose, pose]))
+    if valid.all():
         run.attempt.follow(q)
-        world.run(2 * LOOKING)
+    return bool(valid.all())
 
 
 def _off_centre(run: Run) -> Array:

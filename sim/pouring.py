@@ -25,6 +25,9 @@ from sim.verdict import SkillError
 SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""
 
+FOLD = 0.1
+"""Radians kept, if possible, from where the arm would be stretched: what is held slips a little on the way there."""
+
 LONGEST = 2400
 """Steps after which turning gives up."""
 
@@ -38,11 +41,12 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
     yaw, swivel = (np.tile(part, len(SIDES)) for part in fan())
     side = np.repeat(SIDES, len(yaw) // len(SIDES))
     angles = np.linspace(0.0, numbers["pour_angle"], 5)
-    stages = [
-        Stage(_poses(attempt, source, target, yaw, side, swivel, np.full(len(yaw), angle), numbers)) for angle in angles
-    ]
-    chosen = attempt.choose(stages, (target, source))
-    start = stages[0].poses
+    ways = [_poses(attempt, source, target, yaw, side, swivel, np.full(len(yaw), angle), numbers) for angle in angles]
+    try:
+        chosen = attempt.choose([Stage(poses, fold=FOLD) for poses in ways], (target, source))
+    except SkillError:
+        chosen = attempt.choose([Stage(poses) for poses in ways], (target, source))
+    start = ways[0]
     best = attempt.go([start[i] for i in chosen], (target, source))
     return attempt.check_arrival(start[chosen[best]], numbers)
 

@@ -22,7 +22,8 @@ class Stage:
     """Poses (n, 6) that all candidates must allow, what may be touched there, and what else there is around by then.
 
     The fingers have by then `closed` around something, or are as the others' are. At a handle, which is `near` what it is on,
-    a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits.
+    a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits, and
+    `fold` from where the arm would be stretched.
     What the hand holds now is `released` by then.
     """
 
@@ -32,6 +33,7 @@ class Stage:
     closed: bool = False
     near: bool = False
     slack: float = 0.0
+    fold: float = 0.0
     released: bool = False
 
 

@@ -52,6 +52,21 @@ def test_an_arm_whose_last_axis_passes_the_wrist_has_a_closed_form_too() -> None
     np.testing.assert_allclose(np.cos(swivel_of(arm, found[valid]) - swivel[valid]), 1.0, atol=1e-8)
 
 
+def test_points_at_which_an_arm_is_nearly_stretched_can_be_kept_off() -> None:
+    for arm in (panda(), arm_of("left")):
+        q = np.random.default_rng(0).uniform(arm.lower + 0.05, arm.upper - 0.05, (2000, 7))
+        given = (*hand_frames(arm, q), swivel_of(arm, q))
+        _, anywhere = inverse(arm, *given)
+        _, farther = inverse(arm, *given, fold=0.3)
+        assert farther.sum() < anywhere.sum()
+        r, p, swivel = (part[farther] for part in given)
+        for shift in np.vstack([np.eye(3), -np.eye(3)]) * 0.003:  # a little beside, such a point can still be reached
+            assert (
+                inverse(arm, r, p + shift, swivel)[1].mean()
+                > inverse(arm, given[0], given[1] + shift, swivel_of(arm, q))[1][anywhere].mean()
+            )
+
+
 def test_the_last_joint_alone_rolls_such_a_hand_while_the_swivel_stays() -> None:
     arm = panda()
     roll = np.linspace(0.0, 1.2, 20)

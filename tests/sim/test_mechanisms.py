@@ -111,6 +111,14 @@ def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
         assert world.observe()[Symbol("OPENED", ("drawer",))] == "false"
 
 
+def test_a_handle_that_one_finger_closes_beside_is_taken_anew_where_the_other_met_it() -> None:
+    scene = kitchen()
+    roles = {"hand": "right_hand", "object": "drawer"}
+    with World(scene.embodiment, scene.problem.initial, 7007, Perturbation(), beads=False, noise=0.008) as world:
+        perform(world, by_skill(scene.embodiment)["operate"], roles)
+        assert world.observe()[Symbol("OPENED", ("drawer",))] == "true"
+
+
 def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
     scene = kitchen()
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:

@@ -1,0 +1,192 @@
+"""Tasks, robots and noise: how many perturbed rollouts of each are verified, why the others aren't, and what a rollout costs.
+
+    python -m benchmarks.bodies            the table of what was rolled out so far, of the code as it is
+    python -m benchmarks.bodies run [TASK …]   roll out what is missing of the reporting seeds, ten of everything at a time
+    python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
+
+A line per rollout goes to confab-out/bodies.jsonl, with what tells its code from another; a run that was stopped goes on where
+it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 20000 are for reporting only.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import confab
+from confab.scene import Scene
+from planner.plan import Step
+from reasoner.symbols import Fact
+from sim.rollouts import Trial, wilson
+from sim.staging import Perturbation
+from sim.verify import Rollout, expectations
+
+KEPT = Path("confab-out/bodies.jsonl")
+DEVELOPMENT, REPORTING, COUNT = 7000, 20000, 100
+NOISE = (0, 4, 8)
+"""Millimetres of standard deviation on every perceived position."""
+MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
+"""What a rollout depends on most: where one of these is another one, rollouts begin anew."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A task of the table: a scene, and what is done in it.
+
+    That are primitives, each a behaviour and its arguments, or the plan for the `goals`, or for those of the scene.
+    """
+
+    robot: str
+    scene: str
+    primitives: tuple[str, ...] = ()
+    goals: tuple[str, ...] = ()
+    beads: bool = False
+
+
+CASES = {
+    "drawer": Case("two arms", "kitchen-corner", ("F3_OPEN right_hand drawer", "F3_SHUT right_hand drawer")),
+    "door": Case("two arms", "kitchen-corner", ("F3_OPEN left_hand door", "F3_SHUT left_hand door")),
+    "hood": Case("two arms", "centrifuge", ("F3_OPEN left_hand cover", "F3_SHUT left_hand cover")),
+    "button": Case("two arms", "centrifuge", ("F3_PRESS right_hand start",)),
+    "lid onto pot": Case("two arms", "kitchen-corner", goals=("lid LOCATION pot_top",)),
+    "pick and place": Case("two arms", "beverage-serving", goals=("cup2 LOCATION location8",)),
+    "move and pour": Case("two arms", "beverage-serving-moved", beads=True),
+    "kitchen corner": Case("two arms", "kitchen-corner"),
+    "laboratory": Case("two arms", "centrifuge"),
+    "serving": Case("Panda", "panda-serving", beads=True),
+    "moving": Case("Panda", "panda-serving", goals=("cup1 LOCATION place2", "cup2 LOCATION place1")),
+}
+"""The tasks of the table, by name."""
+
+
+@cache
+def _scene(name: str) -> Scene:
+    return confab.load(name)
+
+
+def steps_of(case: Case) -> tuple[Step, ...]:
+    """Return the primitives that a case consists of."""
+    if case.primitives:
+        words = [text.split() for text in case.primitives]
+        return tuple(Step((i,), 0, 3, name, tuple(arguments)) for i, (name, *arguments) in enumerate(words))
+    scene = _scene(case.scene)
+    if not case.goals:
+        return scene.plan().plan.primitives
+    wanted = {tuple(goal.split()[:2]) for goal in case.goals}
+    as_it_is = [str(Fact(symbol, scene.problem.initial[symbol])) for symbol in scene.problem.goal]
+    others = [fact for fact in as_it_is if tuple(fact.split()[:2]) not in wanted]
+    return scene.plan((*others, *case.goals)).plan.primitives
+
+
+@cache
+def trial(name: str, noise: int) -> Trial:
+    """Return a case at some noise, to be rolled out by seeds."""
+    case = CASES[name]
+    scene, steps = _scene(case.scene), steps_of(case)
+    expected = expectations(scene.problem, steps)
+    return Trial(scene.embodiment, scene.problem.initial, steps, expected, Perturbation(), case.beads, noise / 1000)
+
+
+def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
+    """Return what is kept of a rollout."""
+    failure = rollout.failure
+    return {
+        "task": name,
+        "noise": noise,
+        "seed": rollout.seed,
+        "ok": rollout.ok,
+        "failure": failure.verdict.code if failure else "",
+        "at": f"{failure.step.behavior} {' '.join(failure.step.arguments)}" if failure else "",
+        "said": str(failure.verdict) if failure else "",
+        "cpu": round(rollout.cpu_seconds, 2),
+        "planning": round(rollout.clock.planning, 2),
+        "simulated": round(rollout.simulated_seconds, 1),
+    }
+
+
+def code() -> str:
+    """Return what tells the code and bodies that are committed from others: git's names of their contents."""
+    command = ["git", "rev-parse", "--short", *(f"HEAD:{path}" for path in MEASURED)]
+    return "-".join(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
+
+
+def kept() -> list[dict[str, Any]]:
+    """Return the lines of the rollouts of the code as it is."""
+    if not KEPT.exists():
+        return []
+    rows = [json.loads(text) for text in KEPT.read_text(encoding="utf-8").splitlines()]
+    now = code()
+    return [one for one in rows if one["code"] == now]
+
+
+def missing(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
+    """Yield task, noise and seed of what isn't rolled out yet, ten seeds of everything before the next ten of anything."""
+    done = {(one["task"], one["noise"], one["seed"]) for one in kept()}
+    for first in range(REPORTING, REPORTING + COUNT, 10):
+        for noise in NOISE:
+            for name in names:
+                seeds = range(first, first + 10)
+                yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
+
+
+def run(names: Sequence[str]) -> None:
+    """Roll out what is missing of some tasks, and keep a line for each rollout."""
+    KEPT.parent.mkdir(parents=True, exist_ok=True)
+    now = code()
+    for name, noise, seed in missing(names):
+        found = {"code": now, **row(name, noise, trial(name, noise).run(seed))}
+        with KEPT.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(found) + "\n")
+
+
+def tried(name: str, noise: int, seeds: Sequence[int]) -> None:
+    """Print development rollouts of a task, and each failure."""
+    good = 0
+    for seed in seeds:
+        found = row(name, noise, trial(name, noise).run(seed))
+        good += found["ok"]
+        print(seed, "verified" if found["ok"] else f"{found['at']}: {found['said']}", found["cpu"], flush=True)
+    print(f"{good} of {len(seeds)} at {noise} mm")
+
+
+def main() -> None:
+    """Print the table of what was rolled out."""
+    rows = kept()
+    print(
+        "| task | robot | noise | verified | 95 % confidence | CPU s, median | of it planning | simulated s | failures |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name, case in CASES.items():
+        for noise in NOISE:
+            if some := [one for one in rows if (one["task"], one["noise"]) == (name, noise)]:
+                print(_line(name, case, noise, some))
+
+
+def _line(name: str, case: Case, noise: int, rows: Sequence[dict[str, Any]]) -> str:
+    good = sum(one["ok"] for one in rows)
+    low, high = wilson(good, len(rows))
+    why = Counter(f"{one['failure']} at {one['at'].split()[0]}" for one in rows if not one["ok"])
+    cpu, planning, simulated = (median(one[what] for one in rows) for what in ("cpu", "planning", "simulated"))
+    return (
+        f"| {name} | {case.robot} | {noise} mm | {good} of {len(rows)} | {low:.0%} to {high:.0%} | {cpu:.1f} | {planning:.2f} "
+        f"| {simulated:.1f} | {', '.join(f'{count} {what}' for what, count in why.most_common())} |"
+    )
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case []:
+            main()
+        case ["run", *names]:
+            run(names or list(CASES))
+        case ["try", name, *numbers]:
+            noise, first, last = (*map(int, numbers), *(0, DEVELOPMENT, DEVELOPMENT + 10)[len(numbers) :])
+            tried(name, noise, range(first, last))
