@@ -16,6 +16,7 @@ What is found is made shorter by `planner.grounded.plan_windows`.
 from __future__ import annotations
 
 import heapq
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, reduce
@@ -39,6 +40,7 @@ from reasoner.symbols import Problem, State
 
 BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
+ENABLING = 8  # bits, at most, that are tried to have set where a relaxed plan is stuck
 SHORTEN, SHORTENING = 200_000, 50  # work on the finished plan: operators, and a fiftieth of the bits of the search's
 
 Path: TypeAlias = "tuple[int, list[int]]"
@@ -266,7 +268,9 @@ def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
     """Return a function that carries out a relaxed plan as far as it goes, from a state: what is reached, and by which operators.
 
     Where no operator of it is applicable, one is replaced by an applicable one that brings about what it was to bring about for
-    a later one or the goal: a truck that went north in the meantime comes from there.
+    a later one or the goal: a truck that went north in the meantime comes from there. Else one is put in that brings about what
+    others lack and only that: it drives back, so that the next can be loaded. Of several, that after which most goals hold once
+    the rest was carried out as far as it goes.
     """
 
     @cache
@@ -303,21 +307,42 @@ def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
                         return after, other, stuck[:i] + stuck[i + 1 :]
         return None
 
+    def in_turn(state: int, left: Sequence[int]) -> tuple[int, list[int], list[int]]:
+        done, stuck = [], []
+        for operator in left:
+            if set_by(operator) & ~state:  # else it has nothing left to do
+                after = task.applied(state, operator)
+                if after is None:
+                    stuck.append(operator)
+                elif after != state:
+                    state = after
+                    done.append(operator)
+        return state, done, stuck
+
+    def enabling(state: int, stuck: list[int]) -> tuple[int, int, list[int]] | None:
+        lacking = Counter(task.known(operator)[0] & ~state for operator in stuck)
+        best: tuple[tuple[int, int], int, int] | None = None
+        applicable = task.applicable(state)[0]
+        single = [bits for bits, _ in lacking.most_common() if bits.bit_count() == 1]
+        for bits in single[:ENABLING]:
+            other = next((o for o in applicable if set_by(o) & bits), None)
+            after = None if other is None else task.applied(state, other)
+            if other is None or after is None:
+                continue
+            end, done, _ = in_turn(after, stuck)
+            rank = (end & task.goal).bit_count(), len(done)
+            if done and (best is None or rank > best[0]):
+                best = rank, after, other
+        return None if best is None else (best[1], best[2], stuck)
+
     def carried_out(state: int, relaxed_plan: Sequence[int]) -> Path:
         path: list[int] = []
         left = list(relaxed_plan)
         while True:
-            stuck = []
-            for operator in left:
-                if set_by(operator) & ~state:  # else it has nothing left to do
-                    after = task.applied(state, operator)
-                    if after is None:
-                        stuck.append(operator)
-                    elif after != state:
-                        state = after
-                        path.append(operator)
-            if len(stuck) == len(left):
-                instead = replaced(state, stuck)
+            state, done, stuck = in_turn(state, left)
+            path += done
+            if not done:
+                instead = replaced(state, stuck) or enabling(state, stuck)
                 if instead is None:
                     return state, path
                 state, operator, stuck = instead

@@ -97,6 +97,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
         return evaluate
 
     monkeypatch.setattr("planner.grounded.best_first.automatic", slow)
+    monkeypatch.setattr("planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
     monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: (100, 100))
     for module in ("best_first", "plan_windows", "reachability"):
         monkeypatch.setattr(f"planner.grounded.{module}.perf_counter", lambda: float(evaluated))
@@ -210,6 +211,16 @@ def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> 
     again = regrouped(task, plan)
     assert sorted(again) == sorted(plan)
     assert validate(tabletop, Plan(task.steps(again))) == []
+
+
+def test_a_lookahead_drives_back_for_what_is_left() -> None:
+    task = ground(carrier(12))
+    assert isinstance(task, Task)
+    relaxed = (heuristic(task)(task.initial) or (0, [], []))[1]
+    state, path = ahead(task)(task.initial, relaxed)
+    assert state & task.goal == task.goal
+    assert task.carried_out(task.initial, path) == (state, path)
+    assert len(path) <= 4 * 12 + 1  # one at a time, there and back
 
 
 def test_a_lookahead_replaces_what_is_stuck() -> None:
