@@ -1,7 +1,7 @@
 """What experience is worth: transfer to larger worlds of any kind, flat PDDL, harm, and files.
 
     python -m benchmarks memory
-    CONFAB_MEMORY=transfer,harm …     some of: transfer, worlds, pddl, harm, files
+    CONFAB_MEMORY=transfer,harm …     some of: transfer, worlds, curve, pddl, harm, files
     CONFAB_WORLDS=FOLDER …            worlds from elsewhere beside the shipped ones: pairs ``…-small.ttl`` and ``…-large.ttl``
     CONFAB_PDDL=FOLDER …              folders with ``domain.pddl``, ``training…`` and ``testing…``
     CONFAB_ALL=1 …                    every problem of those, not only a few per folder
@@ -24,7 +24,7 @@ from time import process_time
 import confab
 import ontology
 from planner.experience.advice import Memory, plan
-from planner.experience.lessons import rules_in, teach
+from planner.experience.lessons import live, rules_in, teach
 from planner.hierarchical import planner as fast
 from planner.plan import Limits, Outcome
 from planner.validation import validate
@@ -46,6 +46,7 @@ def main() -> None:
     sections: dict[str, Callable[[], None]] = {
         "transfer": transfer,
         "worlds": worlds,
+        "curve": curve,
         "pddl": pddl,
         "harm": harm,
         "files": files,
@@ -134,6 +135,21 @@ def worlds() -> None:
             while experience.episodes.get("lesson", 0) < lessons:
                 teach(experience, scene)
             beside(f"lab, {lessons} lessons", scene, Memory(experience))
+
+
+def curve(world: str = "canal", episodes: int = 3) -> None:
+    """Print how the effort in a large world falls: without memory, after a lesson in a small one, after each own episode."""
+    small, large = (confab.load(f"{world}-{size}").problem for size in ("small", "large"))
+    experience = Experience("lesson")
+    print(f"| {world}-large | steps | expansions of level 1 (all) | s | rules |\n|---|---|---|---|---|")
+    print(f"| without memory | {shown(*measured(lambda: fast.plan(large), large), large)} | – |", flush=True)
+    teach(experience, small)
+    for number in range(episodes):
+        led, seconds = measured(lambda: plan(large, Memory(experience)), large)
+        before = "a lesson in the small world" if not number else f"{number} episode{'s' * (number > 1)} more"
+        print(f"| after {before} | {shown(led, seconds, large)} | {len(rules_in(experience))} |", flush=True)
+        if led.plan is not None:
+            live(experience, large, led.plan)
 
 
 def folders() -> Iterator[tuple[Path, list[Path], list[Path]]]:

@@ -73,7 +73,7 @@ class Memory:
         return any(rule.goal.situation in open_ and rule.does[0] in problem.domain.behaviors for rule in self.rules)
 
     def helps(self, rule: Rule) -> bool:
-        """Whether rules for such goals reached them as often as not; as long as nothing was tried, one is hopeful."""
+        """Whether rules for such goals of a task reached them as often as not; while nothing was tried, one is hopeful."""
         record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
         return record.chosen + 1 >= record.failed
 
@@ -84,7 +84,8 @@ class Memory:
         def score(c: Candidate) -> float:
             return self.judge.told(view, c.rule, c.roles)
 
-        rules = [rule for rule in self.rules if not guarded or self.helps(rule)]
+        upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
+        rules = [rule for rule in self.rules if not guarded or rule.does[0] not in upper or self.helps(rule)]
         return Guide(call, rules, self.orders, score)
 
     def warmed(self, using: Compiled) -> Compiled:

@@ -82,6 +82,8 @@ class Guide:
         self.names: set[str] = set()
         self.broken: dict[str, int] = {}
         self.wasted = 0
+        self.taught: dict[object, tuple[int, int]] = {}
+        """Of each kind of targets how many lessons in a row had nothing new, and how many more are left out."""
         self.before = _before(call.goal, orders, call.program)
         self.add(rules)
 
@@ -222,11 +224,21 @@ class Guide:
     def learn(
         self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
     ) -> bool:
-        """Learn rules at once from steps of a level that search found, done since a mark; whether there are new ones."""
+        """Learn rules at once from steps of a level that search found, done since a mark; whether there are new ones.
+
+        Of what taught nothing new, after each lesson twice as many are left out.
+        """
+        kind = level, frozenset(situation for situation, _ in targets)
+        barren, pause = self.taught.get(kind, (0, 0))
+        if pause:
+            self.taught[kind] = barren, pause - 1
+            return False
         known = len(self.names)
         done = [(step.behavior, step.arguments) for step in steps]
         self.add(course(self.call, mark, targets, keep, done).rules_of())
-        return len(self.names) > known
+        new = len(self.names) > known
+        self.taught[kind] = (0, 0) if new else (barren + 1, 2**barren)
+        return new
 
 
 def by_rules(guide: Guide) -> Iterator[Candidate]:

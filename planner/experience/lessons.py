@@ -161,7 +161,7 @@ def learned(
     course = Course(problem, grounds(steps))
     lesson = Lesson(said=list(course.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
-    for one in refined(Call(problem, using, None, SHORT.expansions), steps, set()):
+    for one in refined(Call(problem, using, None, SHORT.expansions), steps):
         if isinstance(one, Rule):
             lesson.said.append(one)
         else:
@@ -171,8 +171,8 @@ def learned(
     return lesson
 
 
-def refined(call: Call, steps: Iterable[Step], known: set[str]) -> Iterator[Method | Rule]:
-    """Do steps, and yield how each was refined: the method, and the rules of each that isn't known yet."""
+def refined(call: Call, steps: Iterable[Step]) -> Iterator[Method | Rule]:
+    """Do steps, and yield how each was refined: the method, and the rules."""
     for step in steps:
         mark = len(call.table.trail)
         done = call.segments.forward[step.behavior](*step.arguments)
@@ -182,11 +182,9 @@ def refined(call: Call, steps: Iterable[Step], known: set[str]) -> Iterator[Meth
             call.segments.apply(done[1])
             continue
         targets = call.refiner.targets(done[1])
-        yield from refined(call, step.steps, known)
-        method = method_of(call.refiner, step, (*step.arguments, *done[0]))
-        yield method
-        if method.name not in known and len({inner.level for inner in step.steps}) == 1:
-            known.add(method.name)
+        yield from refined(call, step.steps)
+        yield method_of(call.refiner, step, (*step.arguments, *done[0]))
+        if len({inner.level for inner in step.steps}) == 1:
             keep = call.segments.refining(step.level)
             yield from course(call, mark, targets, keep, grounds(step.steps)).rules_of()
 
