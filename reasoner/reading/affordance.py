@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import pyoxigraph as ox
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure
+from reasoner.derivation import strata
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.reading.problem import Reading
 from reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
@@ -77,13 +78,38 @@ class Affordance:
 
 
 def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
-    """Write a state into the graph `SITUATION`, in place of what was there; the initial state if none is given."""
+    """Write a state, the initial one if none is given, with all that follows from it into the graph `SITUATION`."""
     name, properties = ox.NamedNode(SITUATION), value_properties(graph)
     graph.store.clear_graph(name)
-    for number, (symbol, value) in enumerate((state or reading.problem.initial).items()):
+    count = 0
+
+    def write(symbol: Symbol, value: str) -> None:
+        nonlocal count
+        count += 1
         prop = properties.get(reading.names.iri(symbol.situation))
-        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{number}")):
+        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{count}")):
             graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, name))
+
+    for symbol, value in (state or reading.problem.initial).items():
+        write(symbol, value)
+    for symbol in _following(graph, reading) if reading.problem.domain.rules else ():
+        write(symbol, TRUE)
+
+
+def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
+    """Yield what follows from the graph `SITUATION`, which is to have each before the next is asked for, from nothing upwards."""
+    rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
+    for group in strata(rules):
+        seen, grown = set[Symbol](), True
+        while grown:
+            grown = False
+            for rule in (rule for name in group for rule in rules[name]):
+                for bindings in list(writer.rows(rule.behavior)):
+                    symbol = Symbol(rule.situation, tuple(bindings[p.name] for p in rule.parameters))
+                    if symbol not in seen:
+                        seen.add(symbol)
+                        grown = True
+                        yield symbol
 
 
 def applicable_query(

@@ -6,7 +6,7 @@ Each rule is a function from a `Case` to findings, written as (node, what, why, 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -19,7 +19,8 @@ import ontology
 from reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in, terms_of
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
-from reasoner.reading.problem import Reading
+from reasoner.reading.definitions import Definitions
+from reasoner.reading.problem import Node, Reading
 from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,
@@ -454,6 +455,104 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
             )
 
 
+WATCHED_BY_NOBODY = {
+    OWL + "InverseFunctionalProperty": "leads to no two from one",
+    OWL + "AsymmetricProperty": "never leads both ways",
+    OWL + "IrreflexiveProperty": "leads from nothing to itself",
+}
+
+
+def axioms_not_watched(case: Case) -> Iterator[Fault]:
+    """Find what OWL demands of every state, and what it concludes of a class without a definition: planning does neither."""
+    if case.reading is None:
+        return
+    known = case.reading.schema.expressions
+    of = {prop for node in case.reading.schema.nodes.values() for prop in node.get(CORE + "valueProperty", ())}
+    definitions = Definitions(known, dict.fromkeys(of, ("", True)), case.reading.names)
+    inside: dict[object, list[ox.Triple]] = defaultdict(list)
+    for triple in case.triples:
+        inside[triple.subject].append(triple)
+    why = "behaviours change it, and what comes of that isn't checked against this axiom"
+    mend = "say it as a precondition of the behaviours that could break it, or drop the axiom"
+    for triple in case.triples:
+        subject, predicate, value = triple.subject, triple.predicate.value, triple.object
+        named = subject.value if isinstance(subject, ox.NamedNode) else ""
+        other = value.value if isinstance(value, ox.NamedNode) else ""
+        if named in of and predicate == RDF + "type" and other in WATCHED_BY_NOBODY:
+            yield named, f"that {local_name(named)} {WATCHED_BY_NOBODY[other]} isn't watched in a plan", why, mend
+        if named in of and predicate == OWL + "propertyDisjointWith":
+            said = f"that {local_name(named)} and {local_name(other)} never lead to the same isn't watched in a plan"
+            yield named, said, why, mend
+        if predicate != RDFS + "subClassOf":
+            continue
+        if not other and _properties_in(value, inside) & of:
+            yield (
+                named,
+                f"what each {local_name(named)} is said to be in every state isn't watched in a plan",
+                why,
+                mend,
+            )
+        elif not named and other and _properties_in(subject, inside) & of:
+            yield (
+                other,
+                f"an expression is said to be below {local_name(other)}, which planning doesn't conclude from",
+                "a class has whom its definition has, and who is stated",
+                f"define {local_name(other)} by owl:equivalentClass, or conclude it by a SWRL rule",
+            )
+        elif named and other and definitions.changes(named) and other not in _above(case, named):
+            yield (
+                named,
+                f"each {local_name(named)} is said to be a {local_name(other)}, which planning doesn't conclude",
+                "a class has whom its definition has, and who is stated",
+                f"name {local_name(other)} in the definition of {local_name(named)}, or define it as a union with that",
+            )
+
+
+def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -> set[str]:
+    """Return the properties that a class expression speaks of."""
+    found, waiting, seen = set[str](), [node], set[object]()
+    while waiting:
+        if not isinstance(one := waiting.pop(), ox.BlankNode) or one in seen:
+            continue
+        seen.add(one)
+        for triple in inside.get(one, ()):
+            waiting.append(triple.object)
+            if triple.predicate.value == OWL + "onProperty" and isinstance(triple.object, ox.NamedNode):
+                found.add(triple.object.value)
+    return found
+
+
+def _above(case: Case, iri: str) -> set[str]:
+    """Return the classes that a definition names as its parts, with all above these."""
+    assert case.reading is not None
+    schema, found = case.reading.schema, {OWL + "Thing"}
+    waiting = [iri]
+    while waiting:
+        for node in schema.expressions.get(waiting.pop(), {}).get(OWL + "equivalentClass", ()):
+            parts = [node, *_items(schema.expressions, node)]
+            for part in (part for part in parts if ":" in part and part not in found):
+                found.add(part)
+                waiting.append(part)
+    above = list(found)
+    while above:
+        for kind in schema.supers.get(above.pop(), ()):
+            if kind not in found:
+                found.add(kind)
+                above.append(kind)
+    return found
+
+
+def _items(expressions: Mapping[str, Node], node: str) -> Iterator[str]:
+    """Yield the members of an intersection."""
+    cells, seen = list(expressions.get(node, {}).get(OWL + "intersectionOf", ())), set[str]()
+    while cells:
+        cell = cells.pop()
+        if cell in expressions and cell not in seen:
+            seen.add(cell)
+            yield from expressions[cell].get(RDF + "first", ())
+            cells += expressions[cell].get(RDF + "rest", ())
+
+
 def unlike_units(case: Case) -> Iterator[Fault]:
     """Find amounts of different units that are compared, added, or assigned to one another."""
     if case.reading is None:
@@ -518,7 +617,8 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "value-gap": gaps_of_values,
     "crowded": crowded_places,
     "definition-without-effect": definitions_without_effect,
+    "axiom-not-watched": axioms_not_watched,
     "unit-mismatch": unlike_units,
 }
-WARNINGS = frozenset({"crowded"})
+WARNINGS = frozenset({"axiom-not-watched", "crowded"})
 """Rules of what can be planned with all the same."""

@@ -57,3 +57,30 @@ def test_a_fault_is_told_once_with_line_and_mend(
     assert remedy in said.remedy
     assert f":{node} " in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
     assert [f for f in found if f.rule == said.rule] == [said]
+
+
+HEAVY = """:Heavy a owl:Class, owl:NamedIndividual . :FullCart rdfs:subClassOf :Heavy .
+:HEAVY a owl:NamedIndividual, c:SituationType ; c:holdsOf :Heavy . :Cart c:hasSituationType :HEAVY ."""
+CARRYING = "[ a owl:Restriction ; owl:onProperty :carries ; owl:someValuesFrom :Prop ]"
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (HEAVY, "each FullCart is said to be a Heavy, which planning doesn't conclude"),
+        (
+            f"{CARRYING} rdfs:subClassOf :Cart .",
+            "an expression is said to be below Cart, which planning doesn't conclude from",
+        ),
+        (f":Room rdfs:subClassOf {CARRYING} .", "what each Room is said to be in every state isn't watched in a plan"),
+        (":carries a owl:InverseFunctionalProperty .", "that carries leads to no two from one isn't watched in a plan"),
+        (":FullCart rdfs:subClassOf :Where .", ""),
+    ],
+)
+def test_what_owl_demands_of_every_state_is_not_ignored_silently(tmp_path: Path, more: str, said: str) -> None:
+    for one in THEATRE.glob("*.ttl"):
+        text = one.read_text(encoding="utf-8") + (more if one.stem == "theatre" else "")
+        (tmp_path / one.name).write_text(text, encoding="utf-8")
+    found = [f for f in validate([tmp_path / "first-night.ttl"]) if f.rule == "axiom-not-watched"]
+    assert [f.what for f in found] == ([said] if said else [])
+    assert not any(f.serious for f in found)

@@ -7,7 +7,8 @@ import pytest
 
 from planner.paper.transitions import Model, ground
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeGraph, load
+from reasoner.graph.knowledge import KnowledgeGraph, load, text
+from reasoner.names import local_name
 from reasoner.reading.affordance import SITUATION, affordances, applicable_query, write_situation
 from reasoner.reading.problem import Reading, read
 from reasoner.symbols import State, Symbol
@@ -111,3 +112,16 @@ def test_a_class_that_was_added_yesterday_is_quantified_over(tmp_path: Path) -> 
     path.write_text(text + added)
     assert ("bowl1", "B1_WASH", "bowl1") in afforded(path)
     assert read(load(path)).problem.id_of("B1_WASH", ("bowl1",)) == 11
+
+
+def test_what_is_defined_counts_for_what_something_affords() -> None:
+    graph = load("packing-small")
+    reading = read(graph)
+    found = {(one.object, one.behavior) for one in affordances(graph, reading)}
+    assert ("chest", "OPEN") in found
+    assert "casket" not in {name for name, _ in found}  # the chest around it is shut
+    inside = "SELECT ?x ?y WHERE { ?x <https://w3id.org/confab/packing#isInside> ?y }"
+    rows = {
+        tuple(local_name(text(term)) for term in row) for row in graph.select(inside, [SITUATION.rsplit(":", 1)[-1]])
+    }
+    assert rows == {("casket", "chest"), ("casket", "hall"), ("chest", "hall"), ("ring", "hall")}
