@@ -1169,7 +1169,33 @@ def _facts(
         _check_arguments(symbol, domain, "a fact")
     for relation, pairs in numbered.items():
         _check_numbers(relation, pairs, relations.get(relation, ()))
+    asked = _asked(domain)
+    for relation, rows in sorted(relations.items()):
+        many = asked.get(relation) or max(map(len, rows))
+        for row in sorted(rows):
+            if len(row) != many:
+                others = "conditions" if relation in asked else "others"
+                raise KnowledgeError(
+                    f"{relation} of {', '.join(row)} names {len(row)} individuals; {others} name {many}; state what is lacking, "
+                    "or drop what is too much"
+                )
     return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
+
+
+def _asked(domain: Domain) -> dict[str, int]:
+    """Return how many individuals conditions name for each relation without a number."""
+    found: dict[str, int] = {}
+    rules = [rule.behavior for its in domain.rules.values() for rule in its]
+    waiting = [condition for behavior in (*domain.behaviors.values(), *rules) for condition in behavior.conditions]
+    while waiting:
+        match waiting.pop():
+            case RelationCondition(relation, arguments):
+                found[relation] = len(arguments)
+            case Witness(_, _, inner):
+                waiting += inner
+            case AnyOf(alternatives):
+                waiting += chain.from_iterable(alternatives)
+    return found
 
 
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
@@ -1246,7 +1272,7 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
                 raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
             symbol = Symbol(wanted.situation, wanted.arguments)
             _check_arguments(symbol, problem.domain, "a goal")
-            value = FALSE if wanted.negated and wanted.value == TRUE else wanted.value
+            value = _wanted_value(iri, wanted, known)
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
@@ -1254,6 +1280,28 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
                 )
     return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _wanted_value(iri: str, wanted: ValueCondition, known: Frame) -> str:
+    """Return the value that a goal wants; of a negated one, what is left if not this.
+
+    Raises
+    ------
+    KnowledgeError
+        Several values are left.
+    """
+    if not wanted.negated:
+        return wanted.value
+    situation = known.domain.situations[wanted.situation]
+    if situation.boolean:
+        return FALSE if wanted.value == TRUE else TRUE
+    left = [value for value in known.classes.get(situation.range, ()) if value != wanted.value]
+    if len(left) != 1:
+        raise KnowledgeError(
+            f"<{iri}>: the goal says which value {wanted.situation} shall not have, and leaves {_some(left) or 'none'}; name the "
+            "one that it shall have, or want a situation type that is defined"
+        )
+    return left[0]
 
 
 def _wanted(schema: _Schema, iri: str, known: Frame) -> list[Condition]:

@@ -493,8 +493,9 @@ class _Search:
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
     """Return what ends like an individual or class of a part of the scene, in any namespace that is known.
 
-    Each IRI that it can be is looked up by itself: no row is read of anything else. A class counts if it has individuals that
-    aren't nodes of the schema, as in the whole scene.
+    Each IRI that it can be is looked up by itself: no row is read of anything else. As in the whole scene, an individual counts
+    if it has a class (a property that is declared as one has none), and a class if it has individuals that aren't nodes of the
+    schema.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -502,7 +503,8 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     if not candidates:
         return set()
     rows = graph.select(
-        f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {_values(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual }} AS ?named) "
+        f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {_values(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual, ?kind "
+        "FILTER(isIRI(?kind) && !STRSTARTS(STR(?kind), STR(owl:))) } AS ?named) "
         "FILTER(?named || EXISTS { ?member a ?x }) }",
         SCENE,
     )

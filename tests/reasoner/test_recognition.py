@@ -19,6 +19,7 @@ from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
 from reasoner.reading.problem import read, with_goals
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
+from tests.ontology.faults import skeleton
 from tests.reasoner.worlds import HEAD, graph_of, worlds
 
 
@@ -264,3 +265,40 @@ def test_a_class_may_be_called_like_a_part_of_the_model(tmp_path: Path, word: st
     (tmp_path / "scene.ttl").write_text(text, encoding="utf-8")
     graph = load(tmp_path / "scene.ttl")
     assert recognise(graph).problem.classes[word] == read(graph).problem.classes[word] == ("cup1",)
+
+
+def test_an_individual_may_be_called_like_a_property(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    scene.write_text(scene.read_text(encoding="utf-8").replace(":plate1", ":isAt"), encoding="utf-8")
+    whole, part = read(load(scene)), recognise(load(scene))
+    assert whole.problem.goal == part.problem.goal
+    assert "isAt" in whole.names
+
+
+@pytest.mark.parametrize(
+    ("excluded", "wanted"), [("d:CLEANLINESS ; c:value d:clean", "dirty"), ("d:PLACE ; c:value :table", "")]
+)
+def test_a_goal_that_excludes_a_value_wants_the_one_that_is_left(tmp_path: Path, excluded: str, wanted: str) -> None:
+    scene = skeleton(tmp_path)
+    text = scene.read_text(encoding="utf-8")
+    assert excluded in text
+    scene.write_text(text.replace(excluded, excluded + " ; c:negated true"), encoding="utf-8")
+    if wanted:
+        assert wanted in read(load(scene)).problem.goal.values()
+    else:
+        with pytest.raises(KnowledgeError, match="shall not have, and leaves"):
+            read(load(scene))
+
+
+def test_a_tuple_that_lacks_an_individual_is_refused(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    with scene.open("a", encoding="utf-8") as file:
+        for number, places in enumerate(("table :shelf :sink", "table :shelf")):
+            roles = " ; ".join(
+                f"{role} :{place.strip(':')}"
+                for role, place in zip(("c:about", "c:argument2", "c:argument3"), places.split(), strict=False)
+            )
+            file.write(f":n{number} a owl:NamedIndividual, c:SituatedObjectInstance ; c:relation :near ; {roles} .\n")
+        file.write(":near a owl:NamedIndividual, c:Relation .\n")
+    with pytest.raises(KnowledgeError, match="names 2 individuals; others name 3"):
+        read(load(scene))
