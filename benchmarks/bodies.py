@@ -114,8 +114,9 @@ def row(name: str, noise: int, rollout: Rollout) -> dict[str, Any]:
 
 def code() -> str:
     """Return what tells the code and bodies that are committed from others: git's names of their contents."""
-    command = ["git", "rev-parse", "--short", *(f"HEAD:{path}" for path in MEASURED)]
-    return "-".join(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
+    command = ["git", "rev-parse", *(f"HEAD:{path}" for path in MEASURED)]
+    found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+    return "-".join(name[:7] for name in found)
 
 
 def kept() -> list[dict[str, Any]]:

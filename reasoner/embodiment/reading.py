@@ -90,7 +90,7 @@ def _places(facts: Facts) -> list[str]:
 
 def _place(facts: Facts, node: str, names: Callable[[str], str]) -> Place:
     carriers = facts.linked(node, "carried_by")
-    return Place(names(node), facts.position(node), names(carriers[0]) if carriers else "")
+    return Place(names(node), facts.position(node, "0" if carriers else None), names(carriers[0]) if carriers else "")
 
 
 def _shaped(facts: Facts) -> list[tuple[str, str]]:

@@ -172,6 +172,7 @@ def test_the_lever_of_the_authoring_guide_is_turned_and_turned_back(tmp_path: Pa
     file.write_text(
         f"{head}<https://example.org/wall> a owl:Ontology ; owl:imports {imports} .\n{block}", encoding="utf-8"
     )
+    assert list(confab.validate(file)) == []
     embodiment = confab.load(str(file)).embodiment
     skills, roles = by_skill(embodiment), {"hand": "left_hand", "object": "lever"}
     with World(embodiment, {}, seed=2, perturb=Perturbation()) as world:
