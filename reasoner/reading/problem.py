@@ -962,6 +962,11 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
                     "make its value property not functional"
                 )
         rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
+        if said and len(kinds) != 1:
+            raise KnowledgeError(
+                f"<{iri}> holds of what is in a class, so that it is about one individual, and {len(kinds)} are said; "
+                "say by :hasSituationType which class has it"
+            )
         for kind in said:
             head = (Parameter("?it", kinds[0]),)
             rules.append(Rule(name, head, (), parts.definitions.holding("?it", kind)))
