@@ -13,7 +13,6 @@ from __future__ import annotations
 import os
 import random
 import tempfile
-from contextlib import suppress
 from pathlib import Path
 
 from reasoner.memory.experience import Experience
@@ -78,7 +77,7 @@ def episode(folder: Path, robot: int, number: int | None, peers: list[int]) -> N
         teach(memory, problem(FAMILIES[(robot + number) % len(FAMILIES)], 4, robot))
         save(own, memory, Names(()), SCENE)
     for peer in peers:
-        with suppress(FileNotFoundError):
+        if _file(folder, peer).exists():  # else it was killed before it had learned anything
             memory.merge(load(_file(folder, peer), Names(())))
     save(own, memory, Names(()), SCENE)
 
