@@ -59,6 +59,9 @@ SLACK = 0.1
 GROPING = 120
 """Steps after which a hand that has met a handle with one finger only takes hold anew."""
 
+NARROW = 0.02
+"""Metres by which each finger opens at a handle with little room beside it."""
+
 LOOKING = 6
 """Steps between looks at what the fingers feel."""
 
@@ -370,6 +373,12 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
             )
         closed = closed and one.fingers != "open"
         poses = stages[-1].poses
+    try:
+        return stages[0].poses, way, run.attempt.choose(stages, run.things(), run.spread)
+    except SkillError:
+        if run.numbers.get("spread", 0.0) <= NARROW:
+            raise
+    run.numbers = {**run.numbers, "spread": NARROW}
     return stages[0].poses, way, run.attempt.choose(stages, run.things(), run.spread)
 
 

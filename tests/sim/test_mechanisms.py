@@ -119,6 +119,15 @@ def test_a_handle_that_one_finger_closes_beside_is_taken_anew_where_the_other_me
         assert world.observe()[Symbol("OPENED", ("drawer",))] == "true"
 
 
+def test_fingers_open_less_at_a_handle_with_little_room_beside_it() -> None:
+    scene = kitchen()
+    roles = {"hand": "left_hand", "object": "door"}
+    with World(scene.embodiment, scene.problem.initial, 7013, Perturbation(), beads=False, noise=0.008) as world:
+        for skill in ("operate", "operate_back"):
+            perform(world, by_skill(scene.embodiment)[skill], roles)
+        assert world.observe()[Symbol("OPENED", ("door",))] == "false"
+
+
 def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
     scene = kitchen()
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:
