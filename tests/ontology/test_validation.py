@@ -50,6 +50,34 @@ def test_a_seeded_fault_is_caught(fault: Fault, tmp_path: Path) -> None:
         assert Path(finding.file).parent in (tmp_path, ontology.ROOT)
 
 
+OUTSIDE = {"variable-outside-range", "relation-outside-domain", "relation-outside-range"}
+
+
+@pytest.mark.parametrize(
+    ("shared", "rules"),
+    [
+        ("", OUTSIDE),
+        (":Crate a owl:Class ; rdfs:subClassOf :Item, :Place .", set()),
+        (":crate a owl:NamedIndividual, :Item, :Sink .", set()),
+        (":crate a owl:NamedIndividual, :Item ; c:index 1 . :box a owl:NamedIndividual, :Place ; c:index 2 .", OUTSIDE),
+    ],
+    ids=["nothing", "a class", "an individual", "one individual each"],
+)
+def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wanted(
+    shared: str, rules: set[str], tmp_path: Path
+) -> None:
+    scene = skeleton(tmp_path)
+    domain = tmp_path / "washing.ttl"
+    near = """
+    :near a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; rdfs:range :Place .
+    :B1_WASH c:precondition :B1_WASH.near .
+    :B1_WASH.near a owl:NamedIndividual, c:RelationCondition ; c:relation :near ; c:about :B1_WASH.where ; c:value :B1_WASH.where .
+    """
+    text = domain.read_text(encoding="utf-8").replace("c:Variable ; c:termType :Place", "c:Variable ; c:termType :Item")
+    domain.write_text(text + near + shared, encoding="utf-8")
+    assert {finding.rule for finding in validate([scene])} & OUTSIDE == rules
+
+
 def test_every_rule_was_seen_failing_once() -> None:
     shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
     rules = {check.rule for check in checks()} | set(RULES) | shapes
