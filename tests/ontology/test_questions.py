@@ -65,6 +65,20 @@ def test_without_what_it_asks_for_the_answer_is_another_one(question: Question) 
     assert answer(graph, question) != question.rows
 
 
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("canteen-small", [*(f"cup{i} | DRINK | tea | no" for i in (1, 2, 3)), "jug1 | SERVINGS | >=0.5 | yes"]),
+        ("assembly-small", ["cover | JOINED | housing | no", "shaft | JOINED | housing | no"]),
+        ("packing-small", ["ring | INSIDE | casket | ", "ring | STORED_AWAY | true | "]),
+    ],
+    ids=["amounts and defaults", "pairs", "defined"],
+)
+def test_each_goal_is_listed_whatever_its_situation_is_at_first(name: str, rows: list[str]) -> None:
+    wanted = next(question for question in QUESTIONS if question.name == "what-is-wanted")
+    assert answer(scene(name), wanted) == rows
+
+
 if __name__ == "__main__":
     for asked in QUESTIONS:
         print(asked.name, *(f"# Row: {row}" for row in answer(scene(asked.scene), asked)), sep="\n")
