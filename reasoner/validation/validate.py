@@ -50,6 +50,8 @@ CONSEQUENCES = {
     "object-without-shape",
     "relation-outside-domain",
     "relation-outside-range",
+    "pair-outside-class",
+    "tuple-outside-class",
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
 NEEDS_ALL_BEHAVIORS = {"level-gap", "rest-value-out-of-reach"}
