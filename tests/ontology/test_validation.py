@@ -78,6 +78,25 @@ def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wante
     assert {finding.rule for finding in validate([scene])} & OUTSIDE == rules
 
 
+@pytest.mark.parametrize(
+    ("title", "node", "remedy"),
+    [
+        ("true as a text where the individual is wanted", "task.clean", "write c:true"),
+        ("a text where an individual is wanted", "plate2", "name an individual"),
+        ("an amount of at least more than at most", "WEIGHT", "mend :leastAmount or :mostAmount"),
+    ],
+)
+def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remedy: str, tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.title == title)
+    (finding,) = (
+        finding
+        for finding in found(fault, tmp_path)
+        if finding.rule in (fault.rule, "goal-names-nothing", "unreadable")
+    )
+    assert finding.node.endswith(f"#{node}")
+    assert finding.remedy.startswith(remedy)
+
+
 def test_every_rule_was_seen_failing_once() -> None:
     shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
     rules = {check.rule for check in checks()} | set(RULES) | shapes
