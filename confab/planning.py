@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from confab.accepting import Facts, number, several
 from confab.interchange import outcome_json
 from confab.known import Known
-from planner.plan import Limits, Outcome, Plan, Status, paused_collection, renumbered
+from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
 from planner.solve import DEFAULT_MODE, MODES, Request, solve
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
@@ -166,7 +165,7 @@ def _plan(
         outcome = solve(Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels))
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
-        return _by_any_engine(problem, deadline) or outcome
+        return _then_by_an_engine(problem, deadline, outcome)
 
     outcome = search(problem)
     if outcome.status is Status.UNSOLVABLE and mode != "paper" and not observed:
@@ -181,14 +180,23 @@ def _plan(
     return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries)
 
 
-def _by_any_engine(problem: Problem, deadline: Deadline) -> Outcome | None:
-    """Return the plan of whichever engine is installed, or None: none is, or none takes such a problem, or none solves it."""
-    from confab.engines import plan_by_engine
+def _then_by_an_engine(problem: Problem, deadline: Deadline, ours: Outcome) -> Outcome:
+    """Return the plan of whichever engine is installed; where there is none, what ours said and what became of the engine."""
+    from confab.engines import plan_by_engine, some_installed
 
-    with suppress(KnowledgeError):
-        outcome = plan_by_engine(problem, None, None, deadline.left)
-        return outcome if outcome.status is Status.SOLVED else None
-    return None
+    if not some_installed():
+        return ours
+    begin = perf_counter()
+    try:
+        theirs = plan_by_engine(problem, None, None, deadline.left)
+    except KnowledgeError as error:
+        said = str(error)
+    else:
+        if theirs.status is Status.SOLVED:
+            return replace(theirs, seconds=ours.seconds + perf_counter() - begin)
+        said = theirs.reason.text if theirs.reason else "it found no plan"
+    reason = Reason(f"{ours.reason.text if ours.reason else 'gave up'}; an installed engine was asked then: {said}")
+    return replace(ours, reason=reason, seconds=ours.seconds + perf_counter() - begin)
 
 
 def _check_goal(scene: Known, problem: Problem) -> None:
