@@ -105,7 +105,9 @@ def _plan(
     try:
         levels = call.program.levels if leave_levels else call.program.levels[:1]
         recovery = Recovery(call, levels)
+        call.segments.doubt = recovery.doubt
         if call.serialise(recovery.harder) or recovery.anew(levels):
+            recovery.solvable = True
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
                     shorten(call, improve, leave_levels, advised)

@@ -9,18 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
-from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, proved
+from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, looked_at, proved
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell
 from reasoner.symbols import State
 
+if TYPE_CHECKING:
+    from planner.grounded.task import Task
+
 ALL = (WHOLE,)
 """All goals at once in the whole world."""
+FEW = 1_000
+"""So many states of the lowest level, at least, are worth looking at."""
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
 Done = TypeVar("Done")
@@ -48,11 +53,16 @@ class Recovery:
     attempts: int | None = None
     solvable: bool = False
     forward: bool = False
-    too_large: Reason | None = None
     _doubted: bool = False
-    _proved: bool = False
+    _lowest: Task | Reason | None = None
+    _looked: int = 0
     _finished: int = 0
     _tried: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def too_large(self) -> Reason | None:
+        """Why the lowest level is too large to be grounded, if it is and that was asked."""
+        return self._lowest if isinstance(self._lowest, Reason) else None
 
     @cached_property
     def ladder(self) -> list[tuple[int, Attempt]]:
@@ -89,6 +99,8 @@ class Recovery:
             if attempt is ALL:
                 if self.together(level):
                     return True
+                if not self.solvable:
+                    self._prove()
                 continue
             for cell in candidates():
                 if (level, attempt) in call.failed.get(cell, ()):
@@ -118,11 +130,18 @@ class Recovery:
             if reason:
                 raise UnsolvableError(reason)
 
+    def doubt(self) -> None:
+        """Raise `UnsolvableError` if there is no plan and the lowest level is so small that looking at its states is no work."""
+        call = self.call
+        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.segments.worked:
+            self._prove()
+
     def _prove(self) -> None:
         """Raise `UnsolvableError` if it can be shown on the lowest level that there is no plan."""
-        if not self._proved:
-            self._proved = True
-            self.too_large = proved(self.call.problem, self.call.segments)
+        if self._lowest is None:
+            self._lowest = proved(self.call.problem, self.call.segments)
+        if not isinstance(self._lowest, Reason):
+            self._looked = looked_at(self._lowest, self.call.segments, self._looked)
 
     def finish(self) -> bool:
         """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""

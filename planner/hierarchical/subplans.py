@@ -42,6 +42,10 @@ Keep: TypeAlias = "Callable[[Cell, str], str | None]"
 """Says what a touched symbol must be in the end, given what it was in the beginning; None: whatever it came to be."""
 
 
+def trusting() -> None:
+    """Doubt nothing."""
+
+
 def nobody(level: int | None) -> None:
     """Watch nothing."""
 
@@ -65,6 +69,8 @@ class Segments:
         The task's goal, which proposes values.
     deadline : float, optional
         `perf_counter` at which `LimitError` is raised.
+    doubt : function, optional
+        Called whenever that work has doubled: it may be in vain.
     watch : Watch, optional
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
@@ -79,10 +85,11 @@ class Segments:
     most: int = 200_000
     most_work: float = math.inf
     watch: Watch = nobody
+    doubt: Callable[[], None] = trusting
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.expanded = self.worked = 0
+        self.expanded = self.worked = self.doubted = 0
         self.tidy: frozenset[Cell] = frozenset()
         """What refinements leave as it was, though it might be anything in the end."""
         bound = self.program.bind(self.table)
@@ -220,6 +227,9 @@ class Segments:
         self.worked += work
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
+        if self.worked > self.doubted:
+            self.doubted = 2 * self.worked
+            self.doubt()
         if self.worked > self.most_work:
             raise LimitError(f"{self.most_work:.0f} states times operators")
         self.check_time()

@@ -29,9 +29,11 @@ from reasoner.symbols import (
 
 if TYPE_CHECKING:
     from planner.grounded.reachability import Reached
+    from planner.grounded.task import Task
 
-FEW_OPERATORS, FEW_STATES = 300, 6_000
-"""The smallest problems, of which every state is looked at."""
+LOOKING, LEAST = 1_800_000, 300
+"""The work of looking at all states, in states times operators, that no search has to come before; a state takes at least as long
+as so many operators."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
@@ -231,13 +233,12 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
     return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
 
 
-def proved(problem: Problem, segments: Segments) -> Reason | None:
+def proved(problem: Problem, segments: Segments) -> Task | Reason:
     """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
 
-    Of the smallest problems every state is looked at. Returned is why the level is too large for a proof, if it is.
+    Else that level is returned, grounded, or why it is too large for that.
     """
     from planner.grounded.grounding import ground
-    from planner.grounded.shortest import shortest
     from planner.grounded.unreachable import unreachable
 
     level, deadline = segments.program.levels[-1], segments.deadline
@@ -255,10 +256,22 @@ def proved(problem: Problem, segments: Segments) -> Reason | None:
         return Reason(f"level {level} is too large to be grounded: {error}")
     if isinstance(task, Reason):
         raise UnsolvableError(task)
-    if len(task) <= FEW_OPERATORS:
-        most = FEW_STATES // (1 + len(task.derived.parts) // 10)  # a state costs what follows from it, too
-        found = shortest(task, most=most, deadline=deadline)
-        if found.plan is None and found.bound == math.inf:
-            text = f"all {found.states} states of level {level} that can be reached were looked at"
-            raise UnsolvableError(Reason(text))
-    return None
+    return task
+
+
+def looked_at(task: Task, segments: Segments, before: int) -> int:
+    """Raise `UnsolvableError` if none of all states that can be reached fulfils the goal; return how many were looked at.
+
+    That may cost as much as the searches have up to now. Nothing is done if these aren't twice as many as were looked at `before`.
+    """
+    from planner.grounded.shortest import shortest
+
+    state = max(len(task), LEAST) * (1 + len(task.derived.parts) // 10)  # what follows from it costs, too
+    most = max(LOOKING, segments.worked) // state
+    if most < 2 * before:
+        return before
+    found = shortest(task, most=most, deadline=segments.deadline)
+    if found.plan is None and found.bound == math.inf:
+        text = f"all {found.states} states of level {task.level} that can be reached were looked at"
+        raise UnsolvableError(Reason(text))
+    return most

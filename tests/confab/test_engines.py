@@ -83,7 +83,9 @@ def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.Mon
     assert result.solved and result.json()["engine"] == "any"
     assert scene.plan(engine="none").outcome is gave_up
     monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
-    assert scene.plan().outcome is gave_up
+    outcome = scene.plan().outcome
+    assert outcome.status is Status.GAVE_UP
+    assert outcome.reason == Reason("the limit came first; an installed engine was asked then: e: timeout")
 
 
 @pytest.mark.parametrize(

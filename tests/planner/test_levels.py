@@ -6,12 +6,18 @@ from dataclasses import replace
 import pytest
 
 from planner.grounded.best_first import plan_level
+from planner.grounded.grounding import ground
+from planner.grounded.task import Task
+from planner.hierarchical.planner import Call, compiled
 from planner.hierarchical.planner import plan as default
+from planner.hierarchical.unsolvability import LEAST, looked_at
 from planner.levels import levels_left
 from planner.paper.hierarchy import plan as paper
-from planner.plan import Outcome, Plan, Status
+from planner.plan import Outcome, Plan, Status, UnsolvableError
 from planner.solve import Request, solve
 from planner.validation import successor, validate
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
 from reasoner.symbols import FALSE, Problem, Symbol
 from tests.planner import naive
 from tests.planner.small import CASES, Case
@@ -165,3 +171,23 @@ def test_steps_of_the_level_below_that_the_level_above_could_have_done_break_not
         assert [left.broken for left in levels_left(problem, below)] == [()] * bool(below.steps), seed
         compared += 1
     assert compared > 20
+
+
+def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
+    lamps = " ".join(f"lamp{i}" for i in range(13))
+    problem = imported(
+        parse(
+            """(define (domain lamps) (:requirements :typing) (:types lamp) (:predicates (on ?x - lamp) (odd) (even))
+             (:action light :parameters (?x - lamp) :precondition (even) :effect (and (on ?x) (odd) (not (even))))
+             (:action dim :parameters (?x - lamp) :precondition (odd) :effect (and (not (on ?x)) (even) (not (odd)))))""",
+            f"(define (problem p) (:domain lamps) (:objects {lamps} - lamp) (:init (even)) (:goal (and (odd) (even))))",
+        )
+    ).problem
+    task = ground(problem)
+    assert isinstance(task, Task)
+    segments = Call(problem, compiled(problem), None, 1).segments
+    most = looked_at(task, segments, 0)
+    assert looked_at(task, segments, most) == most  # what was done isn't done again for fewer than twice as many
+    segments.worked = 20_000 * LEAST
+    with pytest.raises(UnsolvableError, match="states of level 1 that can be reached were looked at"):
+        looked_at(task, segments, most)
