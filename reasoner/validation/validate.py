@@ -54,7 +54,7 @@ CONSEQUENCES = {
     "tuple-outside-class",
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
-NEEDS_ALL_BEHAVIORS = {"level-gap", "rest-value-out-of-reach"}
+NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
 """What isn't said as long as the update of some behaviour can't be read."""
 
 STAGES = 4

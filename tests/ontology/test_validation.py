@@ -97,6 +97,15 @@ def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remed
     assert finding.remedy.startswith(remedy)
 
 
+def test_what_is_said_to_exist_further_down_is_not_remarked_on(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "changed-below-only")
+    assert {finding.severity for finding in found(fault, tmp_path) if finding.rule == fault.rule} == {"remark"}
+    domain = tmp_path / "washing.ttl"
+    text = domain.read_text(encoding="utf-8").replace("c:defaultValue :dull", "c:defaultValue :dull ; c:fromLevel 2")
+    domain.write_text(text, encoding="utf-8")
+    assert fault.rule not in {finding.rule for finding in validate([tmp_path / "washing-scene.ttl"])}
+
+
 def test_every_rule_was_seen_failing_once() -> None:
     shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
     rules = {check.rule for check in checks()} | set(RULES) | shapes
