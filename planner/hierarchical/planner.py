@@ -164,13 +164,15 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     best = call.steps
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
+    left = max(call.segments.worked, MUCH)  # for both together
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
-        other.segments.most_work = max(call.segments.worked / 2, MUCH)
+        other.segments.most_work = left
         advised(other)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
             done = recovery.together(first) if at_once else other.serialise(recovery.harder)
             if done and length(other.steps) < length(best):
                 best = other.steps
+        left = max(left - other.segments.worked, 0)
     return best
