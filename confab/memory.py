@@ -287,16 +287,23 @@ class Memory:
             rows.append((record, text, f"{t.chosen}", f"{t.passed_over}", f"{t.failed}"))
         return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
 
-    def page(self, most: int | None = None) -> str:
-        """Return the advice as a page: the rules for each kind of goal, then the orders of goals and the methods."""
-        lines, last = [self.said()], None
-        for record, rule, chosen, passed, failed in list(self.advice(most)):
-            if record != last:
-                lines += ["", f"{record}:"]
-                last = record
+    def told(self, most: int | None = None) -> list[tuple[str, list[str]]]:
+        """Return the rules as sentences with how often, by kind of goal."""
+        found: list[tuple[str, list[str]]] = []
+        for row in self.advice(most):
+            record, rule, chosen, passed, failed = map(str, row)
+            if not found or found[-1][0] != record:
+                found.append((record, []))
             counts = (("chosen", chosen), ("passed over", passed), ("failed", failed))
             said = ", ".join(f"{what} {times} time{'s' * (times != '1')}" for what, times in counts if times != "0")
-            lines.append(f"  – {rule}.{' ' + said.capitalize() + '.' if said else ''}")
+            found[-1][1].append(f"{rule}.{' ' + said.capitalize() + '.' if said else ''}")
+        return found
+
+    def page(self, most: int | None = None) -> str:
+        """Return the advice as a page: the rules for each kind of goal, then the orders of goals and the methods."""
+        lines = [self.said()]
+        for record, rules in self.told(most):
+            lines += ["", f"{record}:", *(f"  – {rule}" for rule in rules)]
         others = self.also()[:most]
         return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
 

@@ -298,12 +298,11 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
 def _learned(memory: Memory | None) -> Markup | None:
     if memory is None:
         return None
-    advice = memory.advice(LEARNED)
-    return joined(
-        tag("h2", "What was learned"),
-        tag("p", memory.said()),
-        table(list(advice.columns), list(advice)) if len(advice) else None,
-    )
+    rules = [
+        joined(tag("h3", goals), tag("ul", joined(*(tag("li", rule) for rule in its))))
+        for goals, its in memory.told(LEARNED)
+    ]
+    return joined(tag("h2", "What was learned"), tag("p", memory.said()), *rules)
 
 
 def _again(scene: Known, report: Report | None, execution: Executed | None) -> str:

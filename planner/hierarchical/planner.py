@@ -106,7 +106,7 @@ def _plan(
         levels = call.program.levels if leave_levels else call.program.levels[:1]
         recovery = Recovery(call, levels)
         call.segments.doubt = recovery.doubt
-        if call.serialise(recovery.harder) or recovery.anew(levels):
+        if call.serialise(recovery.harder) or (recovery.anew(levels) and call.serialise(recovery.harder)):
             recovery.solvable = True
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
@@ -172,6 +172,8 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
             done = recovery.together(first) if at_once else other.serialise(recovery.harder)
+            if at_once and done and not all(map(other.met, other.goal)):  # what the first level doesn't see
+                done = recovery.finish() and all(map(other.met, other.goal))
             if done and length(other.steps) < length(best):
                 best = other.steps
         left = max(left - other.segments.worked, 0)

@@ -191,3 +191,10 @@ def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
     segments.worked = 20_000 * LEAST
     with pytest.raises(UnsolvableError, match="states of level 1 that can be reached were looked at"):
         looked_at(task, segments, most)
+
+
+def test_a_shorter_order_brings_about_what_the_first_level_does_not_see_too() -> None:
+    problem = hierarchy(4_000_382)  # where the robot shall be in the end, level 1 doesn't know
+    outcome = default(problem)
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
