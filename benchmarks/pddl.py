@@ -347,7 +347,8 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
         part.write_text("".join(f"({line})\n" for line in steps if line))
         part.replace(target)
 
-    found = search(task, Limits(expansions=10**9), evaluate=None if fast else heuristic(task), found=write)
+    evaluate = None if fast or task.amounts is not None else heuristic(task)  # which knows no amounts
+    found = search(task, Limits(expansions=10**9), evaluate=evaluate, found=write)
     print(found.status, found.counts)
     if found.status is Status.SOLVED:
         write(found.plan)
