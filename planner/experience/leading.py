@@ -134,8 +134,9 @@ class Guide:
                 if ways and rule.steps < rank:
                     rank, found = rule.steps, []
                 found += ways
-        if self.score is not None and len(found) > 1:
-            found.sort(key=lambda c: -self.score(c))  # type: ignore[misc]
+        score = self.score
+        if score is not None and len(found) > 1:
+            found.sort(key=score, reverse=True)
         return found
 
     def ready(self) -> bool:

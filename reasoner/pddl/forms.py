@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
 
@@ -30,6 +31,10 @@ class NumericEffect:
     amount: Word | Form
     when: tuple[Form, ...] = ()
     variables: tuple[Typed, ...] = ()
+
+
+Change: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
+"""What is changed, with its conditions and the variables that it is made for."""
 
 
 def typed_in(form: Form) -> list[Typed]:
@@ -75,40 +80,40 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
         yield form
 
 
-def effects_of(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Effect]:
+def effects_of(form: Form | None) -> Iterator[Effect]:
     """Yield the effects that make atoms true or false."""
+    for change, when, variables in _changes(form):
+        if change.head == "not":
+            negated = change.items[1]
+            assert isinstance(negated, Form)
+            yield Effect(words_of(negated), False, when, variables)
+        elif change.head not in CHANGES:
+            yield Effect(words_of(change), True, when, variables)
+
+
+def numeric_of(form: Form | None) -> Iterator[NumericEffect]:
+    """Yield the effects on functions."""
+    for change, when, variables in _changes(form):
+        if change.head in CHANGES:
+            function = change.items[1]
+            assert isinstance(function, Form)
+            yield NumericEffect(change.head, function, change.items[2], when, variables)
+
+
+def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()) -> Iterator[Change]:
+    """Yield the single changes of an effect, each with its conditions and the variables that it is made for."""
     if form is None or not form.items:
         return
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head == "and":
         for item in rest:
-            yield from effects_of(item, when, variables)
+            yield from _changes(item, when, variables)
     elif form.head == "when":
-        yield from effects_of(rest[1], (*when, rest[0]), variables)
+        yield from _changes(rest[1], (*when, rest[0]), variables)
     elif form.head == "forall":
-        yield from effects_of(rest[1], when, (*variables, *typed_in(rest[0])))
-    elif form.head == "not":
-        yield Effect(words_of(rest[0]), False, when, variables)
-    elif form.head not in CHANGES:
-        yield Effect(words_of(form), True, when, variables)
-
-
-def numeric_of(
-    form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Typed, ...] = ()
-) -> Iterator[NumericEffect]:
-    """Yield the effects on functions."""
-    rest = [] if form is None else [item for item in form.items[1:] if isinstance(item, Form)]
-    if form is None or form.head in ("", "not"):
-        return
-    if form.head == "and":
-        for item in rest:
-            yield from numeric_of(item, when, variables)
-    elif form.head == "when":
-        yield from numeric_of(rest[1], (*when, rest[0]), variables)
-    elif form.head == "forall":
-        yield from numeric_of(rest[1], when, (*variables, *typed_in(rest[0])))
-    elif form.head in CHANGES:
-        yield NumericEffect(form.head, rest[0], form.items[2], when, variables)
+        yield from _changes(rest[1], when, (*variables, *typed_in(rest[0])))
+    else:
+        yield form, when, variables
 
 
 def functions_read(form: Form | None) -> Iterator[str]:
