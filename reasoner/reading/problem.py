@@ -355,7 +355,7 @@ def frame(
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
     for rule in chain.from_iterable(rules.values()):
-        _check_behavior(rule.behavior, domain)
+        _check_behavior(replace(rule.behavior, level=domain.situations[rule.situation].level), domain)
     return Frame(schema, parts, domain, classes, parents, properties, lifted)
 
 

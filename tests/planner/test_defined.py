@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -16,6 +17,8 @@ from planner.plan import Limits, Status
 from planner.solve import Request, solve
 from planner.transitions import Table, key_of
 from planner.validation import Facts
+from reasoner.graph.knowledge import load
+from reasoner.reading.problem import read
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -29,6 +32,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
+from reasoner.validation.validate import validate
 from tests.planner import naive
 from worlds.language import DEFINED, language
 
@@ -160,3 +164,50 @@ def test_a_chain_of_a_thousand_is_followed_to_its_end_by_all() -> None:
     for pair_, held in (((boxes[0], boxes[-1]), TRUE), ((boxes[-1], boxes[0]), FALSE)):
         assert table.now["INSIDE"].get(pair_) == held
         assert facts_.value("INSIDE", pair_) == held
+
+
+CRANE = """@prefix : <https://example.org/crane#> . @prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/crane> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Crane a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :CRANE_AT, :WORKS_IN, :DONE .
+:Bay a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :CRANE_AT .
+:Zone a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :WORKS_IN .
+:CRANE_AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :craneAt ; c:fromLevel 2 .
+:craneAt a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual .
+:inZone a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Bay ; rdfs:range :Zone .
+:WORKS_IN a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :worksIn .
+:worksIn a owl:ObjectProperty, owl:NamedIndividual .
+:DONE a owl:NamedIndividual, c:SituationType .
+:L1_WORK a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''INSERT { ?crane :DONE true }
+  WHERE { ?crane a :Crane FILTER NOT EXISTS { ?crane :DONE true } }''' .
+:L2_ROLL a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ;
+  c:update "INSERT { ?crane :craneAt ?bay } WHERE { ?crane a :Crane . ?bay a :Bay }" .
+:L2_WORK a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ;
+  c:update "INSERT { ?crane :DONE true } WHERE { ?crane a :Crane ; :worksIn :west }" .
+:west a owl:NamedIndividual, :Zone ; c:index 1 . :east a owl:NamedIndividual, :Zone ; c:index 2 .
+:bay1 a owl:NamedIndividual, :Bay ; c:index 3 ; :inZone :west .
+:bay2 a owl:NamedIndividual, :Bay ; c:index 4 ; :inZone :east .
+:crane1 a owl:NamedIndividual, :Crane ; c:index 5 ; :craneAt :bay2 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :west :east :bay1 :bay2 :crane1 ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.done .
+:task.done a owl:NamedIndividual, c:ValueCondition ; c:about :crane1 ; c:situationType :DONE .
+"""
+BY_CHAIN = ":worksIn owl:propertyChainAxiom ( :craneAt :inZone ) ."
+BY_RULE = """:rule a owl:NamedIndividual, c:Rule ; c:situationType :WORKS_IN ; c:about :crane ; c:value :zone ; c:condition :at, :in .
+:crane a owl:NamedIndividual, c:Variable ; c:termType :Crane . :bay a owl:NamedIndividual, c:Variable ; c:termType :Bay .
+:zone a owl:NamedIndividual, c:Variable ; c:termType :Zone .
+:at a owl:NamedIndividual, c:ValueCondition ; c:about :crane ; c:situationType :CRANE_AT ; c:value :bay .
+:in a owl:NamedIndividual, c:RelationCondition ; c:about :bay ; c:relation :inZone ; c:value :zone ."""
+
+
+@pytest.mark.parametrize("definition", [BY_CHAIN, BY_RULE])
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_what_is_defined_by_a_lower_level_exists_from_there_on(tmp_path: Path, definition: str, mode: str) -> None:
+    path = tmp_path / "crane.ttl"
+    path.write_text(CRANE + definition)
+    problem = read(load(path)).problem
+    assert problem.domain.situations["WORKS_IN"].level == 2
+    outcome = solve(Request(problem, mode))
+    assert outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.primitives] == ["L2_ROLL", "L2_WORK"]
+    assert not [finding for finding in validate([path]) if finding.serious]
