@@ -193,7 +193,8 @@ CRANE = """@prefix : <https://example.org/crane#> . @prefix c: <https://w3id.org
 :task.done a owl:NamedIndividual, c:ValueCondition ; c:about :crane1 ; c:situationType :DONE .
 """
 BY_CHAIN = ":worksIn owl:propertyChainAxiom ( :craneAt :inZone ) ."
-BY_RULE = """:rule a owl:NamedIndividual, c:Rule ; c:situationType :WORKS_IN ; c:about :crane ; c:value :zone ; c:condition :at, :in .
+BY_RULE = """:rule a owl:NamedIndividual, c:Rule ; c:situationType :WORKS_IN ;
+  c:about :crane ; c:value :zone ; c:condition :at, :in .
 :crane a owl:NamedIndividual, c:Variable ; c:termType :Crane . :bay a owl:NamedIndividual, c:Variable ; c:termType :Bay .
 :zone a owl:NamedIndividual, c:Variable ; c:termType :Zone .
 :at a owl:NamedIndividual, c:ValueCondition ; c:about :crane ; c:situationType :CRANE_AT ; c:value :bay .
