@@ -165,7 +165,7 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     left = max(call.segments.worked, MUCH)  # for both together
-    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
+    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
         other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
         other.segments.most_work = left
         advised(other)

@@ -171,6 +171,7 @@ class Recovery:
         call.steps, call.given_up, self._tried = [], [], {}
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         if any(self.together(level) for level in levels):
+            call.at_once = True
             return True
         call.redo(steps)
         call.steps, call.given_up, call.kept, self._tried = steps, given_up, kept, tried

@@ -88,6 +88,8 @@ class Refiner:
         self.besides: dict[Cell, str] = {}
         """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
         self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
+        self.found: dict[object, tuple[RefinedStep, ...]] = {}
+        """What search found, by the state: steps after which another can't be refined are done again on the next way."""
         self.advice: Advice | None = None
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
@@ -178,6 +180,12 @@ class Refiner:
                     return steps
         now = self.table.now
         question = name, arguments, self.segments.tidy, tuple(self.besides)
+        here = question, frozenset(self.table.since(0).items())
+        if here in self.found:
+            for step in self.found[here]:
+                self.redo(step)
+            self.hits += 1
+            return self.found[here]
         for facts in self.failed.get(question, ()):
             if all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
@@ -195,10 +203,11 @@ class Refiner:
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
             self.failed.setdefault(question, []).append(facts)
             return None
+        self.found[here] = tuple(found)
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
         known.sort(key=lambda template: len(template.steps))
         del known[TEMPLATES:]
-        return tuple(found)
+        return self.found[here]
 
     def worlds(self, level: int) -> tuple[Width, ...]:
         """Return the worlds to look at one after the other, the last of them large."""

@@ -89,6 +89,8 @@ class Call:
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
         self.restarts = 0
+        self.at_once = False
+        """Whether the first steps are to all goals at once."""
         self.wary: Callable[[list[RefinedStep], int, Again], list[RefinedStep] | None] | None = None
         """Looks whether steps done since a mark have led astray, and does them again then."""
 

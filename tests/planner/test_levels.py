@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
@@ -198,3 +199,18 @@ def test_a_shorter_order_brings_about_what_the_first_level_does_not_see_too() ->
     outcome = default(problem)
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
+
+
+def test_a_refinement_that_was_found_in_a_state_is_not_searched_there_again() -> None:
+    problem = tabletop()
+    call = Call(problem, compiled(problem), None, 10_000)
+    refiner, first = call.refiner, call.program.levels[0]
+    behavior = problem.domain.at_level(first)[0]
+    every = product(*(problem.classes[parameter.kind] for parameter in behavior.parameters))
+    arguments = next(a for a in every if refiner.do(first, behavior.name, a) is not None)
+    call.table.undo(0)
+    step, searched = refiner.do(first, behavior.name, arguments), refiner.misses
+    call.table.undo(0)
+    refiner.templates.clear()
+    assert refiner.do(first, behavior.name, arguments) == step
+    assert refiner.misses == searched
