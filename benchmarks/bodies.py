@@ -57,7 +57,7 @@ CASES = {
     "hood": Case("two arms", "centrifuge", ("F3_OPEN left_hand cover", "F3_SHUT left_hand cover")),
     "button": Case("two arms", "centrifuge", ("F3_PRESS right_hand start",)),
     "lid onto pot": Case("two arms", "kitchen-corner", goals=("lid LOCATION pot_top",)),
-    "pick and place": Case("two arms", "beverage-serving", goals=("cup2 LOCATION location8",)),
+    "pick and place": Case("two arms", "beverage-serving", goals=("cup2 LOCATION location5",)),
     "move and pour": Case("two arms", "beverage-serving-moved", beads=True),
     "kitchen corner": Case("two arms", "kitchen-corner"),
     "laboratory": Case("two arms", "centrifuge"),

@@ -84,7 +84,7 @@ PLANTED = (
     Planted("joint jammed", faults.jammed("left_hand", 3, 2, 0.1), 2, "tracking error"),
     Planted("joint limit", faults.joint_range("left_hand", 3, -1.0, -0.6), 0, "unreachable", ("cup1",)),
     Planted("arm in the way of the other", LEFT_ARM_THERE, 15, "goal in collision", ("left_hand",)),
-    Planted("sensor noise of 5 cm", faults.noisy(0.05), 0, "unexpected", ("left_hand",)),
+    Planted("sensor noise of 5 cm", faults.noisy(0.05), 0, "object disturbed", ("cup1",)),
     Planted("camera off by 3 cm", faults.misaligned((0.0, 0.03)), 0, "object disturbed", ("cup1",)),
     Planted("bottle empty", faults.drained("bottle1"), 0, "under-pour", ("bottle1",), True),
     Planted("bottle nearly empty", faults.drained("bottle1", 6), 16, "under-pour", ("bottle1", "cup1"), True),

@@ -55,6 +55,7 @@ class Tally:
         for noise in NOISE:
             world.noise = noise
             for _ in range(LOOKS):
+                world.look()
                 seen = world.observe()
                 for symbol, value in truth.items():
                     key = symbol.situation, noise

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -33,6 +34,9 @@ Bullet's own 2 cm are for larger things: a finger's edge that had touched a ledg
 
 LAG = 0.08
 """Radians that a joint may stay behind its command."""
+
+LOOKS = 6
+"""So often is looked at something before its position is told; the mean is taken, so that noise grows less."""
 
 BESIDE = 0.05
 """Metres from a place up to which a body is at it; and below a place from which on it is no longer at it."""
@@ -93,6 +97,7 @@ class Engine:
         self.shifts: dict[
             int, Array
         ] = {}  # by mechanism's body: how far off it is perceived, since it was last looked at
+        self.errors: dict[str, tuple[int, Array]] = {}  # by body: when it was looked at, how far off it was seen
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
@@ -172,10 +177,14 @@ class Engine:
             around |= self._contacts(self.bodies[name].body) - furniture
         return tuple(sorted(around - {held, hand.robot.name}))
 
+    def contacts(self, body: int) -> Sequence[Sequence[Any]]:
+        """Return PyBullet's contact points of a body with others."""
+        found = pybullet.getContactPoints(body, physicsClientId=self.client)
+        return [contact for contact in found if contact[2] != body]
+
     def _contacts(self, body: int) -> set[str]:
         """Return what presses against a body."""
-        found = pybullet.getContactPoints(body, physicsClientId=self.client)
-        return {self.names[c[2]] for c in found if c[9] > 0.5 and c[2] != body and c[2] in self.names}
+        return {self.names[c[2]] for c in self.contacts(body) if c[9] > 0.5 and c[2] in self.names}
 
     @property
     def rate(self) -> float:
@@ -205,14 +214,20 @@ class Engine:
         return rotation, np.array(position) - rotation[:, 2] * center_height(thing.shape)
 
     def sense(self, name: str) -> tuple[Array, Array]:
-        """Return a body's rotation and base as the robot perceives them, noise included."""
+        """Return a body's rotation and base as the robot perceives them: the mean of several looks, each with its noise.
+
+        Until the simulation goes on it is the same.
+        """
         rotation, position = self.truth(name)
         if self.noise:
-            position = position + self.rng.normal(0.0, self.noise, 3)
+            if name not in self.errors or self.errors[name][0] != self.steps:
+                self.errors[name] = self.steps, self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
+            position = position + self.errors[name][1]
         return rotation, position
 
     def look(self) -> None:
-        """Look at the mechanisms anew: until the next look each is perceived to be as far off as now."""
+        """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move."""
+        self.errors.clear()
         if self.noise:
             self.shifts = {mechanic.body: self.rng.normal(0.0, self.noise, 3) for mechanic in self.mechanics}
 

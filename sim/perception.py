@@ -40,16 +40,6 @@ class Perceiver:
     spatial: bool = False
 
 
-LOOKS = 6
-"""So often is looked at something of which a fact shall be told, while nothing moves; the mean is taken."""
-
-
-def steady(world: Engine, body: str) -> tuple[Array, Array]:
-    """Return a body's rotation and the mean of several perceived positions."""
-    looks = [world.sense(body) for _ in range(LOOKS if world.noise else 1)]
-    return looks[0][0], np.mean([position for _, position in looks], axis=0)
-
-
 def tilt_of(rotation: Array) -> float:
     """Return the angle in radians between a frame's z axis and up."""
     return float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
@@ -63,7 +53,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     body = arguments[0]
     if body not in world.bodies:
         return None
-    rotation, position = steady(world, body)
+    rotation, position = world.sense(body)
     place, distance = world.nearest_place(position)
     standing = abs(position[2] - world.place(place)[2]) < use.numbers["contact_height"]
     if standing and distance < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
@@ -117,7 +107,7 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
     held = world.held(hand)
     point = top = world.hands[hand].frame()[1]
     if held is not None:
-        rotation, point = steady(world, held)
+        rotation, point = world.sense(held)
         top = point + rotation[:, 2] * height_of(world.bodies[held].shape)
     place, distance = world.nearest_place(point)
     height = min(point[2], top[2]) - world.place(place)[2]
@@ -125,7 +115,7 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
         return use.values["raised"]
     if held is not None and height < numbers["contact_height"]:
         return held
-    near = [(float(np.hypot(*(steady(world, body)[1] - top)[:2])), body) for body in world.bodies if body != held]
+    near = [(float(np.hypot(*(world.sense(body)[1] - top)[:2])), body) for body in world.bodies if body != held]
     gap, body = min(near, default=(np.inf, ""))
     if gap < (numbers["beside"] if held is not None else numbers["between"]):
         return body

@@ -9,6 +9,7 @@ motion       how the hand goes
 ============ ======================================================================================================
 free         planned around everything
 line         straight
+yielding     straight, giving way to the side to what a finger meets
 joint        as the thing's joint moves it, with what is felt corrected on the way
 rise         straight up to `above` the place below, the elbow turning as it must
 home         to the posture of rest
@@ -19,23 +20,22 @@ over         with a vessel over another one, to where it can be tilted (`sim.pou
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from reasoner.embodiment.skill_checks import endless, unplayed, unset
-from reasoner.embodiment.skills import TERM
-from reasoner.embodiment.values import Guard, Phase, SkillUse
-from sim.attempt import Attempt, named
+from reasoner.embodiment.values import Phase, SkillUse
+from sim.attempt import Attempt
 from sim.engine import Engine
-from sim.features import Frame, Ways, locate, touched, ways
-from sim.linkage import wide
-from sim.mechanisms import Mechanic
+from sim.features import Ways, ways
+from sim.measuring import check, finger_force, until
 from sim.motion import pose_of, rotations, turned_near
-from sim.perception import tilt_of
-from sim.pouring import reach_over
-from sim.stages import Numbers, Stage
+from sim.pouring import FOLD, reach_over
+from sim.running import Run
+from sim.stages import Stage
+from sim.touch import FINGERS, ROOM, go_around, off_centre, room
 from sim.urdf import Array
 from sim.verdict import SkillError
 
@@ -45,9 +45,6 @@ SAMPLES = 9
 ANCHORS = 8
 """So many times on a joint's path the hand looks where it and the joint have come to."""
 
-CLOSING = 360
-"""Steps within which fingers must have got hold of something."""
-
 ASIDE = sorted(
     product((0.0, -0.08), (0.0, -0.1, 0.1, -0.2, 0.2), (0.0, 0.1, 0.2)), key=lambda shift: sum(map(abs, shift))
 )
@@ -56,112 +53,11 @@ ASIDE = sorted(
 SLACK = 0.1
 """Radians kept from the limits of the arm's joints in planning a joint's path, for what will have to be corrected on the way."""
 
-GROPING = 120
-"""Steps after which a hand that has met a handle with one finger only takes hold anew."""
-
 NARROW = 0.02
 """Metres by which each finger opens at a handle with little room beside it."""
 
-LOOKING = 6
-"""Steps between looks at what the fingers feel."""
-
-TOLD = ("object", "source", "target", "place")
-"""The order in which a failure names who takes part."""
-
 FAR = 1e3
 """Metres at which nothing is reached: where a hand that can't be as it should is said to be."""
-
-CENTRED = 0.001
-"""Metres by which one finger may be ahead of the other for a hand to be centred on what it holds."""
-
-
-@dataclass
-class Run:
-    """One execution of a skill: who takes part, what was measured, the way chosen, what is held and where things were seen."""
-
-    attempt: Attempt
-    roles: Mapping[str, str]
-    numbers: Numbers
-    measured: dict[str, float] = field(default_factory=dict)
-    way: Ways | None = None
-    gripped: str = ""
-    seen: dict[tuple[str, str], Frame] = field(default_factory=dict)
-
-    @property
-    def world(self) -> Engine:
-        """The world."""
-        return self.attempt.world
-
-    @property
-    def spread(self) -> float:
-        """Metres by which each finger of an open hand is open."""
-        return self.numbers.get("spread", self.attempt.hand.hand.opening)
-
-    def who(self, target: str) -> tuple[str, str]:
-        """Return the individual and the feature of ``role.feature``."""
-        role, _, feature = target.partition(".")
-        name = self.roles[role]
-        if not (name in self.world.embodiment.places or name in self.world.links):
-            self.attempt.body(name)
-        return name, feature
-
-    def at(self, target: str, values: Mapping[str, float] | None = None) -> Frame:
-        """Return where ``role.feature`` is perceived to be: looked at once in a skill, so that noise doesn't make it jump."""
-        name, feature = self.who(target)
-        if name in self.world.links:
-            frame = locate(self.world, name, feature, values)
-            return replace(frame, point=frame.point + self.world.shift(self.world.links[name]))
-        if (name, feature) not in self.seen:
-            self.seen[name, feature] = locate(self.world, name, feature)
-        return self.seen[name, feature]
-
-    def joint(self, target: str) -> tuple[Mechanic, str]:
-        """Return the mechanism and the link of ``role.feature``."""
-        name, _ = self.who(target)
-        if name not in self.world.links or name not in self.world.links[name].joints:
-            raise SkillError("no grasp", (name,), f"{name} has no joint that could be moved")
-        return self.world.links[name], name
-
-    def number(self, expression: str, link: str = "") -> float:
-        """Return the value of an expression: settings, and what is said of the joint of a `link`, with signs between them."""
-        known = dict(self.numbers)
-        if link:
-            one = self.world.links[link].link(link)
-            known |= {name: getattr(one, name) for name in ("opened", "shut", "lower", "upper")}
-            known["wide"] = wide(one)
-        return evaluate(expression, known)
-
-    def things(self) -> tuple[str, ...]:
-        """Return what takes part, what is held included and the hand excepted."""
-        held = self.attempt.held
-        ordered = sorted(self.roles.items(), key=lambda pair: TOLD.index(pair[0]) if pair[0] in TOLD else len(TOLD))
-        return named(*(name for role, name in ordered if role != "hand"), *([] if held is None else [held]))
-
-    def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the names of what a phase may touch: of a link the parts at the feature, of a place what carries it."""
-        found: list[str] = []
-        for word in phase.touches:
-            if word == "supports":
-                found += [fixture.name for fixture in self.world.embodiment.fixtures]
-                below = self.world.nearest_place(self.attempt.hand.frame()[1])[0]
-                found.append(self.world.embodiment.places[self.roles.get("place", below)].carrier)
-            elif "." in word:
-                found += touched(self.world, *self.who(word))
-            elif word in self.roles:
-                found.append(self.roles[word])
-        return tuple(found)
-
-
-def evaluate(expression: str, known: Mapping[str, float]) -> float:
-    """Return the sum that an expression names.
-
-    >>> round(evaluate("raised-0.03", {"raised": 0.19}), 2)
-    0.16
-    """
-    total = 0.0
-    for sign, term in TERM.findall(expression):
-        total += (-1.0 if sign == "-" else 1.0) * (known[term] if term in known else float(term))
-    return total
 
 
 def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping[str, float]:
@@ -196,91 +92,7 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
         MOTIONS[phase.motion](run, phase)
     run.world.run(round(run.number(phase.wait) * run.world.rate))
     for guard in phase.checks:
-        _check(run, phase, guard)
-
-
-# ----------------------------------------------------------------------------------------------------- fingers
-
-
-def _open(run: Run, phase: Phase) -> None:
-    run.attempt.hand.open(run.spread)
-    if run.attempt.held is not None or run.gripped:
-        run.world.run(round(run.number("release") * run.world.rate))
-        run.attempt, run.gripped = run.attempt.released(), ""
-
-
-def _shut(run: Run, phase: Phase) -> None:
-    run.attempt.hand.close()
-    run.world.run(CLOSING // 6)
-
-
-def _grasp(run: Run, phase: Phase) -> None:
-    """Close until both fingers have pressed for a while; then centre the hand on what doesn't give way."""
-    world, hand, name = run.world, run.attempt.hand, run.roles["object"]
-    hand.close()
-    pressed, waited = 0, 0
-    while pressed < run.numbers["hold"] * world.rate:
-        if waited > CLOSING:
-            raise SkillError("no grasp", (name,), force_n=finger_force(run, name), opening_m=sum(hand.openings()))
-        if name not in world.bodies and waited and waited % GROPING == 0 and not pressed:
-            _grope(run)
-        world.run(LOOKING)
-        waited += LOOKING
-        pressed = pressed + LOOKING if finger_force(run, name) >= run.numbers["force"] else 0
-    run.gripped = name
-    if name in world.bodies:
-        run.attempt.check_others(run.numbers, name)
-        run.attempt = replace(run.attempt, held=name)
-        hand.grasp = world.in_hand(hand, name)
-    else:
-        _centre(run)
-    run.measured |= {"force_n": finger_force(run, name), "seconds": waited / world.rate}
-
-
-def _grope(run: Run) -> None:
-    """Take hold anew of what one finger has met and the other closed beside: around where it was met."""
-    hand, shift = run.attempt.hand, _off_centre(run)
-    hand.open(run.spread)
-    run.world.run(CLOSING // 6)
-    _shift(run, shift)
-    hand.close()
-
-
-def _centre(run: Run) -> None:
-    """Shift the hand until both fingers have closed equally far: what they hold stands fast, so the hand gives way."""
-    hand = run.attempt.hand
-    for _ in range(3):
-        first, second = hand.openings()
-        if abs(first - second) < CENTRED or not _shift(run, _off_centre(run)):
-            return
-        run.world.run(2 * LOOKING)
-
-
-def _shift(run: Run, shift: Array) -> bool:
-    """Shift the hand by some metres, if the arm allows it."""
-    hand = run.attempt.hand
-    pose = hand.pose
-    pose[:3] += shift
-    q, valid = run.attempt.reacher(margin=-np.inf).solve(np.stack([hand.pose, pose]))
-    if valid.all():
-        run.attempt.follow(q)
-    return bool(valid.all())
-
-
-def _off_centre(run: Run) -> Array:
-    """Return by how much the middle of the fingers is beside that of what they hold, which is what they feel of it."""
-    hand = run.attempt.hand
-    first, second = hand.openings()
-    shift: Array = hand.frame()[0] @ hand.first_finger * (first - second) / 2
-    return shift
-
-
-FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
-    "": lambda run, phase: None,
-    "open": _open,
-    "shut": _shut,
-    "grasp": _grasp,
-}
+        check(run, phase, guard)
 
 
 # ----------------------------------------------------------------------------------------------------- poses
@@ -352,7 +164,7 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
     """Return the poses of a free motion's goal, the ways to be there, and which of them allow all that follows."""
     chain = [phase]
     for one in later:
-        if one.motion not in ("", "line", "joint"):
+        if one.motion not in ("", "line", "yielding", "joint"):
             break
         chain.append(one)
     frame, swings = run.at(phase.to), any(one.motion == "joint" for one in chain)
@@ -373,13 +185,24 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
             )
         closed = closed and one.fingers != "open"
         poses = stages[-1].poses
+    return stages[0].poses, way, _allowed(run, chain, stages)
+
+
+def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
+    """Return the candidates that allow all stages; if possible those that leave the hand what it may need on the way."""
+    tight = any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain)
+    if tight:  # it will have to give way, which a stretched arm can't
+        try:
+            return run.attempt.choose([replace(stage, fold=FOLD) for stage in stages], run.things(), run.spread)
+        except SkillError:
+            pass
     try:
-        return stages[0].poses, way, run.attempt.choose(stages, run.things(), run.spread)
+        return run.attempt.choose(stages, run.things(), run.spread)
     except SkillError:
         if run.numbers.get("spread", 0.0) <= NARROW:
             raise
     run.numbers = {**run.numbers, "spread": NARROW}
-    return stages[0].poses, way, run.attempt.choose(stages, run.things(), run.spread)
+    return run.attempt.choose(stages, run.things(), run.spread)
 
 
 def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:
@@ -398,29 +221,28 @@ def _go(run: Run, phase: Phase, goals: Array, way: Ways, chosen: list[int]) -> N
     opening = run.spread if phase.fingers == "open" else None
     best = chosen[run.attempt.go([goals[i] for i in chosen], run.things(), *run.free_of(phase), opening=opening)]
     run.way = way.pick(best)
-    _arrived(run, goals[best])
-
-
-def _arrived(run: Run, goal: Array) -> None:
-    """Check that the hand is where it should be, if the skill says how exactly."""
-    if "tolerance" in run.numbers:
-        run.measured |= run.attempt.check_arrival(goal, run.numbers)
+    run.arrived(goals[best])
 
 
 def _line(run: Run, phase: Phase) -> None:
     hand = run.attempt.hand
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
-    enough = _until(run, phase)
+    enough = until(run, phase)
     speed = run.number(phase.speed)
     run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
     if enough is None:
-        _arrived(run, goal)
+        run.arrived(goal)
+
+
+def _yielding(run: Run, phase: Phase) -> None:
+    now = run.attempt.hand.pose
+    go_around(run, phase, run.who(phase.to)[0], turned_near(now, _poses(run, phase, now[None], run.way)[0]))
 
 
 def _joint(run: Run, phase: Phase) -> None:
     """Move a joint along its path, starting anew from where hand and joint have come to several times on the way."""
     mechanic, link = run.joint(phase.to)
-    goal, enough, attempt = run.number(phase.value, link), _until(run, phase), run.attempt
+    goal, enough, attempt = run.number(phase.value, link), until(run, phase), run.attempt
     way = run.way
     if way is None:
         raise SkillError(
@@ -436,7 +258,7 @@ def _joint(run: Run, phase: Phase) -> None:
         poses = np.concatenate(_moved(run, phase, attempt.hand.pose[None], share, values.tolist()))
         poses[:, 3] = np.unwrap(poses[:, 3])
         if run.gripped:
-            poses[:, :3] += np.linspace(0.0, 1.0, len(poses))[:, None] * _off_centre(run)
+            poses[:, :3] += np.linspace(0.0, 1.0, len(poses))[:, None] * off_centre(run)
         spread = np.linspace(0, len(poses) - 1, 3 * len(poses) - 2)
         poses = np.stack([np.interp(spread, np.arange(len(poses)), part) for part in poses.T], -1)
         attempt.along(
@@ -473,107 +295,13 @@ def _over(run: Run, phase: Phase) -> None:
 MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "": lambda run, phase: None,
     "line": _line,
+    "yielding": _yielding,
     "joint": _joint,
     "rise": _rise,
     "home": _home,
     "over": _over,
 }
 """How a hand goes; ``free`` is done by `_choose` and `_go`."""
-
-
-# ----------------------------------------------------------------------------------------------------- what is measured
-
-
-def finger_force(run: Run, name: str) -> float:
-    """Return the newtons with which the weaker finger presses a body or link."""
-    hand, world = run.attempt.hand, run.world
-    if name in world.links:
-        mechanic = world.links[name]
-        return min(hand.pressing(mechanic.body, mechanic.joints[name]))
-    return min(hand.pressing(world.bodies[name].body)) if name in world.bodies else 0.0
-
-
-def _slip(run: Run) -> float | None:
-    measured = run.attempt.check_grip({**run.numbers, "slip": np.inf})
-    run.measured |= {name: value for name, value in measured.items() if name != "slip_m"}
-    return measured.get("slip_m")
-
-
-def _load(run: Run) -> str:
-    """Return what the skill handles: what is in the hand, else its object."""
-    return run.attempt.held or run.roles.get("object", "")
-
-
-def _height(run: Run) -> float:
-    base = run.world.truth(_load(run))[1]
-    if "place" in run.roles:
-        return float(abs(base[2] - run.world.place(run.roles["place"])[2]))
-    return float(base[2] - run.world.place(run.world.nearest_place(base)[0])[2])
-
-
-def _off(run: Run) -> float:
-    place = run.roles.get("place", run.roles.get("target", ""))
-    held = _load(run)
-    reached = run.world.truth(held)[1] if held else run.attempt.hand.frame()[1]
-    return float(np.hypot(*(reached - run.world.place(place))[:2]))
-
-
-def _grip(run: Run) -> float | None:
-    name = run.gripped or run.roles.get("object", "") or run.attempt.held
-    return finger_force(run, name) if name else None
-
-
-def _value(run: Run) -> float:
-    mechanic, link = run.joint("object")
-    return mechanic.values()[link]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that can be measured: how, under which name it is told, and how a skill has failed if it is out of bounds."""
-
-    measure: Callable[[Run], float | None]
-    told: str
-    code: str
-
-
-QUANTITIES: Mapping[str, Quantity] = {
-    "slip": Quantity(_slip, "slip_m", "slip or drop"),
-    "tilt": Quantity(lambda run: tilt_of(run.world.truth(_load(run))[0]), "tilt_rad", "toppled"),
-    "height": Quantity(_height, "height_m", "misplaced"),
-    "off": Quantity(_off, "off_place_m", "misplaced"),
-    "joint": Quantity(_value, "joint", "stuck"),
-    "push": Quantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
-    "grip": Quantity(_grip, "grip_n", "slip or drop"),
-    "leaning": Quantity(lambda run: tilt_of(run.world.truth(run.who("target")[0])[0]), "tilt_rad", "toppled"),
-}
-
-
-def _holds(run: Run, guard: Guard) -> tuple[bool, float | None]:
-    value = QUANTITIES[guard.quantity].measure(run)
-    link = run.roles.get("object", "") if guard.quantity == "joint" else ""
-    return value is None or (value - run.number(guard.bound, link)) * guard.sign >= 0, value
-
-
-def _check(run: Run, phase: Phase, guard: Guard) -> None:
-    """Measure, and raise if the guard doesn't hold."""
-    holds, value = _holds(run, guard)
-    quantity = QUANTITIES[guard.quantity]
-    if value is not None:
-        run.measured[quantity.told] = value
-    if not holds:
-        load = _load(run)
-        things = (
-            run.things() if guard.quantity in ("off", "height", "joint", "push") else (load,) if load else run.things()
-        )
-        raise SkillError(guard.code or quantity.code, things, **run.measured)
-
-
-def _until(run: Run, phase: Phase) -> Callable[[], bool] | None:
-    """Return what tells whether a motion has come far enough; None if it goes on to its end."""
-    if not phase.until:
-        return None
-    return lambda: any(_holds(run, guard)[0] for guard in phase.until)
 
 
 CONDITIONS: Mapping[str, Callable[[Run], bool]] = {

@@ -28,6 +28,9 @@ SIDES = (1.0, -1.0)
 FOLD = 0.1
 """Radians kept, if possible, from where the arm would be stretched: what is held slips a little on the way there."""
 
+SHARES = (1.0, 0.95, 0.9, 0.8)
+"""Of the way on which a lip stays where it is, what a hand goes that rolls back."""
+
 LONGEST = 2400
 """Steps after which turning gives up."""
 
@@ -99,12 +102,13 @@ def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> 
     angles = np.linspace(0.0, angle, 48)
     poses = np.repeat(now[None], len(angles), axis=0)
     poses[:, 4] = side * angles
+    shifts = np.zeros((len(angles), 3))
     if attempt.held is not None:
         height, lip = _lip(attempt, attempt.held, np.array([side]))
         tips = rotations(poses) @ lip[0]
-        poses[:, :3] += tips[-1] - tips
-        poses[:, 2] += height * (np.maximum(np.cos(angles), 0) - max(np.cos(angle), 0))
-    servo = _Servo(world, hand, _way(attempt, angles, poses, ()), angle)
+        shifts = tips[-1] - tips
+        shifts[:, 2] += height * (np.maximum(np.cos(angles), 0) - max(np.cos(angle), 0))
+    servo = _Servo(world, hand, _way_back(attempt, angles, poses, shifts), angle)
     servo.turn(0.0, numbers["fast"])
     world.run(2 * PATIENCE)
     measured = {"tilt_rad": tilt_of(hand.frame()[0])} | attempt.check_grip(numbers)
@@ -183,7 +187,10 @@ def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
         yaw, sides, swivel = (np.full(len(angles), value) for value in (now[3], side, now[5]))
         poses = _poses(attempt, source, target, yaw, sides, swivel, angles, numbers)
         ways.append((float(np.linalg.norm(poses[0, :3] - now[:3])), side, poses))
-    return _way(attempt, angles, min(ways, key=lambda way: way[0])[2], (source, target))
+    poses = min(ways, key=lambda way: way[0])[2]
+    left = np.maximum(1 - angles / numbers["hold_back"], 0.0)
+    poses[:, :3] += left[:, None] * (now - poses[0])[:3]  # it comes to where it was seen now before anything flows
+    return _way(attempt, angles, poses, (source, target))
 
 
 def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]) -> _Way:
@@ -195,6 +202,19 @@ def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]
             blame = reacher.blame(poses)
             raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)
     return _Way(angles, q)
+
+
+def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _Way:
+    """Return the postures of a way back on which the lip stays where it is, or nearly so if the arm doesn't reach that far."""
+    for share in SHARES:
+        moved = poses.copy()
+        moved[:, :3] += share * shifts
+        try:
+            return _way(attempt, angles, moved, ())
+        except SkillError:
+            if share == SHARES[-1]:
+                raise
+    raise AssertionError("unreachable")
 
 
 # ----------------------------------------------------------------------------------------------- control

@@ -144,6 +144,11 @@ class Manipulator:
             forces.append(sum(contact[9] for contact in contacts))
         return tuple(forces)
 
+    def meets(self, other: int) -> bool:
+        """Whether some part of the robot touches a body."""
+        found = pybullet.getContactPoints(self.body, other, physicsClientId=self.client)
+        return any(contact[9] > 0 for contact in found)
+
     @property
     def first_finger(self) -> Array:
         """Where the first finger goes as the hand opens, in the hand's frame."""

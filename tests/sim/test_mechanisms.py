@@ -16,7 +16,7 @@ from reasoner.embodiment.skill_checks import RULES
 from reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES
 from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
 from reasoner.symbols import Fact, Symbol
-from sim import phases
+from sim import measuring, phases, touch
 from sim.faults import displaced
 from sim.linkage import read_mechanism, wide
 from sim.live import LiveWorld
@@ -228,8 +228,8 @@ def test_the_model_of_a_mechanism_is_where_physics_has_it() -> None:
 
 def test_the_interpreter_has_all_that_phases_may_say() -> None:
     assert {*phases.MOTIONS, "free"} == set(MOTIONS)
-    assert set(phases.FINGERS) == set(FINGERS)
+    assert set(touch.FINGERS) == set(FINGERS)
     assert set(phases.CONDITIONS) == set(CONDITIONS)
-    assert set(phases.QUANTITIES) == set(QUANTITIES)
+    assert set(measuring.QUANTITIES) == set(QUANTITIES)
     said = {guard.code for use in kitchen().embodiment.skills.values() for p in use.phases for guard in p.checks}
     assert said - {""} <= set(CODES)

@@ -1,0 +1,118 @@
+"""What skills measure: quantities of which guards say where a motion ends, and what must hold after it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from reasoner.embodiment.values import Guard, Phase
+from sim.perception import tilt_of
+from sim.running import Run
+from sim.verdict import SkillError
+
+
+def finger_force(run: Run, name: str) -> float:
+    """Return the newtons with which the weaker finger presses a body or link."""
+    return min(finger_forces(run, name))
+
+
+def finger_forces(run: Run, name: str) -> tuple[float, ...]:
+    """Return the newtons with which each finger presses a body or link."""
+    hand, world = run.attempt.hand, run.world
+    if name in world.links:
+        mechanic = world.links[name]
+        return hand.pressing(mechanic.body, mechanic.joints[name])
+    return hand.pressing(world.bodies[name].body) if name in world.bodies else (0.0, 0.0)
+
+
+def _slip(run: Run) -> float | None:
+    measured = run.attempt.check_grip({**run.numbers, "slip": np.inf})
+    run.measured |= {name: value for name, value in measured.items() if name != "slip_m"}
+    return measured.get("slip_m")
+
+
+def _load(run: Run) -> str:
+    """Return what the skill handles: what is in the hand, else its object."""
+    return run.attempt.held or run.roles.get("object", "")
+
+
+def _height(run: Run) -> float:
+    base = run.world.truth(_load(run))[1]
+    if "place" in run.roles:
+        return float(abs(base[2] - run.world.place(run.roles["place"])[2]))
+    return float(base[2] - run.world.place(run.world.nearest_place(base)[0])[2])
+
+
+def _bearing(run: Run) -> float:
+    """Return the newtons with which what is held, or was just let go, is borne by something other than the hand."""
+    world, load = run.world, _load(run)
+    others = (c for c in world.contacts(world.bodies[load].body) if c[2] != run.attempt.hand.body)
+    return float(sum(contact[9] * max(contact[7][2], 0.0) for contact in others))
+
+
+def _off(run: Run) -> float:
+    place = run.roles.get("place", run.roles.get("target", ""))
+    held = _load(run)
+    reached = run.world.truth(held)[1] if held else run.attempt.hand.frame()[1]
+    return float(np.hypot(*(reached - run.world.place(place))[:2]))
+
+
+def _grip(run: Run) -> float | None:
+    name = run.gripped or run.roles.get("object", "") or run.attempt.held
+    return finger_force(run, name) if name else None
+
+
+def _value(run: Run) -> float:
+    mechanic, link = run.joint("object")
+    return mechanic.values()[link]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that can be measured: how, under which name it is told, and how a skill has failed if it is out of bounds."""
+
+    measure: Callable[[Run], float | None]
+    told: str
+    code: str
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "slip": Quantity(_slip, "slip_m", "slip or drop"),
+    "tilt": Quantity(lambda run: tilt_of(run.world.truth(_load(run))[0]), "tilt_rad", "toppled"),
+    "height": Quantity(_height, "height_m", "misplaced"),
+    "off": Quantity(_off, "off_place_m", "misplaced"),
+    "joint": Quantity(_value, "joint", "stuck"),
+    "push": Quantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
+    "grip": Quantity(_grip, "grip_n", "slip or drop"),
+    "bearing": Quantity(_bearing, "bearing_n", "misplaced"),
+    "leaning": Quantity(lambda run: tilt_of(run.world.truth(run.who("target")[0])[0]), "tilt_rad", "toppled"),
+}
+
+
+def _holds(run: Run, guard: Guard) -> tuple[bool, float | None]:
+    value = QUANTITIES[guard.quantity].measure(run)
+    link = run.roles.get("object", "") if guard.quantity == "joint" else ""
+    return value is None or (value - run.number(guard.bound, link)) * guard.sign >= 0, value
+
+
+def check(run: Run, phase: Phase, guard: Guard) -> None:
+    """Measure, and raise if the guard doesn't hold."""
+    holds, value = _holds(run, guard)
+    quantity = QUANTITIES[guard.quantity]
+    if value is not None:
+        run.measured[quantity.told] = value
+    if not holds:
+        load = _load(run)
+        things = (
+            run.things() if guard.quantity in ("off", "height", "joint", "push") else (load,) if load else run.things()
+        )
+        raise SkillError(guard.code or quantity.code, things, **run.measured)
+
+
+def until(run: Run, phase: Phase) -> Callable[[], bool] | None:
+    """Return what tells whether a motion has come far enough; None if it goes on to its end."""
+    if not phase.until:
+        return None
+    return lambda: any(_holds(run, guard)[0] for guard in phase.until)

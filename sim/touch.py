@@ -1,0 +1,157 @@
+"""Touch: fingers that open and close around something, and a hand that gives way to what they feel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from reasoner.embodiment.values import Phase
+from sim.bodies import outline
+from sim.measuring import finger_force, finger_forces
+from sim.motion import line
+from sim.running import Run
+from sim.urdf import Array
+from sim.verdict import SkillError
+
+CLOSING = 360
+"""Steps within which fingers must have got hold of something."""
+
+GROPING = 120
+"""Steps after which a hand that has met a handle with one finger only takes hold anew."""
+
+YIELDS, ASIDE_BY = 6, 0.002
+"""So often a hand gives way to what a finger meets, and the metres by which it does."""
+
+ROOM = 0.01
+"""Metres between an open finger and what it shall go around, below which the hand goes as slowly as there is less of it."""
+
+SLOWEST = 0.1
+"""The least share of its speed at which it goes."""
+
+LOOKING = 6
+"""Steps between looks at what the fingers feel."""
+
+CENTRED = 0.001
+"""Metres by which one finger may be ahead of the other for a hand to be centred on what it holds."""
+
+
+def _open(run: Run, phase: Phase) -> None:
+    run.attempt.hand.open(run.spread)
+    if run.attempt.held is not None or run.gripped:
+        run.world.run(round(run.number("release") * run.world.rate))
+        run.attempt, run.gripped = run.attempt.released(), ""
+
+
+def _shut(run: Run, phase: Phase) -> None:
+    run.attempt.hand.close()
+    run.world.run(CLOSING // 6)
+
+
+def _grasp(run: Run, phase: Phase) -> None:
+    """Close until both fingers have pressed for a while; then centre the hand on what doesn't give way."""
+    world, hand, name = run.world, run.attempt.hand, run.roles["object"]
+    hand.close()
+    pressed, waited = 0, 0
+    while pressed < run.numbers["hold"] * world.rate:
+        if waited > CLOSING:
+            raise SkillError("no grasp", (name,), force_n=finger_force(run, name), opening_m=sum(hand.openings()))
+        if name not in world.bodies and waited and waited % GROPING == 0 and not pressed:
+            _grope(run)
+        world.run(LOOKING)
+        waited += LOOKING
+        pressed = pressed + LOOKING if finger_force(run, name) >= run.numbers["force"] else 0
+    run.gripped = name
+    if name in world.bodies:
+        run.attempt.check_others(run.numbers, name)
+        run.attempt = replace(run.attempt, held=name)
+        hand.grasp = world.in_hand(hand, name)
+    else:
+        _centre(run)
+    run.measured |= {"force_n": finger_force(run, name), "seconds": waited / world.rate}
+
+
+def _grope(run: Run) -> None:
+    """Take hold anew of what one finger has met and the other closed beside: around where it was met."""
+    hand, shift = run.attempt.hand, off_centre(run)
+    hand.open(run.spread)
+    run.world.run(CLOSING // 6)
+    _shift(run, shift)
+    hand.close()
+
+
+def _centre(run: Run) -> None:
+    """Shift the hand until both fingers have closed equally far: what they hold stands fast, so the hand gives way."""
+    hand = run.attempt.hand
+    for _ in range(3):
+        first, second = hand.openings()
+        if abs(first - second) < CENTRED or not _shift(run, off_centre(run)):
+            return
+        run.world.run(2 * LOOKING)
+
+
+def _shift(run: Run, shift: Array) -> bool:
+    """Shift the hand by some metres, if the arm allows it."""
+    hand = run.attempt.hand
+    pose = hand.pose
+    pose[:3] += shift
+    q, valid = run.attempt.reacher(margin=-np.inf).solve(np.stack([hand.pose, pose]))
+    if valid.all():
+        run.attempt.follow(q)
+    return bool(valid.all())
+
+
+def off_centre(run: Run) -> Array:
+    """Return by how much the middle of the fingers is beside that of what they hold, which is what they feel of it."""
+    hand = run.attempt.hand
+    first, second = hand.openings()
+    shift: Array = hand.frame()[0] @ hand.first_finger * (first - second) / 2
+    return shift
+
+
+FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
+    "": lambda run, phase: None,
+    "open": _open,
+    "shut": _shut,
+    "grasp": _grasp,
+}
+
+
+def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
+    """Go around something: what a finger meets on the way is farther on its side than it was seen, so the hand gives way.
+
+    What the palm meets has come far enough into the hand, which draws back a little.
+    """
+    hand = run.attempt.hand
+    speed = run.number(phase.speed) * min(max(room(run, name) / ROOM, SLOWEST), 1.0)
+    back = -ASIDE_BY * hand.frame()[0][:, 0]
+    patience = YIELDS
+    while True:
+        enough = (lambda: hand.meets(run.world.bodies[name].body)) if patience else None
+        run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
+        if not patience or not hand.meets(run.world.bodies[name].body):
+            break
+        patience -= 1
+        first, second = finger_forces(run, name)
+        if not first and not second:
+            _shift(run, back)
+            goal = hand.pose
+            break
+        beside = goal.copy()
+        beside[:3] += hand.frame()[0] @ hand.first_finger * (ASIDE_BY if first else -ASIDE_BY)
+        again = hand.pose + beside - goal
+        again[:3] += back
+        if (first and second) or not run.attempt.reacher(margin=-np.inf).solve(line(again, beside))[1].all():
+            patience = 0  # between both there is no side to give way to
+        elif _shift(run, (again - hand.pose)[:3]):
+            goal = beside
+    run.arrived(goal)
+
+
+def room(run: Run, name: str) -> float:
+    """Return the metres on either side of an object between the open fingers."""
+    if name not in run.world.bodies:
+        return np.inf
+    shape = run.world.bodies[name].shape
+    return run.spread - float(np.interp(shape.grasp_height, *outline(shape)))

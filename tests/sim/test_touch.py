@@ -1,0 +1,53 @@
+"""Hands that feel: what a finger meets is given way to, what is put down is let go when it stands; looks and their noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import confab
+from sim.engine import Engine
+from sim.faults import misaligned
+from sim.verify import expectations, verify
+from sim.world import World
+
+
+@pytest.mark.parametrize("off", [(0.0, -0.004), (0.006, 0.0), (-0.006, 0.0)])
+def test_a_hand_with_little_room_takes_what_stands_elsewhere_than_it_is_seen(off: tuple[float, float]) -> None:
+    scene = confab.load("panda-serving")
+    steps = scene.plan().plan.primitives[:3]
+    expected = expectations(scene.problem, steps)
+    rollout = verify(scene.embodiment, scene.problem.initial, steps, expected, beads=False, prepare=misaligned(off))
+    assert [step.behavior for step in steps][-1] == "B3_LIFT"
+    assert rollout.failure is None
+
+
+def test_what_is_put_down_is_let_go_when_it_stands_even_where_the_table_is_lower_than_it_seems() -> None:
+    scene = confab.load("beverage-serving")
+    steps = scene.plan().plan.primitives[:5]
+    place = steps[3].arguments[-1]
+    seem = scene.embodiment.places[place]
+    higher = replace(seem, position=(*seem.position[:2], seem.position[2] + 0.006))
+    embodiment = replace(scene.embodiment, places={**scene.embodiment.places, place: higher})
+    heights: list[float] = []
+
+    def watch(world: Engine) -> None:
+        if world.current == 4 and not world.hands["left_hand"].closing:
+            heights.append(float(world.truth("cup1")[1][2]))
+
+    rollout = verify(
+        embodiment, scene.problem.initial, steps, expectations(scene.problem, steps), beads=False, watch=watch
+    )
+    assert rollout.failure is None
+    assert heights[0] == pytest.approx(seem.position[2], abs=0.003)
+
+
+def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_look_tells() -> None:
+    scene = confab.load("beverage-serving")
+    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
+        assert np.array_equal(world.sense("cup1")[1], world.sense("cup1")[1])
+        seen = []
+        for _ in range(200):
+            world.look()
+            seen.append(world.sense("cup1")[1] - world.truth("cup1")[1])
+        assert np.std(seen) == pytest.approx(0.01 / np.sqrt(6), rel=0.1)
