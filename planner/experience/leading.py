@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TypeAlias
 
+from planner.experience.evidence import told_apart
 from planner.experience.matching import Find, finder, known
 from planner.experience.regression import Course, ordered
 from planner.hierarchical.operators import Program
@@ -38,6 +39,8 @@ WASTE = 10
 """Of so many expansions one may have been for steps of rules that were undone."""
 FAR = 1000
 """More steps than any rule promises."""
+
+NOTHING: Mapping[Cell, str] = {}
 
 Roles: TypeAlias = "tuple[str, ...]"
 
@@ -83,9 +86,12 @@ class Guide:
         self.broken: dict[str, int] = {}
         self.wasted = 0
         self.taught: dict[object, tuple[int, int]] = {}
-        """Of each kind of targets how many lessons in a row had nothing new, and how many more are left out."""
+        """Of each kind of targets how many lessons in a row rules led nowhere after, and how many more are left out."""
+        self.classes: dict[str, frozenset[str]] = {}
         self.before = _before(call.goal, orders, call.program)
         self.add(rules)
+        first = call.program.levels[0]
+        self.expects = all((first, situation) in self.by_goal for situation, _ in self.open())
 
     def add(self, rules: Iterable[Rule]) -> None:
         """Follow more rules."""
@@ -121,8 +127,13 @@ class Guide:
         """Whether another open goal comes first."""
         return any(not self.call.met(other) for other in self.before.get(cell, ()))
 
-    def candidates(self, level: int, cells: Mapping[Cell, str], below: int = FAR) -> list[Candidate]:
-        """Return the candidates of the least rank below a bound for some values, in the order in which to try them."""
+    def candidates(
+        self, level: int, cells: Mapping[Cell, str], below: int = FAR, off: Mapping[Cell, str] = NOTHING
+    ) -> list[Candidate]:
+        """Return the candidates of the least rank below a bound for some values, in the order in which to try them.
+
+        Last come those that give something to somebody though somebody else, who is off, is to have it.
+        """
         rank, found = below - 1, list[Candidate]()
         for cell, value in cells.items():
             for rule in self.by_goal.get((level, cell[0]), ()):
@@ -137,6 +148,9 @@ class Guide:
         score = self.score
         if score is not None and len(found) > 1:
             found.sort(key=score, reverse=True)
+        if len(off) > 1:
+            wanted = {value: arguments_of(key) for (_, key), value in off.items() if value not in (TRUE, FALSE)}
+            found.sort(key=lambda c: any(not set(wanted[a]) & set(c.ground[1]) for a in c.ground[1] if a in wanted))
         return found
 
     def ready(self) -> bool:
@@ -181,7 +195,9 @@ class Guide:
         while off:
             among = {goal: off[goal]} if goal in off else {c: v for c, v in off.items() if c not in closed}
             done = None
-            for candidate in self.candidates(level, among, rank)[:TRIES]:
+            found = self.candidates(level, among, rank, off)
+            possible = (c for c in found if segments.forward[c.ground[0]](*c.ground[1]) is not None)
+            for candidate in islice(possible, TRIES):
                 yield candidate
                 used[candidate.rule.name] = None
                 done = self.do(level, candidate)
@@ -201,6 +217,7 @@ class Guide:
                 closed.add(goal)
                 rank = FAR
         if not off and call.refiner.left_as_it_must(start, targets, keep) is None:
+            self.taught.pop(self.kind(level, targets), None)
             return steps
         for name in used:
             self.broken[name] = self.broken.get(name, 0) + 1
@@ -222,24 +239,34 @@ class Guide:
         done = call.refiner.do(level, name, arguments)
         return done if len(call.table.trail) > mark else None
 
+    def kind(self, level: int, targets: Mapping[Cell, str]) -> object:
+        """Return of what kind targets are: the situation types, and the classes of those whom they are about."""
+        if not self.classes:
+            members = self.call.program.problem.members
+            self.classes = {kind: members(kind) for kind in told_apart(self.call.program.problem)}
+        found = set()
+        for (situation, key), value in targets.items():
+            parts = (*arguments_of(key), value)
+            found.add((situation, *(tuple(k for k, its in self.classes.items() if one in its) for one in parts)))
+        return level, frozenset(found)
+
     def learn(
         self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
     ) -> bool:
         """Learn rules at once from steps of a level that search found, done since a mark; whether there are new ones.
 
-        Of what taught nothing new, after each lesson twice as many are left out.
+        After each lesson twice as many are left out, until rules lead to such targets.
         """
-        kind = level, frozenset(situation for situation, _ in targets)
-        barren, pause = self.taught.get(kind, (0, 0))
+        kind = self.kind(level, targets)
+        lessons, pause = self.taught.get(kind, (0, 0))
         if pause:
-            self.taught[kind] = barren, pause - 1
+            self.taught[kind] = lessons, pause - 1
             return False
+        self.taught[kind] = lessons + 1, 2**lessons
         known = len(self.names)
         done = [(step.behavior, step.arguments) for step in steps]
         self.add(course(self.call, mark, targets, keep, done).rules_of())
-        new = len(self.names) > known
-        self.taught[kind] = (0, 0) if new else (barren + 1, 2**barren)
-        return new
+        return len(self.names) > known
 
 
 def by_rules(guide: Guide) -> Iterator[Candidate]:

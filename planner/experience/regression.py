@@ -21,12 +21,14 @@ from planner.language import terms, walk
 from planner.paper.learning import LearningError
 from planner.validation import Facts, Rules
 from reasoner.amounts import meets
+from reasoner.derivation import strata
 from reasoner.memory.experience import Ground, Order, Rule
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Fact,
@@ -41,6 +43,10 @@ WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition,
 """What memory's files have words for; a rule that asks for anything else isn't learned."""
 LONGEST = 12
 """Rules for more steps than this ask for so much that they seldom apply."""
+
+
+BINDINGS = 100
+"""So many ways in which something that is defined may follow from others are looked at, for one that isn't circular."""
 
 
 @dataclass(frozen=True)
@@ -78,15 +84,14 @@ class Course:
         bound = self.rules.satisfied(behavior.preconditions, given, behavior.kinds, facts)
         if bound is None:
             raise LearningError(f"step {number} ({' '.join((name, *arguments))}): its preconditions don't hold there")
-        asked = [c for lifted in behavior.preconditions for c in self.plain(substituted(lifted, bound), behavior.kinds)]
+        asked = list(self.plain(behavior.preconditions, bound, behavior.kinds, facts))
         kinds = [ClassCondition(argument, p.kind) for p, argument in zip(behavior.parameters, arguments, strict=True)]
         because: dict[tuple[str, tuple[str, ...]], list[Condition]] = {}
         for effect in behavior.effects:
             inner = self.rules.satisfied(effect.when, bound, behavior.kinds, facts) if effect.when else None
             if inner is not None:
                 cell = effect.situation, tuple([inner.get(a, a) for a in effect.arguments])
-                when = [c for lifted in effect.when for c in self.plain(substituted(lifted, inner), behavior.kinds)]
-                because.setdefault(cell, []).extend(when)
+                because.setdefault(cell, []).extend(self.plain(effect.when, inner, behavior.kinds, facts))
         made = self.rules.changes(behavior, arguments, facts)
         if made is None:
             raise LearningError(f"step {number} ({' '.join((name, *arguments))}): an amount would be what it can't be")
@@ -103,23 +108,42 @@ class Course:
             elif symbol in before and not holds:
                 self.lost[Fact(symbol, value)] = number
 
-    def plain(self, condition: Condition, kinds: Mapping[str, str]) -> Iterator[Condition]:
-        """Yield a condition that holds now without choices: the individual and the alternative that there are."""
-        if isinstance(condition, Witness) and not condition.negated:
-            inner = {**kinds, condition.variable: condition.kind}
-            wanted = (*condition.conditions, ClassCondition(condition.variable, condition.kind))
-            found = self.rules.satisfied(wanted, {}, inner, self.facts)
-            for c in wanted if found is not None else ():
-                yield from self.plain(substituted(c, found or {}), inner)
-        elif isinstance(condition, AnyOf) and not condition.negated:
-            for group in condition.alternatives:
-                found = self.rules.satisfied(group, {}, kinds, self.facts)
+    def plain(
+        self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: Facts
+    ) -> Iterator[Condition]:
+        """Yield conditions that hold without choices: the individual and the alternative that there are; no comparison."""
+        for condition in (substituted(lifted, bound) for lifted in conditions):
+            if isinstance(condition, Witness) and not condition.negated:
+                inner = {**kinds, condition.variable: condition.kind}
+                wanted = (*condition.conditions, ClassCondition(condition.variable, condition.kind))
+                found = self.rules.satisfied(wanted, {}, inner, facts)
                 if found is not None:
-                    for c in group:
-                        yield from self.plain(substituted(c, found), kinds)
-                    return
-        else:
-            yield condition
+                    yield from self.plain(wanted, found, inner, facts)
+            elif isinstance(condition, AnyOf) and not condition.negated:
+                ways = ((group, self.rules.satisfied(group, {}, kinds, facts)) for group in condition.alternatives)
+                group, found = next((way for way in ways if way[1] is not None), ((), None))
+                yield from self.plain(group, found or {}, kinds, facts)
+            elif not isinstance(condition, Comparison):
+                yield condition
+
+    def because(self, condition: ValueCondition, facts: Facts) -> Iterator[list[Condition]]:
+        """Yield what a defined situation type may rest on where it is true."""
+        rules = self.problem.domain.rules
+        of = [(rule.conditions, rule.behavior.kinds, rule.parameters) for rule in rules[condition.situation]]
+        group = next(group for group in strata(rules) if condition.situation in group)
+        for conditions, kinds, parameters in sorted(of, key=lambda its: any(s in group for s in situations_of(its[0]))):
+            own = dict(zip((p.name for p in parameters), condition.arguments, strict=True))
+            if not all(who in self.problem.members(kinds[name]) for name, who in own.items()):
+                continue
+            conditions, kinds = opened(conditions, kinds)
+            for _ in range(BINDINGS):
+                found = self.rules.satisfied(conditions, own, kinds, facts)
+                if found is None:
+                    break
+                classes = [ClassCondition(found[v], kind) for v, kind in kinds.items() if v in found]
+                yield [*classes, *self.plain(conditions, found, kinds, facts)]
+                others = [EqualityCondition(v, found[v], negated=True) for v in kinds if v in found and v not in own]
+                conditions = (*conditions, AnyOf(tuple((other,) for other in others)))
 
     # -------------------------------------------------------------------------------------------------------- regressing
 
@@ -138,29 +162,26 @@ class Course:
 
     def regressed(self, goal: Fact, start: int, end: int) -> Iterator[Rule]:
         """Yield the rules for a goal from the step that achieves it backwards."""
-        facts = Facts(self.problem, self.problem.initial)
-        for done in self.done[: end + 1]:
+        facts, later = (Facts(self.problem, self.problem.initial) for _ in range(2))
+        for number, done in enumerate(self.done[: end + 1]):
             for situation, key, value, _ in done.changes:
-                facts.put(situation, key, value)
+                later.put(situation, key, value)
+                if number < end:
+                    facts.put(situation, key, value)
         wanted = ValueCondition(goal.symbol.situation, goal.symbol.arguments, goal.value)
         need: dict[Condition, None] = {wanted: None}
         order: dict[str, None] = dict.fromkeys((*wanted.arguments, wanted.value))
         steps, level = 0, self.problem.domain.behaviors[self.done[end].ground[0]].level
-        for done in reversed(self.done[start : end + 1]):
-            after = dict(need)
-            while len(facts.log) > done.mark:
-                situation, key, old = facts.log[-1]
-                facts.put(situation, key, old)
-                del facts.log[-2:]
+        for position in range(end, start - 1, -1):
+            done, after = self.done[position], need
             if self.problem.domain.behaviors[done.ground[0]].level != level:
                 return  # part of the way left the level: what must be at rest after it, goals don't say
-            served = [c for c in after if self.rules.satisfied([c], {}, {}, facts) is None]
+            need, served = self.needed(after, done, facts, later)
+            undo(later, done.mark)
+            if position > start:
+                undo(facts, self.done[position - 1].mark)
             if not served:
                 continue
-            need = {c: None for c in after if c not in served}
-            need.update(dict.fromkeys(done.asked))
-            for condition in served:
-                need.update(dict.fromkeys(self.before(condition, done, facts)))
             steps += 1
             if steps > LONGEST:
                 return
@@ -169,6 +190,47 @@ class Course:
             rule = self.lifted(wanted, tuple(need), done.ground, steps, tuple(order))
             if rule is not None:
                 yield rule
+
+    def needed(
+        self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
+    ) -> tuple[dict[Condition, None], bool]:
+        """Return what must hold before a step so that something holds after it, and whether the step serves that at all.
+
+        What is defined is replaced by what it rests on, as far as the step brought it about; what follows no more, by what it
+        followed from.
+        """
+        need, served = dict[Condition, None](), dict[Condition, None]()
+        tries = BINDINGS
+
+        def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
+            """Return what something rests on, each with whether it holds before the step; None if on itself alone."""
+            nonlocal tries
+            if self.rules.satisfied([c], {}, {}, facts) is not None:
+                return [(c, True)]
+            if not isinstance(c, ValueCondition) or c.situation not in self.problem.domain.rules:
+                return [(c, False)]
+            for way in (
+                self.because(c, later if (c.value == TRUE) is not c.negated else facts) if c not in above else ()
+            ):
+                tries -= 1
+                found: list[tuple[Condition, bool]] = [(c, False)]
+                for other in way:
+                    inner = rests(other, (*above, c)) if tries > 0 else None
+                    if inner is None:
+                        break
+                    found += inner
+                else:
+                    return found
+            return None
+
+        for c in after:
+            for other, holds in rests(c, ()) or [(c, False)]:
+                (need if holds else served)[other] = None
+        if served:
+            need.update(dict.fromkeys(done.asked))
+            for c in served:
+                need.update(dict.fromkeys(self.before(c, done, facts)))
+        return need, bool(served)
 
     def before(self, condition: Condition, done: Done, facts: Facts) -> Iterator[Condition]:
         """Yield what must hold before a step for what it makes true: its effects' conditions, and none but those it took away."""
@@ -206,7 +268,7 @@ class Course:
 
         for c in need:
             if isinstance(c, ClassCondition) and not c.negated:
-                narrow(c.term, c.kind)
+                narrow(c.term, self.plainest(c.term, c.kind))
         situations = self.problem.domain.situations
         asked = [inner for c in (goal, *need) for inner in walk(c)]
         for inner in sorted(asked, key=lambda inner: isinstance(inner, RelationCondition)):
@@ -214,6 +276,8 @@ class Course:
             if isinstance(inner, ValueCondition):
                 kind = situations[inner.situation]
                 ends = zip((*inner.arguments, inner.value), (*kind.arguments, kind.range), strict=True)
+                if kind.quantity is not None:
+                    ends = zip(inner.arguments, kind.arguments, strict=True)
             elif isinstance(inner, RelationCondition):
                 ends = ((who, "") for who in inner.arguments)
             for who, of in ends:
@@ -269,6 +333,33 @@ class Course:
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
                 yield ordered(first, then, self.constants)
+
+
+def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
+    """Return conditions with those inside of witnesses beside them, and the classes of all variables."""
+    found, of = list[Condition](), dict(kinds)
+    for condition in conditions:
+        if isinstance(condition, Witness) and not condition.negated:
+            of[condition.variable] = condition.kind
+            inner, of = opened(condition.conditions, of)
+            found += [*inner, ClassCondition(condition.variable, condition.kind)]
+        else:
+            found.append(condition)
+    return tuple(found), of
+
+
+def situations_of(conditions: Iterable[Condition]) -> Iterator[str]:
+    """Yield the situation types that conditions ask for."""
+    for condition in conditions:
+        yield from (inner.situation for inner in walk(condition) if isinstance(inner, ValueCondition))
+
+
+def undo(facts: Facts, mark: int) -> None:
+    """Take back what was changed since the log had a length."""
+    while len(facts.log) > mark:
+        situation, key, old = facts.log[-1]
+        facts.put(situation, key, old)
+        del facts.log[-2:]
 
 
 def ordered_inside(condition: Condition) -> Condition:

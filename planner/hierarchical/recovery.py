@@ -26,6 +26,8 @@ ALL = (WHOLE,)
 """All goals at once in the whole world."""
 FEW = 1_000
 """So many states of the lowest level, at least, are worth looking at."""
+CONFIDENT = 10
+"""So many times as many where all goals are of kinds that were reached before."""
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
 Done = TypeVar("Done")
@@ -103,7 +105,9 @@ class Recovery:
                     self._prove()
                 continue
             for cell in candidates():
-                if (level, attempt) in call.failed.get(cell, ()):
+                if self.advised(cell):
+                    return True
+                if attempt is ADVISED or (level, attempt) in call.failed.get(cell, ()):
                     continue
                 if call.achieve(level, cell, attempt):
                     return True
@@ -122,6 +126,14 @@ class Recovery:
             return self.harder(asleep, before)
         return False
 
+    def advised(self, cell: Cell) -> bool:
+        """Achieve a goal as advised, if there is advice now that wasn't tried; whether that succeeded."""
+        call, attempt = self.call, (self.call.program.levels[0], ADVISED)
+        if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
+            return False
+        call.failed.setdefault(cell, set()).add(attempt)
+        return call.achieve(attempt[0], cell, ADVISED)
+
     def _doubt(self) -> None:
         """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
         if not self._doubted:
@@ -137,7 +149,10 @@ class Recovery:
             self._prove()
 
     def _prove(self) -> None:
-        """Raise `UnsolvableError` if it can be shown on the lowest level that there is no plan."""
+        """Raise `UnsolvableError` if the lowest level shows that there is no plan; what is expected is searched first."""
+        call, worth = self.call, FEW * CONFIDENT * self.call.program.size(self.call.program.levels[-1])
+        if call.advice is not None and call.advice.expects and call.segments.worked < worth:
+            return
         if self._lowest is None:
             self._lowest = proved(self.call.problem, self.call.segments)
         if not isinstance(self._lowest, Reason):

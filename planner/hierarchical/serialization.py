@@ -56,6 +56,12 @@ def compiled(problem: Problem) -> Compiled:
 class GoalAdvice(Advice, Protocol):
     """What may know steps to goals, too."""
 
+    expects: bool
+    """Whether all goals are of kinds that were reached before."""
+
+    def ready(self) -> bool:
+        """Whether advice is to be taken now."""
+
     def rank(self, cell: Cell) -> int:
         """Return how many steps are promised for a goal; 0 if none are."""
 

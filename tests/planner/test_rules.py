@@ -11,16 +11,18 @@ from planner.experience.evidence import View
 from planner.experience.leading import Guide
 from planner.experience.lessons import compared, live, rules_in, teach
 from planner.experience.regression import Course
+from planner.grounded.task import Task
 from planner.hierarchical import planner as fast
+from planner.hierarchical import recovery
 from planner.hierarchical.operators import Program
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.serialization import Call, compiled
-from planner.plan import Outcome, Status
+from planner.plan import Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Order, Rule, Tally
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse_files
-from reasoner.symbols import Problem
+from reasoner.symbols import Problem, RelationCondition, ValueCondition
 from tests.planner.small import van
 from worlds.lessons import problem, taught
 
@@ -254,6 +256,53 @@ def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
     live(experience, few, led.plan)
     again = plan(few, Memory(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
+
+
+def test_one_lesson_carries_a_laboratory_five_times_as_large() -> None:
+    small, large = (confab.load(f"laboratory-{size}").problem for size in ("small", "large"))
+    experience = Experience("robot")
+    teach(experience, small)
+    led = plan(large, Memory(experience))
+    assert led.plan is not None
+    assert validate(large, led.plan) == []
+    assert expanded(led) <= 1.1 * led.plan.length[1]
+
+
+def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
+    experience = Experience("robot")
+    teach(experience, confab.load("gallery-small").problem)
+    opening = [r for r in rules_in(experience) if r.goal.situation == "AT" and (r.does[0], r.steps) == ("OPEN_DOOR", 2)]
+    assert opening
+    for rule in opening:
+        _, door, here = rule.does[1]
+        beyond = {c.arguments[0] for c in rule.asks if isinstance(c, ValueCondition) and c.situation == "WAY"}
+        assert any(
+            RelationCondition("doorOf", (door, there)) in rule.asks and there != here
+            for there in {*beyond, rule.goal.value}
+        )
+
+
+def test_rules_are_learned_where_amounts_are_compared() -> None:
+    small, large = (confab.load(f"canteen-{size}").problem for size in ("small", "large"))
+    experience = Experience("robot")
+    teach(experience, small)
+    alone, led = fast.plan(large, improve=0), plan(large, Memory(experience), improve=0)
+    assert led.plan is not None
+    assert validate(large, led.plan) == []
+    assert 3 * expanded(led) < 2 * expanded(alone)
+
+
+def test_what_was_reached_before_is_not_doubted_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    def proved(*_: object) -> Task | Reason:
+        raise AssertionError("looked for a proof")
+
+    small, large = (confab.load(f"gallery-{size}").problem for size in ("small", "large"))
+    experience = Experience("robot")
+    teach(experience, small)
+    monkeypatch.setattr(recovery, "proved", proved)
+    assert plan(large, Memory(experience)).plan is not None
+    with pytest.raises(AssertionError, match="looked for a proof"):
+        fast.plan(large)
 
 
 def test_what_search_found_in_a_call_leads_on_in_it() -> None:
