@@ -61,7 +61,7 @@ def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Pat
 
 def teach(domain: Path, training: list[Path], target: Path) -> str:
     """Learn from problems as long as there is time, write what was learned, and say how much."""
-    from planner.experience.lessons import rules_in
+    from planner.experience.leading import rules_in
     from planner.experience.lessons import teach as learn
     from reasoner.memory.experience import Experience
     from reasoner.memory.experience_file import save

@@ -24,7 +24,8 @@ from time import process_time
 import confab
 import ontology
 from planner.experience.advice import Memory, plan
-from planner.experience.lessons import live, rules_in, teach
+from planner.experience.leading import rules_in
+from planner.experience.lessons import live, teach
 from planner.hierarchical import planner as fast
 from planner.plan import Limits, Outcome
 from planner.validation import validate

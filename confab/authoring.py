@@ -19,7 +19,7 @@ from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.memory.experience_file import Lines
 from reasoner.names import local_name, nearest
-from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY
+from reasoner.vocabulary import ARGUMENTS, CORE
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -218,13 +218,12 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     """
     spoken: set[str] = set()
     with suppress(SyntaxError):  # of which reading the memory tells
-        quads = list(ox.parse(memory.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY))
-        kinds = {q.subject for q in quads if getattr(q.object, "value", "") == CORE + "GoalKind"}
+        kinds = {t.subject for t in memory.triples if getattr(t.object, "value", "") == CORE + "GoalKind"}
         spoken = {
-            q.object.value
-            for q in quads
-            if isinstance(q.object, ox.NamedNode)
-            and (q.predicate.value in TERMS or (q.subject in kinds and q.predicate.value in ROLES))
+            t.object.value
+            for t in memory.triples
+            if isinstance(t.object, ox.NamedNode)
+            and (t.predicate.value in TERMS or (t.subject in kinds and t.predicate.value in ROLES))
         }
     asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken))
     rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if spoken else []

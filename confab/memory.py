@@ -50,7 +50,7 @@ class Memory:
     Attributes
     ----------
     links : Links
-        The paper's p(situated object instance | quantified behaviour).
+        The paper's p(situated object instance | quantified behaviour); read from a file when it is first asked for.
     names : Names
         Leads short names to IRIs.
     scene : str
@@ -63,12 +63,23 @@ class Memory:
         What people call the scene's terms, asked for where something is said.
     """
 
-    links: Links
+    linked: Links | Callable[[], Links]
     names: Names
     scene: str
     experience: Experience = field(default_factory=lambda: Experience(new_replica()))
     trusted: set[str] = field(default_factory=set)
     labels: Callable[[], Labels] | None = None
+
+    @property
+    def links(self) -> Links:
+        """The paper's links."""
+        if not isinstance(self.linked, Links):
+            self.linked = self.linked()
+        return self.linked
+
+    @links.setter
+    def links(self, links: Links) -> None:
+        self.linked = links
 
     @classmethod
     def of(cls, scene: Known) -> Memory:
@@ -103,9 +114,10 @@ class Memory:
             found = cls(Links(), names, iri, pull(url, names))
         else:
             path = Path(source)
-            lines = memory_lines(path) if lines is None else lines
-            iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path, lines)
-            found = cls(load_links(path, names, lines), names, iri)
+            read = memory_lines(path) if lines is None else lines
+            iri, names = (scene.iri, scene.names) if scene is not None else memory_names(path, read)
+            found = cls(lambda: load_links(path, names, read), names, iri)
+            lines = read
             if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
                 found.experience = parse(lines, str(path), names)
             elif not len(found.links):

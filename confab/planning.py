@@ -136,7 +136,7 @@ def _plan(
     leave_levels: bool,
 ) -> Result:
     begin, asked = perf_counter(), scene.knowledge.round_trips
-    links = memory if isinstance(memory, Links) or memory is None else memory.links
+    links = memory if isinstance(memory, Links) else memory.links if memory is not None and mode == "paper" else None
     advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
     grounds = None
     if mode == "paper":

@@ -20,8 +20,7 @@ from functools import cached_property
 from time import perf_counter
 
 from planner.experience.evidence import Judge, View
-from planner.experience.leading import Candidate, Guide, by_rules, usable
-from planner.experience.lessons import rules_in
+from planner.experience.leading import Candidate, Guide, by_rules, rules_in, usable
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled

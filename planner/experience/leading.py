@@ -302,6 +302,15 @@ def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done:
     return Course(replace(call.problem, initial=state, goal=goal), done)
 
 
+def rules_in(experience: Experience) -> list[Rule]:
+    """Return the rules that may be followed."""
+    return [
+        one
+        for name, one in sorted(experience.said.items())
+        if isinstance(one, Rule) and name not in experience.disabled
+    ]
+
+
 def usable(experience: Experience) -> list[Order]:
     """Return the orders that held in nearly all cases; one between goals that share nobody, of different situation types only."""
     counts = experience.totals()

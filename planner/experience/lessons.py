@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from planner.experience.evidence import View
-from planner.experience.leading import Candidate, Guide, by_rules, course, usable
+from planner.experience.leading import Candidate, Guide, by_rules, course, rules_in, usable
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner
@@ -107,15 +107,6 @@ def live(
 def grounds(steps: Sequence[Step]) -> list[tuple[str, tuple[str, ...]]]:
     """Return steps as behaviours with their arguments."""
     return [(step.behavior, step.arguments) for step in steps]
-
-
-def rules_in(experience: Experience) -> list[Rule]:
-    """Return the rules that may be followed."""
-    return [
-        one
-        for name, one in sorted(experience.said.items())
-        if isinstance(one, Rule) and name not in experience.disabled
-    ]
 
 
 def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:

@@ -16,10 +16,9 @@ import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field
+from functools import cached_property
 from pathlib import Path
-from urllib.error import URLError
-from urllib.parse import quote, urlencode
-from urllib.request import Request, urlopen
+from urllib.parse import quote
 
 import pyoxigraph as ox
 
@@ -58,13 +57,23 @@ COUNTS = re.compile(
 """Most of a file are such lines: lifted facts, or counts of a link. The rest, in any layout, is left to the Turtle parser."""
 
 
+PAPER = re.compile(r"^(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n", re.MULTILINE)
+"""The lines of the paper's links, which the paper's mode alone reads."""
+
+
 @dataclass(frozen=True)
 class Lines:
-    """A memory file taken apart: the links with their counts, the lifted facts by name, and the rest as Turtle."""
+    """A memory file taken apart: the links with their counts, the lifted facts by name, the rest as Turtle, the paper's links."""
 
     links: list[tuple[str, str, Tally]] = field(default_factory=list)
     facts: dict[str, Fact] = field(default_factory=dict)
     rest: str = ""
+    paper: str = ""
+
+    @cached_property
+    def triples(self) -> list[ox.Triple]:
+        """The rest, parsed; raises `SyntaxError`."""
+        return [q.triple for q in ox.parse(self.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
 
 
 def lines(text: str) -> Lines:
@@ -79,7 +88,8 @@ def lines(text: str) -> Lines:
             facts[fact] = asks, answer
         else:
             links.append((counter, about, Tally(*map(int, counts))))
-    return Lines(links, facts, "".join([*rest, text[at:]]))
+    text = "".join([*rest, text[at:]])
+    return Lines(links, facts, PAPER.sub("", text), "".join(PAPER.findall(text)))
 
 
 def new_replica() -> str:
@@ -190,7 +200,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
 def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
     """Read a memory; `source` names it in messages."""
     try:
-        triples = [q.triple for q in ox.parse(found.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
+        triples = found.triples
     except SyntaxError as error:
         raise KnowledgeError(f"{source}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     return _experience(triples, found, source, names)
@@ -303,6 +313,10 @@ def push(endpoint: str, experience: Experience, names: Names, domain: str, timeo
 
 
 def _ask(endpoint: str, form: Mapping[str, str], timeout: float) -> bytes:
+    from urllib.error import URLError  # only where a memory is at an endpoint: what speaks HTTP takes long to import
+    from urllib.parse import urlencode
+    from urllib.request import Request, urlopen
+
     url = endpoint if "query" in form else re.sub(r"/(query|sparql)/?$", "/update", endpoint)
     headers = {"Content-Type": "application/x-www-form-urlencoded", "Accept": "application/n-triples"}
     try:

@@ -136,7 +136,8 @@ def memory_lines(path: Path) -> Lines:
 
 def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
     """Return all of a file but the counts as a graph."""
-    rest = (found or memory_lines(path)).rest
+    found = found or memory_lines(path)
+    rest = found.rest + found.paper
     graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
     try:
         triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())

@@ -17,6 +17,7 @@ from planner.plan import Plan
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
+from reasoner.memory.links import Links
 from reasoner.memory.links_file import memory_lines
 
 
@@ -55,6 +56,18 @@ def test_a_memory_that_is_looked_after_without_its_scene_still_speaks_of_its_ter
         assert CliRunner().invoke(app, ["memory", *map(str, arguments)]).exit_code == 0
         assert unknown_terms(memory_lines(file), scene.knowledge) == []
     assert confab.Memory.load(file, scene).experience.said == memory.experience.said
+
+
+def test_the_papers_links_are_read_for_the_papers_mode_alone(tmp_path: Path, scene: confab.Scene) -> None:
+    memory = confab.Memory.of(scene)
+    memory.teach(scene, scene.plan())
+    memory.save(tmp_path / "memory.ttl")
+    read = confab.Memory.load(tmp_path / "memory.ttl", scene)
+    scene.plan(memory=read)
+    assert not isinstance(read.linked, Links)
+    scene.plan(memory=read, mode="paper")
+    assert isinstance(read.linked, Links)
+    assert len(read.linked) == len(memory.links) > 0
 
 
 def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -> None:

@@ -8,8 +8,8 @@ import pytest
 import confab
 from planner.experience.advice import Memory, plan
 from planner.experience.evidence import View
-from planner.experience.leading import Guide
-from planner.experience.lessons import compared, live, rules_in, teach
+from planner.experience.leading import Guide, rules_in
+from planner.experience.lessons import compared, live, teach
 from planner.experience.regression import Course
 from planner.grounded.task import Task
 from planner.hierarchical import planner as fast
