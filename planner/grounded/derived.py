@@ -4,7 +4,8 @@ part          bits that need each other, mostly one; what a part needs besides s
 alternatives  a bit is set where all bits of one of its alternatives are; an opposite where the one bit that it names isn't
 
 After a change only the parts are looked at that need a bit which changed. A part of several bits is worked out from nothing, by
-counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984).
+counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984). Where there are many (who
+reaches whom in a large place), by arrays: round by round all alternatives at once.
 """
 
 from __future__ import annotations
@@ -13,7 +14,13 @@ import heapq
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, partial
+from itertools import chain
+
+import numpy as np
+
+MANY = 2_000
+"""Alternatives from which on arrays are faster than counting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +45,8 @@ class Derived:
 
     def completed(self, state: int) -> int:
         """Return a state with all these bits as they have to be."""
-        for part in self.parts:
-            state = _worked_out(part, state)
+        for number in range(len(self.parts)):
+            state = self._worked_out(number, state)
         return state
 
     def after(self, state: int, before: int) -> int:
@@ -64,7 +71,7 @@ class Derived:
         wake(state ^ before)
         while waiting:
             number = heapq.heappop(waiting)
-            new = _worked_out(self.parts[number], state)
+            new = self._worked_out(number, state)
             if new != state:
                 changed, state = new ^ state, new
                 wake(changed)
@@ -73,8 +80,19 @@ class Derived:
     def fresh(self, state: int, bits: int) -> int:
         """Return a state with some of these bits as they have to be; the others may be those of another state."""
         for number in self._support(bits & self.mask):
-            state = _worked_out(self.parts[number], state)
+            state = self._worked_out(number, state)
         return state
+
+    def _worked_out(self, number: int, state: int) -> int:
+        """Return a state with the bits of one part as they have to be."""
+        work = self._works.get(number)
+        if work is None:
+            work = self._works[number] = _work(self.parts[number])
+        return work(state)
+
+    @cached_property
+    def _works(self) -> dict[int, Callable[[int], int]]:
+        return {}
 
     def _support(self, bits: int) -> Sequence[int]:
         """Return the parts on which bits depend, in order."""
@@ -135,43 +153,90 @@ def _single(mask: int) -> Iterable[int]:
         yield low
 
 
-def _worked_out(part: tuple[Bit, ...], state: int) -> int:
-    """Return a state with the bits of one part as they have to be."""
+def _work(part: tuple[Bit, ...]) -> Callable[[int], int]:
+    """Return what gives a state the bits of one part as they have to be."""
     if len(part) == 1:
-        bit = part[0]
-        for wanted in bit.alternatives:
-            if state & wanted == wanted:
-                return state & ~bit.mask if bit.opposite else state | bit.mask
-        return state | bit.mask if bit.opposite else state & ~bit.mask
-    own, ways = _circular(part)
-    state &= ~own
-    lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: how many are lacking, and of what
-    waiting: list[int] = []
-    for outside, inside, mask in ways:
-        if state & outside == outside:
-            if not inside:
-                waiting.append(mask)
-                continue
-            entry = [len(inside), mask]
-            for low in inside:
-                lacking[low].append(entry)
-    while waiting:
-        mask = waiting.pop()
-        if state & mask:
-            continue
-        state |= mask
-        for entry in lacking.get(mask, ()):
-            entry[0] -= 1
-            if not entry[0]:
-                waiting.append(entry[1])
-    return state
+        return partial(_alone, part[0])
+    return _by_arrays(part) if _ways(part) >= MANY else _by_counting(part)
 
 
-@lru_cache(maxsize=4096)
-def _circular(part: tuple[Bit, ...]) -> tuple[int, list[tuple[int, tuple[int, ...], int]]]:
-    """Return the bits of a part, and each alternative as what it needs of other parts, and of this one, for which bit."""
+def _ways(part: tuple[Bit, ...]) -> int:
+    return sum(len(bit.alternatives) for bit in part)
+
+
+def _alone(bit: Bit, state: int) -> int:
+    for wanted in bit.alternatives:
+        if state & wanted == wanted:
+            return state & ~bit.mask if bit.opposite else state | bit.mask
+    return state | bit.mask if bit.opposite else state & ~bit.mask
+
+
+def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
     own = sum(bit.mask for bit in part)
-    return own, [(way & ~own, tuple(_single(way & own)), bit.mask) for bit in part for way in bit.alternatives]
+    ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # by what they need of other parts
+    for bit in part:
+        for way in bit.alternatives:
+            ways[way & ~own].append((tuple(_single(way & own)), bit.mask))
+
+    def work(state: int) -> int:
+        state &= ~own
+        lacking: dict[int, list[list[int]]] = defaultdict(list)  # by bit of the part: how many are lacking, and of what
+        waiting: list[int] = []
+        for outside, of_these in ways.items():
+            if state & outside == outside:
+                for inside, mask in of_these:
+                    if not inside:
+                        waiting.append(mask)
+                        continue
+                    entry = [len(inside), mask]
+                    for low in inside:
+                        lacking[low].append(entry)
+        while waiting:
+            mask = waiting.pop()
+            if state & mask:
+                continue
+            state |= mask
+            for entry in lacking.get(mask, ()):
+                entry[0] -= 1
+                if not entry[0]:
+                    waiting.append(entry[1])
+        return state
+
+    return work
+
+
+def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
+    own = sum(bit.mask for bit in part)
+    ways = [(way, bit.mask.bit_length() - 1) for bit in part for way in bit.alternatives]
+    size = max(max(way.bit_length() for way, _ in ways), own.bit_length())
+
+    def rows(masks: Sequence[int]) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+        lists = [[low.bit_length() - 1 for low in _single(mask)] for mask in masks]
+        found = np.full((len(lists), max(map(len, lists))), size)  # the bit behind the last is always set
+        for row, bits in zip(found, lists, strict=True):
+            row[: len(bits)] = bits
+        return found
+
+    outsides, inside = rows([way & ~own for way, _ in ways]), rows([way & own for way, _ in ways])
+    outsides, which = np.unique(outsides, axis=0, return_inverse=True)
+    heads, low, length = np.array([head for _, head in ways]), (1 << size) - 1, size // 8 + 1
+
+    def work(state: int) -> int:
+        there = np.frombuffer((state & low & ~own | 1 << size).to_bytes(length, "little"), np.uint8)
+        flags = np.unpackbits(there, bitorder="little").view(bool)
+        active = np.flatnonzero(flags[outsides].all(axis=1)[which.ravel()])
+        lacking, goal = inside[active], heads[active]
+        while len(goal):
+            ready = flags[lacking].all(axis=1)
+            if not ready.any():
+                break
+            flags[goal[ready]] = True
+            left = ~flags[goal]
+            lacking, goal = lacking[left], goal[left]
+        flags[size] = False
+        return state & ~low | int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
+
+    return work
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
@@ -217,7 +282,25 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
                         if member == number:
                             break
                     parts.append(tuple(part))
-    return Derived(tuple(parts))
+    return Derived(tuple(_joined(parts)))
+
+
+def _joined(parts: Sequence[tuple[Bit, ...]]) -> list[tuple[Bit, ...]]:
+    """Return parts by how many others stand below them, those of several bits in one with others that stand as high if they are large."""
+    height: dict[int, int] = {}  # by bit
+    found: list[list[tuple[Bit, ...]]] = []
+    for part in parts:
+        own = {bit.mask for bit in part}
+        needed = {low for bit in part for way in bit.alternatives for low in _single(way)} - own
+        mine = 1 + max((height.get(low, -1) for low in needed), default=-1)
+        height |= dict.fromkeys(own, mine)
+        found += [[] for _ in range(mine + 1 - len(found))]
+        found[mine].append(part)
+    for as_high in found:
+        several = [part for part in as_high if len(part) > 1]
+        if len(several) > 1 and sum(map(_ways, several)) >= MANY:
+            as_high[:] = [*(part for part in as_high if len(part) == 1), tuple(chain(*several))]
+    return list(chain(*found))
 
 
 def _union(masks: Iterable[int]) -> int:

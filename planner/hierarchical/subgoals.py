@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from heapq import nsmallest
+from itertools import islice
 from typing import Any, TypeAlias
 
 from planner.amount_transitions import amount
@@ -58,7 +59,10 @@ class Wants:
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[Condition, Condition]] = {}
-        self._open: set[tuple[str, Key, bool]] = set()  # what is defined, and being asked what brings it about
+        self._entered: dict[tuple[str, Key, bool], int] | None = (
+            None  # what is defined, and how deep it was asked about
+        )
+        self._depth = 0
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str], list[str]] = {}
@@ -127,10 +131,11 @@ class Wants:
                                 yield from self.of(achiever, self._negation(c), inner, level)
                 else:
                     lacking: list[tuple[str, list[Condition]]] = []
-                    for individual in self.one_of_each(kind):
+                    changing = [c for c in conditions if not self._about(c)[0]]
+                    for individual in self.one_of_each(kind, env.values()):
                         inner = {**env, variable: individual}
-                        if all(self.holds(achiever, c, inner) for c in conditions if not _fluent(c)):
-                            unmet = [c for c in conditions if _fluent(c) and not self.holds(achiever, c, inner)]
+                        if all(self.holds(achiever, c, inner) for c in conditions if c not in changing):
+                            unmet = [c for c in changing if not self.holds(achiever, c, inner)]
                             lacking.append((individual, unmet))
                     for individual, unmet in self._nearest(lacking) if achiever.rule else lacking:
                         for c in unmet:
@@ -146,20 +151,24 @@ class Wants:
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
         """Return wants, any of which may make something that is defined true, or false."""
-        if situation in self._circular:  # then it depends on where one comes from
-            return list(dict.fromkeys(self._defining(situation, key, wanted, level)))
+        if self._entered is not None and situation in self._circular:  # then it depends on where one comes from
+            return list(self._defining(situation, key, wanted, level))
         self._forget()
         asked = situation, key, wanted, level
         found = self._fresh.get(asked)
         if found is None:
+            outside, self._entered, self._depth = (self._entered, self._depth), {}, 0
             found = self._fresh[asked] = list(dict.fromkeys(self._defining(situation, key, wanted, level)))
+            self._entered, self._depth = outside
         return found
 
     def _defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:
         cell = situation, key, wanted
-        if cell in self._open or len(self._open) >= DEEPEST:
-            return
-        self._open.add(cell)
+        assert self._entered is not None
+        if self._entered.get(cell, DEEPEST) <= self._depth:
+            return  # what it wants is among what was found
+        self._entered[cell] = self._depth
+        self._depth += 1
         for parameters, rule in self.program.rules[situation]:
             env: dict[str, str | None] = dict(zip(parameters, arguments_of(key), strict=True))
             if all(env[name] in self.program.members.get(rule.kinds[name], ()) for name in parameters):
@@ -172,7 +181,7 @@ class Wants:
                     for condition in rule.soft:
                         if not self._about(condition)[0] and condition not in rule.determining:
                             yield from self.of(rule, self._negation(condition), env, level)
-        self._open.discard(cell)
+        self._depth -= 1
 
     def _nearest(self, lacking: Sequence[tuple[str, list[Condition]]]) -> Sequence[tuple[str, list[Condition]]]:
         """Return of those who could satisfy a rule's witness the ones that it is about, or else a few that lack least."""
@@ -327,10 +336,18 @@ class Wants:
         values = self.candidates(situation, key, self.program.domain.situations[situation].range)
         return tuple(value for value in values if value != avoid and levels.get(value, 1) <= level)
 
-    def one_of_each(self, kind: str) -> list[str]:
-        """Return the individuals of a class, or one of each symmetry class and state if they are many."""
-        members = self.program.problem.classes.get(kind, ())
-        return list(members) if len(members) <= FEW else self.program.alike.unlike(members, (), self.table.now)
+    def one_of_each(self, kind: str, beside: Collection[str | None] = ()) -> list[str]:
+        """Return the individuals of a class, or one of each symmetry class and state if they are many.
+
+        Of a symmetry class that has an individual `beside`, one more: it may have to be another.
+        """
+        members, alike = self.program.problem.classes.get(kind, ()), self.program.alike
+        if len(members) <= FEW:
+            return list(members)
+        found = alike.unlike(members, (), self.table.now)
+        for sort in sorted({alike.sort.get(one, -1) for one in beside if one in found}):
+            found += islice((one for one in alike.members[sort] if one not in beside and one not in found), 1)
+        return found
 
     def _boolean(self, situation: str) -> bool:
         return self.program.domain.situations[situation].boolean
@@ -368,7 +385,3 @@ class Wants:
             function = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
             found = self._tests[key] = function(self.table.now, self.table.who)
         return found, names
-
-
-def _fluent(condition: Condition) -> bool:
-    return isinstance(condition, ValueCondition | Comparison | Witness | AnyOf)
