@@ -16,8 +16,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+
+Flags: TypeAlias = NDArray[np.bool_]
 
 MANY = 2_000
 """Alternatives from which on arrays are faster than counting."""
@@ -42,6 +46,11 @@ class Derived:
     def mask(self) -> int:
         """All bits that follow from others."""
         return sum(bit.mask for part in self.parts for bit in part)
+
+    @cached_property
+    def effort(self) -> int:
+        """The alternatives gone through after a change, at most, but for those of parts of one bit."""
+        return sum(_ways(part) for part in self.parts if len(part) > 1)
 
     def completed(self, state: int) -> int:
         """Return a state with all these bits as they have to be."""
@@ -210,7 +219,7 @@ def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
     ways = [(way, bit.mask.bit_length() - 1) for bit in part for way in bit.alternatives]
     size = max(max(way.bit_length() for way, _ in ways), own.bit_length())
 
-    def rows(masks: Sequence[int]) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    def rows(masks: Sequence[int]) -> NDArray[np.int64]:
         lists = [[low.bit_length() - 1 for low in _single(mask)] for mask in masks]
         found = np.full((len(lists), max(map(len, lists))), size)  # the bit behind the last is always set
         for row, bits in zip(found, lists, strict=True):
@@ -223,8 +232,9 @@ def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
     def work(state: int) -> int:
         there = np.frombuffer((state & low & ~own | 1 << size).to_bytes(length, "little"), np.uint8)
-        flags = np.unpackbits(there, bitorder="little").view(bool)
-        active = np.flatnonzero(flags[outsides].all(axis=1)[which.ravel()])
+        flags: Flags = np.unpackbits(there, bitorder="little").astype(np.bool_)
+        possible: Flags = np.logical_and.reduce(flags[outsides], axis=1)
+        active = np.flatnonzero(possible[which.ravel()])
         lacking, goal = inside[active], heads[active]
         while len(goal):
             ready = flags[lacking].all(axis=1)
@@ -286,7 +296,7 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
 
 
 def _joined(parts: Sequence[tuple[Bit, ...]]) -> list[tuple[Bit, ...]]:
-    """Return parts by how many others stand below them, those of several bits in one with others that stand as high if they are large."""
+    """Return parts by how many are below them; those of several bits that are equally high in one, if they are large."""
     height: dict[int, int] = {}  # by bit
     found: list[list[tuple[Bit, ...]]] = []
     for part in parts:

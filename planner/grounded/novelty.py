@@ -26,7 +26,6 @@ MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
 STATE_BYTES = 400  # that a state takes besides its bits
 # bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
 CHILD, VISIT = 20, 2
-AT_ONCE = 32  # states expanded in one turn
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""
@@ -43,10 +42,10 @@ def by_novelty(
     counts: Counts,
     marked: Callable[[], int] | None = None,
 ) -> Generator[int, None, tuple[Seen, int] | None]:
-    """Search by novelty; yield the work done, in bits, every so many states; return what was seen and the last state.
+    """Search by novelty; yield the work done, in bits, when it is that of a relaxed plan; return what was seen and the last state.
 
-    `relaxing` is the work of a relaxed plan.
-    Where there are landmarks (`marked`), those that weren't met yet count like goals, and of equal states the last comes first.
+    `relaxing` is the work of a relaxed plan. Where there are landmarks (`marked`), those that weren't met yet count like goals, and
+    of equal states the last comes first.
 
     Raises
     ------
@@ -60,16 +59,15 @@ def by_novelty(
     above = -1 << task.size if task.amounts else 0  # where the number of the amounts is, which is no fact
     known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # of each distance, the facts of its states
     marks = marked() & ~(task.initial | goal) if marked else 0
-    child = CHILD + task.size // 50
+    child = CHILD + task.size // 50 + task.derived.effort
     number, step = 0, -1 if marked else 1
     # (no new fact, distance, number, state, facts of the relaxed plan (-1: not made yet), those met, landmarks left)
     first = (goal & ~task.initial).bit_count() + marks.bit_count()
     queue: list[tuple[bool, int, int, int, int, int, int]] = [(False, first, 0, task.initial, -1, 0, marks)]
-    work = turns = 0
+    work = 0
     while queue:
         _, open_, _, state, wanted, met, unmet = heapq.heappop(queue)
-        turns += 1
-        if not turns % AT_ONCE:
+        if work >= relaxing:
             yield work
             work = 0
             if len(seen) > most:

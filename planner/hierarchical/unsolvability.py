@@ -266,7 +266,7 @@ def looked_at(task: Task, segments: Segments, before: int) -> int:
     """
     from planner.grounded.shortest import shortest
 
-    state = max(len(task), LEAST) * (1 + len(task.derived.parts) // 10)  # what follows from it costs, too
+    state = max(len(task.owners), LEAST)
     most = max(LOOKING, segments.worked) // state
     if most < 2 * before:
         return before

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner.grounded.derived import Bit, in_parts
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.hierarchical.operators import Program
@@ -212,3 +213,28 @@ def test_what_is_defined_by_a_lower_level_exists_from_there_on(tmp_path: Path, d
     assert outcome.plan is not None
     assert [step.behavior for step in outcome.plan.primitives] == ["L2_ROLL", "L2_WORK"]
     assert not [finding for finding in validate([path]) if finding.serious]
+
+
+@given(seed=st.integers(0, 10**9))
+def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int) -> None:
+    rng = Random(seed)
+    first, places = 6, range(6, 18)  # six bits that are stated, twelve that follow from each other and from these
+    bits = {
+        bit: Bit(1 << bit, tuple(sum({1 << other for other in rng.sample(range(18), rng.randint(1, 3))} - {1 << bit})
+                                 for _ in range(rng.randint(0, 4))))
+        for bit in places
+    }  # fmt: skip
+    changes, above = (
+        rng.sample(range(1 << first), 1 << first),
+        5 << 20,
+    )  # the number of the amounts stands above all bits
+    found = []
+    for many in (0, 10**6):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("planner.grounded.derived.MANY", many)
+            derived = in_parts(bits)
+            states = [derived.completed(stated | above) for stated in range(1 << first)]
+            after = [derived.after(state ^ change, state) for state, change in zip(states, changes, strict=True)]
+            assert after == [states[stated ^ change] for stated, change in enumerate(changes)]
+            found.append(states)
+    assert found[0] == found[1]

@@ -14,7 +14,7 @@ from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
 from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
-from planner.grounded.novelty import AT_ONCE, Seen, by_novelty, landmarks
+from planner.grounded.novelty import Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
 from planner.plan import Counts, Limits, Plan, Reason, Status, TooLargeError
@@ -106,7 +106,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
     evaluated = 0
     late = plan_level(problem, limits=Limits(seconds=seconds))
     assert late.status is Status.GAVE_UP and late.reason == Reason("the time limit came first")
-    assert seconds < evaluated <= seconds + AT_ONCE  # a turn is seen to its end
+    assert seconds < evaluated <= seconds + 5  # a turn is seen to its end
 
 
 def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
