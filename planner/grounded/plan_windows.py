@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 
 from planner.grounded.hff import heuristic
 from planner.grounded.joins import Ints
+from planner.grounded.shortest import shortest, ways
 from planner.grounded.task import Change, Grouped, Task, bits_of
 
+STATES, STEPS = 400, 12  # looked at for a cheapest plan, where the plan has no more steps
 SIZES = (8, 16)  # steps of a window
 OPERATORS = 150  # of a window's search
 EVALUATIONS = 100  # of a window's search
@@ -34,7 +36,7 @@ LOOK = 50  # operators ranked for what one evaluated costs
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
-    """Return a plan with no more steps than a given one, by replacing windows of it.
+    """Return a plan that costs no more than a given one: a cheapest one where few states tell, else by replacing windows of it.
 
     Parameters
     ----------
@@ -47,6 +49,12 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         On the clock of `time.perf_counter`.
     """
     best = shortened(task, plan, deadline)
+    if len(best) <= STEPS:
+        cost = sum(task.costs[operator] for operator in best)
+        states = min(STATES, work // (1 + len(task.applicable(task.initial)[0])))
+        exact = shortest(task, ways(task), cost, states, deadline)
+        if exact.plan is not None or exact.bound >= cost:
+            return best if exact.plan is None else list(exact.plan)
     if task.amounts is not None:
         return best  # what a window leaves of an amount isn't told by bits
     windows = _Windows(task, work, deadline)

@@ -12,7 +12,6 @@ and searches is imported where a world is looked at: numpy alone takes longer to
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
@@ -22,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from planner.hierarchical.subplans import Ground, Keep, Segments
 from planner.language import walk
-from planner.plan import Counts, Limits, OutOfTimeError, Reason, Status, TooLargeError
+from planner.plan import Limits, OutOfTimeError, Reason, Status, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets
 from reasoner.symbols import (
@@ -41,8 +40,6 @@ if TYPE_CHECKING:
 FEW = 4
 """Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
 
-STATES, STEPS = 400, 12
-"""So many states are looked at for the fewest steps, where these aren't more; else any steps will do."""
 LEAST, MAKING = 300, 100
 """A task counts as having at least so many relaxed operators, since a state costs something whatever can be done there; and
 making it as much as looking at so many states. A world of which not a fifth as many could be looked at isn't grounded."""
@@ -93,20 +90,12 @@ class World:
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
         from planner.grounded.best_first import search
-        from planner.grounded.shortest import shortest, ways
 
         if self.task is None:
             return None
-        size, deadline, counts = max(len(self.task.owners), LEAST), self.segments.deadline, Counts()
-        bound = ways(self.task)
-        states = 0 if STEPS < bound(self.task.initial) < math.inf else STATES
-        best = shortest(self.task, bound, most=states, deadline=deadline, counts=counts)
-        self.segments.spend(self.level, counts, MAKING * size + LEAST * counts.expanded)
-        if best.plan is not None or best.bound == math.inf:
-            self.plan = best.plan or ()
-            return None if best.plan is None else [self.task.describe(operator)[:2] for operator in best.plan]
-        found = search(self.task, Limits(self.width.work // size), deadline)
-        self.segments.spend(self.level, found.counts, found.counts.expanded * size)
+        size = max(len(self.task.owners), LEAST)
+        found = search(self.task, Limits(self.width.work // size), self.segments.deadline)
+        self.segments.spend(self.level, found.counts, MAKING * size + found.counts.expanded * size)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
             return None

@@ -101,7 +101,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: (100, 100))
     for module in ("best_first", "plan_windows", "reachability"):
         monkeypatch.setattr(f"planner.grounded.{module}.perf_counter", lambda: float(evaluated))
-    problem = carrier(12)
+    problem = carrier(16)
     assert plan_level(problem).status is Status.SOLVED and evaluated > 50
     evaluated = 0
     late = plan_level(problem, limits=Limits(seconds=seconds))

@@ -252,7 +252,7 @@ def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
     alone, led = fast.plan(few, improve=0), plan(few, Memory(experience), improve=0)
     assert led.plan is not None
     assert validate(few, led.plan) == []
-    assert 4 * expanded(led, 2) < expanded(alone, 2)
+    assert 3 * expanded(led, 2) < expanded(alone, 2)
     live(experience, few, led.plan)
     again = plan(few, Memory(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
@@ -265,7 +265,7 @@ def test_one_lesson_carries_a_laboratory_five_times_as_large() -> None:
     led = plan(large, Memory(experience))
     assert led.plan is not None
     assert validate(large, led.plan) == []
-    assert expanded(led) <= 1.1 * led.plan.length[1]
+    assert 5 * expanded(led) < expanded(fast.plan(large))
 
 
 def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
