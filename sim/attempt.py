@@ -20,6 +20,7 @@ from sim.motion import (
     beyond,
     comfort,
     connect,
+    leave,
     line,
     polyline,
     smooth,
@@ -40,6 +41,12 @@ ROUNDED = 3
 
 THIN = 0.01
 """Metres by which fingers are open around a handle."""
+
+EFFORTS = ((0, None), (150, None), (600, 4))
+"""Samples of a search for a path, and to how many goals: first without any, then briefly, then longer to the best goals."""
+
+FINER = 4
+"""By how much denser than others a line is sampled that is followed as far as it is free."""
 
 BATCH, ENOUGH = 24, 6
 """Candidates checked for collisions at a time, and how many good ones end the search."""
@@ -119,10 +126,15 @@ class Attempt:
                     missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
                     raise SkillError("unreachable", objects, beyond_m=missing)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
-            return [
-                int(left[i])
-                for i in _free(reacher, self.hand.mover(THIN), self.hand.mover(opening), stages, solved, order, objects)
-            ]
+            closed, bare = self.hand.mover(THIN), self.hand.mover(opening)
+            try:
+                found = _free(reacher, closed, bare, stages, solved, order, objects)
+            except SkillError:
+                if not self.world.blur:
+                    raise
+                blurred = replace(reacher, margin=MARGIN - 2 * self.world.blur)
+                found = _free(blurred, closed, bare, stages, solved, order, objects)
+            return [int(left[i]) for i in found]
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
         """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""
@@ -168,20 +180,22 @@ class Attempt:
             found, reacher = None, self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
-            for attempts in (0, 150):
-                for i, goal in enumerate(targets):
-                    turns = connect(reacher, start, goal, self.world.rng, attempts)
+            free = reacher.follow(start[None]) is not None
+            left = start if free else leave(reacher, start)
+            for attempts, most in EFFORTS:
+                for i, goal in enumerate(targets[:most]):
+                    turns = None if left is None else connect(reacher, left, goal, self.world.rng, attempts)
                     if turns is not None:
-                        found = i, reacher.solve(polyline(turns))[0]
+                        found = i, reacher.solve(polyline(turns if free else np.concatenate([start[None], turns])))[0]
                         break
                 if found is not None:
                     break
             if found is None:
                 blame = reacher.blame(line(start, targets[0]))
                 raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
-            near = replace(reacher, margin=CLOSE)
-            corners = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(found[1], n)).all()), 0)
-        self.follow(found[1], corners=corners)
+            near = replace(reacher, margin=min(MARGIN, CLOSE + 2 * self.world.noise))
+            rounded = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(found[1], n)).all()), 0)
+        self.follow(found[1], corners=rounded)
         return found[0]
 
     def straight(
@@ -192,8 +206,11 @@ class Attempt:
         speed: float = 1.0,
         enough: Callable[[], bool] | None = None,
     ) -> None:
-        """Move along the straight line to a pose, or until it is `enough`; raise if it isn't free."""
-        self.along(line(self.hand.pose, goal), objects, *ignored, speed=speed, enough=enough)
+        """Move along the straight line to a pose; or until it is `enough`, as far as the line is free; raise if it isn't."""
+        poses = line(self.hand.pose, goal)
+        if enough is not None:
+            poses = np.linspace(poses[0], poses[-1], FINER * (len(poses) - 1) + 1)
+        self.along(poses, objects, *ignored, speed=speed, enough=enough, partly=enough is not None)
 
     def along(
         self,
@@ -202,11 +219,14 @@ class Attempt:
         *ignored: str,
         speed: float = 1.0,
         enough: Callable[[], bool] | None = None,
+        partly: bool = False,
     ) -> None:
-        """Move along sampled poses, or until it is `enough`; raise if they can't be followed."""
+        """Move along sampled poses, or until it is `enough`; raise if they can't be followed, or not even `partly`."""
         with self.planning():
             reacher = self.reacher(*ignored, margin=CLOSE)
-            q = reacher.follow(poses)
+            ways = [reacher, replace(reacher, margin=CLOSE - 2 * self.world.blur)][: 2 if self.world.blur else 1]
+            found = (way.begin(poses) if partly else way.follow(poses) for way in ways)
+            q = next((q for q in found if q is not None), None)
             if q is None:
                 blame = reacher.blame(poses)
                 raise SkillError(blame.code, named(*objects, *blame.objects), clearance_m=blame.clearance)

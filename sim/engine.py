@@ -225,6 +225,11 @@ class Engine:
             position = position + self.errors[name][1]
         return rotation, position
 
+    @property
+    def blur(self) -> float:
+        """Standard deviation in metres of what `sense` returns."""
+        return self.noise / float(np.sqrt(LOOKS))
+
     def look(self) -> None:
         """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move."""
         self.errors.clear()

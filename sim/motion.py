@@ -26,6 +26,9 @@ STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 JUMP = 0.35
 """Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
 
+TREMBLE = 0.001
+"""Metres by which a hand that leaves something it is too near to may come nearer still."""
+
 FEWEST = 5
 """Samples of a path that timing needs: it is at rest at the first and the last, and speeds up and brakes between them."""
 
@@ -78,6 +81,14 @@ class Reacher:
         if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP) or not self.free(q).all():
             return None
         return q
+
+    def begin(self, poses: Array) -> Array | None:
+        """Return the postures along sampled poses up to where `follow` would refuse them, or None if it refuses the first."""
+        q, valid = self.solve(poses)
+        smooth = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(1) <= JUMP
+        good = np.all([valid, self.free(q), smooth], axis=0)
+        end = len(q) if good.all() else int(np.argmin(good))
+        return q[:end] if end else None
 
     def blame(self, poses: Array) -> Blocked:
         """Return why `follow` refuses the poses."""
@@ -157,6 +168,22 @@ def connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generato
     return None if found is None else _shortcut(reacher, found, rng)
 
 
+def leave(reacher: Reacher, start: Array) -> Array | None:
+    """Return a pose that is free and to which a line leads that comes no nearer to anything than `start` is; None if none does."""
+    ahead = np.array([np.cos(start[3]), np.sin(start[3]), 0.0])
+    aside = np.array([-ahead[1], ahead[0], 0.0])
+    for metres in (0.03, 0.06, 0.1, 0.15):
+        for way in (-ahead, Z, Z - ahead, aside, -aside, aside - ahead, -aside - ahead):
+            goal = start.copy()
+            goal[:3] += metres * way / np.linalg.norm(way)
+            q, valid = reacher.solve(line(start, goal))
+            gaps = reacher.mover.clearances(q, reacher.around).values()
+            rising = all((gap >= min(gap[0], reacher.margin) - TREMBLE).all() for gap in gaps)
+            if valid.all() and rising and all(gap[-1] > reacher.margin for gap in gaps):
+                return goal
+    return None
+
+
 def _detours(start: Array, goal: Array) -> Iterator[Array]:
     """Yield poses to pass through: over things, and closer to the body."""
     for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
@@ -215,13 +242,24 @@ def _branch(nodes: list[Array], back: list[int]) -> Array:
 
 
 def _shortcut(reacher: Reacher, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
-    """Leave out corners that a straight line can do without."""
+    """Replace stretches between any two points of the way by straight lines where these are free."""
     for _ in range(attempts):
         if len(corners) < 3:
             break
-        i, j = sorted(rng.choice(len(corners), 2, replace=False))
-        if j - i > 1 and reacher.follow(line(corners[i], corners[j])) is not None:
-            corners = np.concatenate([corners[: i + 1], corners[j:]])
+        first, last = np.sort(rng.uniform(0, len(corners) - 1, 2))
+        i, j = int(first), int(last)
+        if i == j:
+            continue
+        a = corners[i] + (first - i) * (corners[i + 1] - corners[i])
+        b = corners[j] + (last - j) * (corners[j + 1] - corners[j])
+        if reacher.follow(line(a, b)) is not None:
+            corners = np.concatenate([corners[: i + 1], [a, b], corners[j + 1 :]])
+    i = 1
+    while i < len(corners) - 1:  # leave out corners that a line can do without
+        if reacher.follow(line(corners[i - 1], corners[i + 1])) is not None:
+            corners = np.delete(corners, i, axis=0)
+        else:
+            i += 1
     return corners
 
 

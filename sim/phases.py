@@ -20,6 +20,7 @@ over         with a vessel over another one, to where it can be tilted (`sim.pou
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 
@@ -190,12 +191,9 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
 
 def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
     """Return the candidates that allow all stages; if possible those that leave the hand what it may need on the way."""
-    tight = any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain)
-    if tight:  # it will have to give way, which a stretched arm can't
-        try:
+    if any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain):
+        with suppress(SkillError):  # it will have to give way, which a stretched arm can't
             return run.attempt.choose([replace(stage, fold=FOLD) for stage in stages], run.things(), run.spread)
-        except SkillError:
-            pass
     try:
         return run.attempt.choose(stages, run.things(), run.spread)
     except SkillError:
@@ -229,6 +227,9 @@ def _line(run: Run, phase: Phase) -> None:
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
     enough = until(run, phase)
     speed = run.number(phase.speed)
+    if enough is not None:  # the guard ends it, and what isn't seen well may be farther
+        ahead = goal[:3] - hand.pose[:3]
+        goal[:3] += 2 * run.world.noise * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
     if enough is None:
         run.arrived(goal)

@@ -4,7 +4,7 @@ import pytest
 from reasoner.embodiment.values import Embodiment
 from sim.collision import Solid, Surroundings, box, read_mover
 from sim.kinematics import read_arm
-from sim.motion import Limits, Reacher, connect, line, polyline, pose_of, smooth, timed
+from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from sim.stages import MARGIN
 from sim.urdf import read_urdf
 
@@ -81,3 +81,24 @@ def test_a_move_too_short_for_a_third_sample_is_timed_like_a_longer_one(serving:
         positions, _ = timed(free.arm, q, Limits(free.arm.velocity, 8.0, 1.0, 4.0), 240.0)
         np.testing.assert_allclose(positions[-1], q[-1])
         assert len(positions) < 60
+
+
+def test_a_hand_that_stands_too_near_to_something_leaves_it_and_never_comes_nearer(serving: Case) -> None:
+    panel = Solid("panel", "box", np.array([0.01, 0.1, 0.1]), START[:3] + np.array([0.02, 0.0, 0.0]), np.eye(3))
+    beside = reacher(serving.embodiment, panel)
+    assert beside.follow(START[None]) is None
+    away = leave(beside, START)
+    assert away is not None
+    gaps = beside.mover.clearances(beside.solve(line(START, away))[0], beside.around)["panel"]
+    assert (np.diff(gaps) >= -0.001).all()
+    assert gaps[-1] > beside.margin
+
+
+def test_a_line_begins_as_far_as_it_is_free(serving: Case) -> None:
+    one = reacher(serving.embodiment)
+    down = line(START, START - np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]))
+    assert one.follow(down) is None
+    begun = one.begin(down)
+    assert begun is not None
+    assert one.follow(down[: len(begun)]) is not None
+    assert one.follow(down[: len(begun) + 1]) is None
