@@ -21,10 +21,12 @@ from time import perf_counter
 
 from planner.experience.evidence import Judge, View
 from planner.experience.leading import Candidate, Guide, by_rules, rules_in, usable
+from planner.experience.matching import Find
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import LimitError, Limits, Outcome, Status
+from planner.transitions import Table
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
@@ -76,8 +78,8 @@ class Memory:
         record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
         return record.chosen + 1 >= record.failed
 
-    def guide(self, call: Call, guarded: bool) -> Guide:
-        """Return the rules bound to a call, with what says which of them is most cogent."""
+    def guide(self, call: Call, guarded: bool, joins: dict[str, Callable[[Table], Find] | None] | None = None) -> Guide:
+        """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
         view = View(call.program, call.table, call.goal)
 
         def score(c: Candidate) -> float:
@@ -85,7 +87,7 @@ class Memory:
 
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
         rules = [rule for rule in self.rules if not guarded or rule.does[0] not in upper or self.helps(rule)]
-        return Guide(call, rules, self.orders, score)
+        return Guide(call, rules, self.orders, score, joins)
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
@@ -148,8 +150,10 @@ def plan(
     if mode == "strict" or not memory.trusted:
         return _strictly(problem, memory, limits, using, improve, leave_levels)
 
+    joins: dict[str, Callable[[Table], Find] | None] = {}
+
     def advised(call: Call) -> None:
-        call.advise(memory.guide(call, guarded=mode == "guarded"))
+        call.advise(memory.guide(call, mode == "guarded", joins))
 
     warm = memory.warmed(using)
     return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)

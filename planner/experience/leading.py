@@ -24,7 +24,7 @@ from planner.hierarchical.operators import Program
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.subplans import Keep
-from planner.transitions import Cell, arguments_of
+from planner.transitions import Cell, Table, arguments_of
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Experience, Ground, Order, Rule, Tally
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
@@ -73,12 +73,20 @@ class Guide:
     orders : sequence of Order
     score : function of a candidate, optional
         The greater, the sooner tried.
+    joins : dict, optional
+        What was compiled of rules for other calls over the same program; grows.
     """
 
     def __init__(
-        self, call: Call, rules: Iterable[Rule], orders: Sequence[Order] = (), score: Score | None = None
+        self,
+        call: Call,
+        rules: Iterable[Rule],
+        orders: Sequence[Order] = (),
+        score: Score | None = None,
+        joins: dict[str, Callable[[Table], Find] | None] | None = None,
     ) -> None:
         self.call, self.score = call, score
+        self.joins = {} if joins is None else joins
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.finds: dict[str, Find | None] = {}
@@ -106,7 +114,9 @@ class Guide:
     def ways(self, rule: Rule, cell: Cell, value: str, most: int = CANDIDATES) -> list[Candidate]:
         """Return ways to follow a rule for a value now; it is compiled when it is first asked."""
         if rule.name not in self.finds:
-            bind = finder(rule, self.call.program.writer)
+            if rule.name not in self.joins:
+                self.joins[rule.name] = finder(rule, self.call.program.writer)
+            bind = self.joins[rule.name]
             self.finds[rule.name] = bind(self.call.table) if bind is not None else None
         find = self.finds[rule.name]
         if find is None:
