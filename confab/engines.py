@@ -24,6 +24,8 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import Problem, Symbol
 
+WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk"}
+"""Packages of engines that take no amounts."""
 Answer = tuple[str, str, list[str]]
 """An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""
 
@@ -45,12 +47,17 @@ def plan_by_engine(
     Raises
     ------
     KnowledgeError
-        There is no such engine, or no such level.
+        There is no such engine or level, or something is defined or an amount, which no engine's reader or this engine takes.
     """
     began = perf_counter()
     level = problem.domain.levels[-1] if level is None else level
     if level not in problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
+    if problem.domain.rules:
+        defined = ", ".join(sorted(problem.domain.rules))
+        raise KnowledgeError(
+            f"unified-planning reads no derived predicates, and {defined} would be some; plan without --engine"
+        )
     wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
     exported = to_pddl(wanted, level)
     name, said, lines = answer(exported.domain, exported.problem, engine, seconds)
@@ -72,9 +79,16 @@ def plan_by_engine(
     return outcome(Status.GAVE_UP, reason=f"its plan is none here: {faults[0].text}")
 
 
-def some_installed() -> bool:
-    """Whether unified-planning and an engine seem to be there, by names: importing them takes longer than most plans."""
-    return find_spec("unified_planning") is not None and any(m.name.startswith("up_") for m in iter_modules())
+def some_installed(problem: Problem) -> bool:
+    """Whether unified-planning and an engine that takes such a problem seem to be there.
+
+    By their names: importing them takes longer than most plans.
+    """
+    if problem.domain.rules or find_spec("unified_planning") is None:
+        return False
+    numbers = any(situation.quantity is not None for situation in problem.domain.situations.values())
+    engines = {module.name for module in iter_modules() if module.name.startswith("up_")}
+    return bool(engines - WITHOUT_NUMBERS if numbers else engines)
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
@@ -129,6 +143,10 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
         except Exception as error:  # its reader's asserts and pyparsing's errors among them: ours goes on without it
             said = " ".join(str(error).split())[:200]
             raise KnowledgeError(f"unified-planning can't read this level: {type(error).__name__}: {said}") from None
+        if engine and not {"INT_FLUENTS", "REAL_FLUENTS"}.isdisjoint(
+            task.kind.features - factory.engine(engine).supported_kind().features
+        ):
+            raise KnowledgeError(f"{engine} takes no numbers; name an engine that does, or plan without --engine")
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:

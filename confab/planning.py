@@ -161,7 +161,7 @@ def _plan(
         if others and seconds is not None:
             from confab.engines import some_installed
 
-            seconds *= OURS if some_installed() else 1.0
+            seconds *= OURS if some_installed(problem) else 1.0
         outcome = solve(Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels))
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
@@ -184,7 +184,7 @@ def _then_by_an_engine(problem: Problem, deadline: Deadline, ours: Outcome) -> O
     """Return the plan of whichever engine is installed; where there is none, what ours said and what became of the engine."""
     from confab.engines import plan_by_engine, some_installed
 
-    if not some_installed():
+    if not some_installed(problem):
         return ours
     begin = perf_counter()
     try:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from click.testing import CliRunner
 
 import confab
 from confab import engines
 from confab.cli import app
-from confab.engines import Answer, answer, at_rest, plan_by_engine
+from confab.engines import Answer, answer, at_rest, plan_by_engine, some_installed
 from planner.grounded.best_first import search
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
@@ -129,3 +131,15 @@ def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_
         assert "no engine takes this problem" in str(error)
     with pytest.raises(KnowledgeError, match="unified-planning can't read this level"):
         answer("(define (domain d) (:predicates", problem, None, 10.0)
+
+
+def test_what_no_engine_takes_is_said_and_no_time_is_kept_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
+    monkeypatch.undo()
+    defined, counted, plain = (confab.load(scene).problem for scene in ("gallery-small", "canteen-small", SCENE))
+    with pytest.raises(KnowledgeError, match=r"reads no derived predicates, and .* would be"):
+        plan_by_engine(defined, "fast-downward")
+    with pytest.raises(KnowledgeError, match="fast-downward takes no numbers"):
+        plan_by_engine(counted, "fast-downward")
+    monkeypatch.setattr("confab.engines.iter_modules", lambda: [SimpleNamespace(name="up_fast_downward")])
+    assert [some_installed(problem) for problem in (plain, defined, counted)] == [True, False, False]
