@@ -160,6 +160,8 @@ class Reached:
             yield from self.joined(schema, None, {})
         for position, start in enumerate(fluent):
             key = schema.atoms[start].table
+            if before[key] == size[key]:
+                continue
             ranges = {start: (before[key], size[key])}
             ranges |= {i: (0, before[schema.atoms[i].table]) for i in fluent[:position]}
             if all(low < high for low, high in ranges.values()):
@@ -173,7 +175,7 @@ class Reached:
         columns: dict[str, Ints] = {}
         count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
         while waiting:
-            i = start if start in waiting else min(waiting, key=lambda i: self._fan_out(schema.atoms[i], columns))
+            i = start if start in waiting else self._narrowest(schema, waiting, columns)
             assert i is not None
             waiting.remove(i)
             columns, count = self._step(schema.atoms[i], columns, count, (ranges or {}).get(i))
@@ -194,6 +196,17 @@ class Reached:
         """Raise `OutOfTimeError` when the deadline has passed."""
         if self.deadline is not None and perf_counter() > self.deadline:
             raise OutOfTimeError("the time limit")
+
+    def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
+        """Return the first of the atoms that match the fewest rows; one without a new variable is as good as any."""
+        best, least = -1, float("inf")
+        for i in waiting:
+            rows = self._fan_out(schema.atoms[i], columns)
+            if rows < least:
+                best, least = i, rows
+                if not rows:
+                    break
+        return best
 
     def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
         """Estimate how many rows of the atom's table match one row of `columns`."""
