@@ -93,12 +93,8 @@ def some_installed(problem: Problem) -> bool:
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
     """Return the rest values that hold in the beginning, of what only levels below the first know: a plan has to restore them."""
-    situations, first = problem.domain.situations, problem.domain.levels[0]
-    return {
-        symbol: value
-        for symbol, value in problem.initial.items()
-        if value == situations[symbol.situation].rest and first < problem.first_level(symbol) <= level
-    }
+    first = problem.domain.levels[0]
+    return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
 
 def answer(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:

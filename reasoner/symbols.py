@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from math import prod
 from typing import TypeAlias
 
@@ -361,9 +362,20 @@ class Problem:
 
     def goal_on(self, level: int) -> dict[Symbol, str]:
         """Return the goal for plans of one level: with it, what the level knows and finds at rest is at rest in the end."""
+        return {**self.at_rest(level), **self.goal}
+
+    def at_rest(self, level: int) -> dict[Symbol, str]:
+        """Return what a level knows and finds at rest; of what is true or false and not stated, what its behaviours change."""
         rests = {s.name: s.rest for s in self.domain.situations.values() if s.rest is not None}
-        found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation) and self.first_level(s) <= level}
-        return {**found, **self.goal}
+        found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation)}
+        changed = frozenset[str]().union(*(behavior.changes for behavior in self.domain.at_level(level)))
+        for name in sorted(changed & {name for name, rest in rests.items() if rest == FALSE}):
+            for individuals in product(
+                *(self.classes.get(kind, ()) for kind in self.domain.situations[name].arguments)
+            ):
+                if (symbol := Symbol(name, individuals)) not in self.initial:
+                    found[symbol] = FALSE
+        return {symbol: value for symbol, value in found.items() if self.first_level(symbol) <= level}
 
     def members(self, kind: str) -> frozenset[str]:
         """Return the individuals of a class as a set."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from planner.grounded.best_first import plan_level
 from planner.grounded.grounding import ground
 from planner.grounded.shortest import shortest
 from planner.grounded.task import Task
@@ -15,7 +16,9 @@ from planner.hierarchical.bounds import lm_cut
 from planner.plan import Limits, Reason, Status
 from planner.solve import Request, solve
 from planner.validation import validate
+from reasoner.symbols import FALSE, TRUE, SituationType, Symbol
 from worlds.families import family, random_table
+from worlds.writing import becomes, behavior, has, world
 
 
 @pytest.mark.parametrize("part", range(2))
@@ -78,3 +81,25 @@ def test_the_bound_holds_where_something_not_at_rest_need_not_be_touched() -> No
     assert outcome.plan is not None
     assert outcome.bound is not None
     assert outcome.bound <= optimal.cost(problem, outcome.plan)
+
+
+def test_what_is_true_or_false_and_not_stated_is_at_rest_in_the_end_of_a_best_plan() -> None:
+    ajar = SituationType("AJAR", ("Gate",), "Truth", 2, FALSE, FALSE, True)
+    within = SituationType("IN", ("Animal",), "IN")
+    problem = world(
+        [ajar, within],
+        [
+            behavior("B1_DRIVE", 1, "?a:Animal ?to:IN", [], [becomes("IN", "?a", "?to")]),
+            behavior("B2_OPEN", 2, "?g:Gate", [has("AJAR", "?g", FALSE)], [becomes("AJAR", "?g", TRUE)]),
+            behavior("B2_SHUT", 2, "?g:Gate", [has("AJAR", "?g", TRUE)], [becomes("AJAR", "?g", FALSE)]),
+            behavior("B2_DRIVE", 2, "?a:Animal ?to:IN", [has("AJAR", "gate", TRUE)], [becomes("IN", "?a", "?to")]),
+        ],
+        {"Gate": ("gate",), "Animal": ("lion",), "IN": ("pen", "yard")},
+        {"IN lion": "pen"},
+        {"IN lion": "yard"},
+    )
+    assert problem.goal_on(2) == {Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): FALSE}
+    outcome, flat = optimal.plan(problem), plan_level(problem)
+    assert outcome.plan is not None and flat.plan is not None
+    assert outcome.bound == optimal.cost(problem, outcome.plan) == len(flat.plan.steps) == 3
+    assert validate(problem, flat.plan) == validate(problem, outcome.plan) == []
