@@ -1,4 +1,4 @@
-"""Faults that are planted in the paper's plan: where it stops, with which code, objects and number.
+"""Faults that are planted in the paper's plan, and in plans with joints: where these stop, with which code, objects and number.
 
     python -m benchmarks.faults          print the table, and write it to docs/physics-faults.md
 
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
+import confab
 from benchmarks.physics import case
 from sim import faults
 from sim.faults import Fault
 from sim.rollouts import Trial
-from sim.verify import Rollout
+from sim.verify import Rollout, expectations
 
 MEANS = {
     "unreachable": "beyond_m",
@@ -26,6 +28,7 @@ MEANS = {
     "spill": "spilled",
     "toppled": "tilt_rad",
     "misplaced": "off_place_m",
+    "stuck": "joint",
     "too slow": "seconds",
 }
 """The number that tells most about a code, where it is always the same."""
@@ -41,6 +44,7 @@ class Planted:
     code: str
     objects: tuple[str, ...] = ()
     beads: bool = False
+    scene: str = "beverage-serving"
 
     def run(self, trial: Trial) -> Rollout:
         """Return the rollout with the fault."""
@@ -59,9 +63,11 @@ class Planted:
 
 
 WALL_ON_THE_WAY = faults.hidden_wall("location7", 0.08, (0.02, 0.2, 0.5))
+CORNER, SPINNER = "kitchen-corner", "centrifuge"
+SMALL = (0.03, 0.03, 0.05)
 LEFT_ARM_THERE = faults.arm_at("left_hand", (0.54, -0.12, 0.9), -0.6, 12)
 
-PLANTED = (
+ON_A_TABLE = (
     Planted("unreachable object", faults.displaced("cup1", (0.55, 0.0)), 0, "unreachable", ("cup1",)),
     Planted("unreachable location", faults.place_displaced("location7", (0.4, 0.0)), 3, "unreachable", ("location7",)),
     Planted("occupied location", faults.stranger((0.56, -0.12, 0.7)), 3, "goal in collision", ("location7", "stranger")),
@@ -96,6 +102,37 @@ PLANTED = (
 )  # fmt: skip
 
 
+KITCHEN = (
+    Planted("door stuck", faults.stiff("door", 60.0), 0, "slip or drop", ("door",), scene=CORNER),
+    Planted("door stops halfway", faults.stopped("door", 0.0, 0.5), 0, "slip or drop", ("door",), scene=CORNER),
+    Planted("door falls shut when let go", faults.sprung("door", 0.0, 1.5), 0, "stuck", ("door",), scene=CORNER),
+    Planted("door's value read .3 too low", faults.misread("door", -0.3), 0, "goal in collision", ("door",), scene=CORNER),
+    Planted("handle of the door greasy", faults.greasy("door", 0.004), 0, "slip or drop", ("door",), scene=CORNER),
+    Planted("weak grip at the door", faults.weak_grip("left_hand", 0.4), 0, "no grasp", ("door",), scene=CORNER),
+    Planted("box in the door's swing", faults.stranger((0.42, 0.42, 0.7)), 0, "no path", ("door", "stranger"), scene=CORNER),
+    Planted("door shut by a person meanwhile", faults.swung("door", 0.0, 1, 0.3), 1, "tracking error", ("door",), scene=CORNER),
+    Planted("cup taken from the hand", faults.gone("cup", 3, 0.3), 3, "slip or drop", ("cup",), scene=CORNER),
+    Planted("door stopped while it is shut", faults.stopped("door", 0.4, 1.8, 7, 0.0), 7, "stuck", ("door",), scene=CORNER),
+    Planted("pot occupied", faults.stranger((0.6, 0.0, 0.8), SMALL), 11, "goal in collision", ("lid", "stranger"), scene=CORNER),
+    Planted("lid pushed off", faults.displaced("lid", (0.0, 0.045), 12, 0.9), 12, "misplaced", ("lid",), scene=CORNER),
+)  # fmt: skip
+
+LABORATORY = (
+    Planted("lid stuck", faults.stiff("cover", 60.0), 0, "slip or drop", ("cover",), scene=SPINNER),
+    Planted("lid stops halfway", faults.stopped("cover", 0.0, 0.6), 0, "slip or drop", ("cover",), scene=SPINNER),
+    Planted("lid falls shut when let go", faults.sprung("cover", 0.0, 2.0), 0, "stuck", ("cover",), scene=SPINNER),
+    Planted("lid shut by a person meanwhile", faults.swung("cover", 0.0, 4, 0.0), 4, "tracking error", ("cover",), scene=SPINNER),
+    Planted("slot occupied", faults.stranger((0.57, 0.15, 0.74), SMALL), 4, "goal in collision", ("stranger",), scene=SPINNER),
+    Planted("lid not shut", faults.stopped("cover", 0.3, 2.0, 7, 0.0), 7, "slip or drop", ("cover",), scene=SPINNER),
+    Planted("lid springs open again", faults.sprung("cover", 0.5, 3.0, 7, 4.0), 7, "stuck", ("cover",), scene=SPINNER),
+    Planted("button not latched", faults.unlatched("start"), 16, "stuck", ("start",), scene=SPINNER),
+    Planted("button stuck", faults.stiff("start", 200.0), 16, "stuck", ("start",), scene=SPINNER),
+    Planted("button's value read 1 cm too low", faults.misread("start", -0.01), 16, "stuck", ("start",), scene=SPINNER),
+)  # fmt: skip
+
+PLANTED = (*ON_A_TABLE, *KITCHEN, *LABORATORY)
+
+
 def row(planted: Planted, rollout: Rollout) -> str:
     """Return a line of the table."""
     failure = rollout.failure
@@ -112,11 +149,20 @@ def row(planted: Planted, rollout: Rollout) -> str:
     )
 
 
+@cache
+def nominal(name: str) -> Trial:
+    """Return the plan of a scene without a fault: the paper's, or that of a scene with joints."""
+    if name == "beverage-serving":
+        return case(name)
+    scene = confab.load(name)
+    steps = scene.plan().plan.primitives
+    return Trial(scene.embodiment, scene.problem.initial, steps, expectations(scene.problem, steps))
+
+
 def rows() -> Iterator[tuple[bool, str]]:
     """Yield whether each fault was found as it must be, and its line."""
-    trial = case("beverage-serving")
     for planted in PLANTED:
-        rollout = planted.run(trial)
+        rollout = planted.run(nominal(planted.scene))
         yield planted.found(rollout), row(planted, rollout)
 
 

@@ -184,7 +184,13 @@ class Engine:
 
     def _contacts(self, body: int) -> set[str]:
         """Return what presses against a body."""
-        return {self.names[c[2]] for c in self.contacts(body) if c[9] > 0.5 and c[2] in self.names}
+        found = {self._name(contact[2], contact[4]) for contact in self.contacts(body) if contact[9] > 0.5}
+        return found - {""}
+
+    def _name(self, body: int, part: int) -> str:
+        """Return what a body is called, or its link of that number if that moves; an empty name if nobody knows it."""
+        links = (name for name, one in self.links.items() if (one.body, one.joints.get(name)) == (body, part))
+        return next(links, self.names.get(body, ""))
 
     @property
     def rate(self) -> float:

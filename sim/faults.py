@@ -11,7 +11,9 @@ which can be sent to another process. What may happen in the middle of a task ta
 `place_displaced`, `settings`                        knowledge that is wrong
 `lets_go`, `arm_at`, `jammed`, `joint_range`         a robot that isn't as it should be
 `weak_arm`, `slow_arm`, `weak_grip`, `shut`          the same, for want of strength
-`noisy`, `misaligned`                                perception that isn't as it should be
+`noisy`, `misaligned`, `misread`                     perception that isn't as it should be
+`stiff`, `stopped`, `swung`, `sprung`                a joint of furniture that isn't as it should be
+`unlatched`, `greasy`                                a button that doesn't stay in; a handle that slips
 ==================================================== ============================================================
 """
 
@@ -252,6 +254,94 @@ def settings(world: Engine, /, behavior: str, **numbers: float) -> None:
     world.embodiment = replace(world.embodiment, skills={**world.embodiment.skills, behavior: changed})
 
 
+# ------------------------------------------------------------------------------------------------- furniture
+
+
+@fault
+def stiff(world: Engine, link: str, friction: float) -> None:
+    """Let a joint resist with so many newtons, or newton metres."""
+    mechanic = world.links[link]
+    pybullet.setJointMotorControl2(
+        mechanic.body,
+        mechanic.joints[link],
+        pybullet.VELOCITY_CONTROL,
+        targetVelocity=0.0,
+        force=friction,
+        physicsClientId=world.client,
+    )
+
+
+@fault
+def stopped(world: Engine, link: str, lower: float, upper: float, step: int = -1, seconds: float = 0.0) -> None:
+    """Let a joint go no farther than from one value to another, which the robot doesn't know."""
+    mechanic = world.links[link]
+
+    def stop(world: Engine) -> None:
+        pybullet.changeDynamics(
+            mechanic.body,
+            mechanic.joints[link],
+            jointLowerLimit=lower,
+            jointUpperLimit=upper,
+            physicsClientId=world.client,
+        )
+
+    if step < 0:
+        stop(world)
+    else:
+        later(world, step, seconds, stop)
+
+
+@fault
+def swung(world: Engine, link: str, value: float, step: int, seconds: float) -> None:
+    """Move a joint to a value, as a person might."""
+    mechanic = world.links[link]
+
+    def swing(world: Engine) -> None:
+        pybullet.resetJointState(mechanic.body, mechanic.joints[link], value, physicsClientId=world.client)
+
+    later(world, step, seconds, swing)
+
+
+@fault
+def sprung(world: Engine, link: str, rest: float, force: float, step: int = 0, seconds: float = 0.0) -> None:
+    """Let a spring draw a joint to a value."""
+    mechanic = world.links[link]
+
+    def draw(world: Engine) -> None:
+        pybullet.setJointMotorControl2(
+            mechanic.body,
+            mechanic.joints[link],
+            pybullet.POSITION_CONTROL,
+            targetPosition=rest,
+            force=force,
+            physicsClientId=world.client,
+        )
+
+    later(world, step, seconds, draw)
+
+
+@fault
+def unlatched(world: Engine, link: str) -> None:
+    """Let a button that should stay in when it is pressed come out again."""
+    mechanic = world.links[link]
+    links = tuple(replace(one, latches=one.latches and one.name != link) for one in mechanic.mechanism.links)
+    mechanic.mechanism = replace(mechanic.mechanism, links=links)
+
+
+@fault
+def greasy(world: Engine, link: str, friction: float = 0.01) -> None:
+    """Give a link, its handle included, another coefficient of friction."""
+    mechanic = world.links[link]
+    pybullet.changeDynamics(
+        mechanic.body,
+        mechanic.joints[link],
+        lateralFriction=friction,
+        spinningFriction=0,
+        rollingFriction=0,
+        physicsClientId=world.client,
+    )
+
+
 # ------------------------------------------------------------------------------------------------- the robot
 
 
@@ -354,3 +444,16 @@ def misaligned(world: Engine, by: tuple[float, float]) -> None:
         return rotation, base + np.array([*by, 0.0])
 
     world.sense = sense  # type: ignore[method-assign]
+
+
+@fault
+def misread(world: Engine, link: str, by: float) -> None:
+    """Let a joint's value be perceived off by metres or radians."""
+    mechanic = world.links[link]
+    true_values = mechanic.values
+
+    def values() -> dict[str, float]:
+        found = true_values()
+        return {**found, link: found[link] + by}
+
+    mechanic.values = values  # type: ignore[method-assign]
