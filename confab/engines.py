@@ -24,7 +24,7 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import Problem, Symbol
 
-WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk"}
+WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines that take no amounts."""
 Answer = tuple[str, str, list[str]]
 """An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""

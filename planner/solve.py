@@ -124,10 +124,13 @@ def _paper(request: Request) -> Outcome:
     )
 
 
-def _proof(problem: Problem) -> Reason | None:
-    from planner.hierarchical.unsolvability import impossible
+def _proof(problem: Problem, states: int, deadline: float | None) -> Reason | None:
+    from planner.hierarchical.unsolvability import exhausted, impossible, proved
 
-    return impossible(problem)
+    if not states:
+        return impossible(problem)
+    task = proved(problem, problem.domain.levels[-1], deadline)
+    return None if isinstance(task, Reason) else exhausted(task, states, deadline)
 
 
 Mode: TypeAlias = "Callable[[Request], Outcome]"

@@ -154,9 +154,9 @@ class Recovery:
         if call.advice is not None and call.advice.expects and call.segments.worked < worth:
             return
         if self._lowest is None:
-            self._lowest = proved(self.call.problem, self.call.segments)
+            self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline, call.segments.watch)
         if not isinstance(self._lowest, Reason):
-            self._looked = looked_at(self._lowest, self.call.segments, self._looked)
+            self._looked = looked_at(self._lowest, call.segments, self._looked)
 
     def finish(self) -> bool:
         """Do the last step again so that it brings about what its level doesn't see, too; else all is as it was."""

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.hierarchical.operators import Achieve, Achiever, Program
-from planner.hierarchical.subplans import Segments
+from planner.hierarchical.subplans import Segments, Watch, nobody
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.symbols import (
@@ -233,21 +233,20 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
     return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
 
 
-def proved(problem: Problem, segments: Segments) -> Task | Reason:
-    """Raise `UnsolvableError` if a goal can't be reached on the lowest level even if nothing ever became false.
+def proved(problem: Problem, level: int, deadline: float | None = None, watch: Watch = nobody) -> Task | Reason:
+    """Raise `UnsolvableError` if a goal can't be reached on a level even if nothing ever became false.
 
-    Else that level is returned, grounded, or why it is too large for that.
+    Else that level is returned, grounded, or why it is too large for that. The observer is told before it is grounded.
     """
     from planner.grounded.grounding import ground
     from planner.grounded.unreachable import unreachable
 
-    level, deadline = segments.program.levels[-1], segments.deadline
     try:
         reached = closed(problem, level, deadline)
         for symbol, value in sorted(problem.goal.items()):
             if not reached.possible(symbol, value):
                 raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
-        segments.watch(None)
+        watch(None)
         too_large = refusal(reached)
         if too_large is not None:
             return too_large
@@ -264,14 +263,20 @@ def looked_at(task: Task, segments: Segments, before: int) -> int:
 
     That may cost as much as the searches have up to now. Nothing is done if these aren't twice as many as were looked at `before`.
     """
-    from planner.grounded.shortest import shortest
-
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, segments.worked) // state
     if most < 2 * before:
         return before
-    found = shortest(task, most=most, deadline=segments.deadline)
-    if found.plan is None and found.bound == math.inf:
-        text = f"all {found.states} states of level {task.level} that can be reached were looked at"
-        raise UnsolvableError(Reason(text))
+    if reason := exhausted(task, most, segments.deadline):
+        raise UnsolvableError(reason)
     return most
+
+
+def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
+    """Return that none of all states fulfils the goal, if that is so and at most so many have to be looked at."""
+    from planner.grounded.shortest import shortest
+
+    found = shortest(task, most=most, deadline=deadline)
+    if found.plan is not None or found.bound < math.inf:
+        return None
+    return Reason(f"all {found.states} states of level {task.level} that can be reached were looked at")

@@ -19,15 +19,15 @@ from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
 from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from reasoner.memory.links import Links
-from reasoner.symbols import GroundBehavior, Problem
+from reasoner.symbols import Fact, GroundBehavior, Problem
 
 SETTLED, UNSETTLED = "settled", "unsettled"
 """Whether a symbol that wasn't at rest in the beginning is at rest or still untouched: see `Target`."""
 
 DOUBT = 1_000
-"""Expansions after which it is asked once whether there can be a plan at all."""
-Proof: TypeAlias = "Callable[[Problem], Reason | None]"
-"""Says why a problem has no plan, if that can be shown at once."""
+"""Expansions after which it is asked whether there can be a plan at all, and again whenever they are four times as many."""
+Proof: TypeAlias = "Callable[[Problem, int, float | None], Reason | None]"
+"""Says why a problem has no plan, if that can be shown at once or, by a deadline, by looking at so many states."""
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
 """A behaviour with its refinement and the state that it really leads to; None if it has no refinement."""
@@ -47,11 +47,12 @@ class Call:
     expanded: int = 0
     counts: dict[int, Counts] = field(default_factory=dict)
     known: dict[tuple[Values, GroundBehavior], Refined] = field(default_factory=dict)
-    fallbacks: int = 0
     gave_up: bool = False
+    doubted: int = DOUBT
+    given_up: list[str] = field(default_factory=list)
 
 
-def unproved(problem: Problem) -> None:
+def unproved(problem: Problem, states: int, deadline: float | None) -> None:
     """Show nothing."""
 
 
@@ -79,7 +80,7 @@ def plan(
     leave_levels : bool
         Whether the level below is given the goal where a level has no plan that can be refined.
     proof : Proof
-        Asked once, after `DOUBT` expansions.
+        Asked after `DOUBT` expansions, and now and then from there on with as many states.
 
     Returns
     -------
@@ -99,7 +100,10 @@ def plan(
         if not leave_levels and level != levels[-1]:
             reason = Reason(f"no plan of level {level} was found that can be refined, and levels aren't to be left")
             return Outcome(Status.GAVE_UP, None, reason, call.counts, 0, perf_counter() - begin)
-        call.fallbacks += level != levels[-1]
+        if level != levels[-1]:
+            unseen = [str(Fact(s, value)) for s, value in problem.goal.items() if not problem.sees(level, s, value)]
+            lacks = f", which doesn't know {', '.join(unseen)}," if unseen else ""
+            call.given_up.append(f"level {level}{lacks} was given up: no plan of it was found that can be refined")
     return _outcome(call, steps, perf_counter() - begin)
 
 
@@ -237,8 +241,10 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
 
     def successors(state: Values) -> Iterable[Applied]:
         call.expanded += 1
-        if call.expanded == DOUBT and (reason := call.proof(call.model.problem)):
-            raise UnsolvableError(reason)
+        if call.expanded == call.doubted:
+            call.doubted *= 4
+            if reason := call.proof(call.model.problem, call.expanded - DOUBT, call.deadline):
+                raise UnsolvableError(reason)
         base, marks = state[:size], state[size:]
         for applied in call.model.successors(grounds, base):
             after = applied.after
@@ -279,14 +285,18 @@ def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], flo
 
 
 def _outcome(call: Call, steps: list[Step] | None, seconds: float) -> Outcome:
-    if steps is not None:
-        return Outcome(Status.SOLVED, Plan(renumbered(steps)), None, call.counts, call.fallbacks, seconds)
     limits, levels = call.limits, tuple(call.grounds)
-    if call.gave_up:
-        seconds_too = f" or {limits.seconds} s" if limits.seconds else ""
+    status, plan, reason = Status.SOLVED, None, None
+    if steps is not None:
+        plan = Plan(renumbered(steps))
+    elif call.gave_up:
+        seconds_too = f" or {limits.seconds:.3g} s" if limits.seconds else ""
+        status = Status.GAVE_UP
         reason = Reason(f"stopped at the limit of {limits.expansions} expansions in one search{seconds_too}")
-        return Outcome(Status.GAVE_UP, None, reason, call.counts, call.fallbacks, seconds)
-    rests = any(kind.rest is not None for kind in call.model.problem.domain.situations.values())
-    what = "no state in which the goal holds" + (" and what was touched is at rest" if rests else "")
-    reason = Reason(f"{what} can be reached; all states of level {levels[-1]} were tried")
-    return Outcome(Status.UNSOLVABLE, None, reason, call.counts, call.fallbacks, seconds)
+    else:
+        rests = any(kind.rest is not None for kind in call.model.problem.domain.situations.values())
+        what = "no state in which the goal holds" + (" and what was touched is at rest" if rests else "")
+        status = Status.UNSOLVABLE
+        reason = Reason(f"{what} can be reached; all states of level {levels[-1]} were tried")
+    given_up = tuple(call.given_up)
+    return Outcome(status, plan, reason, call.counts, len(given_up), seconds, given_up=given_up)

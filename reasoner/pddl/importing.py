@@ -575,7 +575,7 @@ class _Variables:
                 yield replace(found[0], negated=not found[0].negated)
             else:
                 yield AnyOf((found,), True)
-        elif head in COMPARISONS and (rest or any(is_number(item) for item in form.items[1:])):
+        elif head in COMPARISONS and (head != "=" or rest or any(is_number(item) for item in form.items[1:])):
             left, right = (self.table.number(item, named) for item in form.items[1:])
             yield Comparison(left, head, right, negated)
         else:

@@ -762,7 +762,7 @@ class _Schema:
         if _is(node, "RelationCondition"):
             arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
             relation = self.one(iri, "relation")
-            if relation not in self.nodes:
+            if relation not in self.nodes or not _is(self.nodes[relation], "Relation", "ReachRelation"):
                 raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
             return RelationCondition(self.names.short(relation), arguments, negated)
         if _is(node, "ClassCondition"):
@@ -805,7 +805,7 @@ class _Schema:
         """Return the amount of an object, or what a relation gives for it."""
         if self.values(iri, "relation"):
             relation = self.one(iri, "relation")
-            if relation not in self.nodes:
+            if relation not in self.nodes or not _is(self.nodes[relation], "Relation", "ReachRelation"):
                 raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
             return Measure(self.names.short(relation), self.arguments(iri))
         situation = self.one(iri, "situationType")

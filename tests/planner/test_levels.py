@@ -13,18 +13,20 @@ from planner.hierarchical.planner import Call, compiled
 from planner.hierarchical.planner import plan as default
 from planner.hierarchical.unsolvability import LEAST, looked_at
 from planner.levels import levels_left
+from planner.paper.hierarchy import DOUBT
 from planner.paper.hierarchy import plan as paper
-from planner.plan import Outcome, Plan, Status, UnsolvableError
-from planner.solve import Request, solve
+from planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
+from planner.solve import Request, _proof, solve
 from planner.validation import successor, validate
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse
-from reasoner.symbols import FALSE, Problem, Symbol
+from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Symbol
 from tests.planner import naive
 from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable
 from worlds.families import tabletop
 from worlds.hierarchies import hierarchy, states
+from worlds.writing import becomes, behavior, has, world
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper, "default": default}
 """The planners that every case is given to."""
@@ -214,3 +216,41 @@ def test_a_refinement_that_was_found_in_a_state_is_not_searched_there_again() ->
     refiner.templates.clear()
     assert refiner.do(first, behavior.name, arguments) == step
     assert refiner.misses == searched
+
+
+def pen(goal: Mapping[str, str], *, key: bool = True) -> Problem:
+    """Two levels: an animal is driven through a gate, which level 2 opens if there is a key to it."""
+    ajar = SituationType("AJAR", ("Gate",), "Truth", 2, FALSE, FALSE, True)
+    opening = [has("AJAR", "?g", FALSE)] + ([] if key else [has("IN", "lion", "nowhere")])
+    return world(
+        [ajar, SituationType("IN", ("Animal",), "IN")],
+        [
+            behavior("B1_DRIVE", 1, "?a:Animal ?to:IN", [], [becomes("IN", "?a", "?to")]),
+            behavior("B2_OPEN", 2, "?g:Gate", opening, [becomes("AJAR", "?g", TRUE)]),
+            behavior("B2_SHUT", 2, "?g:Gate", [has("AJAR", "?g", TRUE)], [becomes("AJAR", "?g", FALSE)]),
+            behavior("B2_DRIVE", 2, "?a:Animal ?to:IN", [has("AJAR", "gate", TRUE)], [becomes("IN", "?a", "?to")]),
+        ],
+        {"Gate": ("gate",), "Animal": ("lion",), "IN": ("pen", "yard", "nowhere")},
+        {"IN lion": "pen"},
+        goal,
+    )
+
+
+def test_the_papers_mode_says_which_level_it_left_and_what_that_does_not_know() -> None:
+    outcome = paper(pen({"AJAR gate": TRUE}))
+    assert outcome.status is Status.SOLVED and outcome.fallbacks == 1
+    assert outcome.given_up == (
+        "level 1, which doesn't know gate AJAR true, was given up: no plan of it was found that can be refined",
+    )
+
+
+def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> None:
+    asked: list[int] = []
+
+    def proof(problem: Problem, states: int, deadline: float | None) -> None:
+        asked.append(states)
+
+    assert paper(hierarchy(3000016), proof=proof).status is Status.UNSOLVABLE
+    assert asked == [0, 3 * DOUBT]
+    with pytest.raises(UnsolvableError, match="IN can't be|can't be reached"):
+        _proof(pen({"IN lion": "yard"}, key=False), 100, None)
