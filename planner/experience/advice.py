@@ -3,7 +3,7 @@
 =========  ====================================================================================================
 guarded    rules lead from the beginning on, for those kinds of goals on which they have helped as often as not
 leading    rules lead whatever their record is
-strict     memoryless search plans, exactly as without; rules try a step of their own for every `SHARE` expansions of it
+strict     rules lead only while what they may waste is a twentieth of the effort so far
 =========  ====================================================================================================
 
 Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`);
@@ -13,25 +13,21 @@ isn't trusted runs in strict mode whatever was asked for, and one that knows non
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from time import perf_counter
 
 from planner.experience.evidence import Judge, View
-from planner.experience.leading import Candidate, Guide, by_rules, rules_in, usable
+from planner.experience.leading import Candidate, Guide, rules_in, usable
 from planner.experience.matching import Find
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
-from planner.plan import LimitError, Limits, Outcome, Status
+from planner.plan import Limits, Outcome
 from planner.transitions import Table
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
-
-SHARE = 20
 
 
 @dataclass
@@ -78,7 +74,7 @@ class Memory:
         record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
         return record.chosen + 1 >= record.failed
 
-    def guide(self, call: Call, guarded: bool, joins: dict[str, Callable[[Table], Find] | None] | None = None) -> Guide:
+    def guide(self, call: Call, mode: str, joins: dict[str, Callable[[Table], Find] | None] | None = None) -> Guide:
         """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
         view = View(call.program, call.table, call.goal)
 
@@ -86,8 +82,8 @@ class Memory:
             return self.judge.told(view, c.rule, c.roles)
 
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
-        rules = [rule for rule in self.rules if not guarded or rule.does[0] not in upper or self.helps(rule)]
-        return Guide(call, rules, self.orders, score, joins)
+        rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or self.helps(rule)]
+        return Guide(call, rules, self.orders, score, joins, strict=mode == "strict")
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
@@ -147,66 +143,15 @@ def plan(
     using = using or fast.compiled(problem)
     if memory is None or not memory.knows(problem):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
-    if mode == "strict" or not memory.trusted:
-        return _strictly(problem, memory, limits, using, improve, leave_levels)
-
     joins: dict[str, Callable[[Table], Find] | None] = {}
 
     def advised(call: Call) -> None:
-        call.advise(memory.guide(call, mode == "guarded", joins))
+        call.advise(memory.guide(call, mode if memory.trusted else "strict", joins))
 
-    warm = memory.warmed(using)
+    warm = memory.warmed(using) if memory.trusted else using
     return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)
 
 
 def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], Outcome]:
     """Return what plans any problem of one domain with experience."""
     return lambda problem: plan(problem, memory, mode)
-
-
-class _ArrivedError(Exception):
-    """Rules reached the goal while the memoryless search was at it."""
-
-
-def _strictly(
-    problem: Problem, memory: Memory, limits: Limits, using: Compiled, improve: int, leave_levels: bool
-) -> Outcome:
-    """Plan without memory, and let rules do a step of their own for every `SHARE` expansions."""
-    began = perf_counter()
-    first = problem.domain.levels[0]
-    deadline = None if limits.seconds is None else began + limits.seconds
-    call = Call(problem, memory.warmed(using), deadline, limits.expansions)
-    base = 0
-    spent: dict[int, int] = {}
-    stream: Iterator[Candidate] = iter(())
-    guide: Guide | None = None
-
-    def watch(level: int | None) -> None:
-        nonlocal base, stream, guide
-        if level is None:
-            return
-        if level == first and (base + 1) // SHARE > call.segments.counts[first].expanded:
-            if guide is None:
-                guide = memory.guide(call, guarded=False)
-                stream = by_rules(guide)
-            with suppress(LimitError):
-                if next(stream, None) is None and not guide.open():
-                    raise _ArrivedError
-        base += level == first
-        spent[level] = spent.get(level, 0) + 1
-
-    try:
-        outcome = fast.plan(
-            problem, limits=limits, improve=improve, using=using, watch=watch, leave_levels=leave_levels
-        )
-    except _ArrivedError:
-        with suppress(LimitError):
-            fast.shorten(call, improve, leave_levels)
-        outcome = call.outcome(Status.SOLVED, call.tree(), None, 0.0)
-        for level, expanded in spent.items():
-            outcome.search[level].expanded += expanded
-        return replace(outcome, seconds=perf_counter() - began)
-    for level, counts in call.segments.counts.items():
-        if level in outcome.search:
-            outcome.search[level].add(counts)
-    return replace(outcome, seconds=perf_counter() - began)

@@ -12,7 +12,7 @@ finds becomes rules at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TypeAlias
@@ -37,6 +37,8 @@ CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
 WASTE = 10
 """Of so many expansions one may have been for steps of rules that were undone."""
+SHARE, LONG = 20, 12
+"""In strict mode: one of so many, with promises of so many steps counted as wasted before they are tried."""
 FAR = 1000
 """More steps than any rule promises."""
 
@@ -84,8 +86,9 @@ class Guide:
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Callable[[Table], Find] | None] | None = None,
+        strict: bool = False,
     ) -> None:
-        self.call, self.score = call, score
+        self.call, self.score, self.strict = call, score, strict
         self.joins = {} if joins is None else joins
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
@@ -99,7 +102,7 @@ class Guide:
         self.before = _before(call.goal, orders, call.program)
         self.add(rules)
         first = call.program.levels[0]
-        self.expects = all((first, situation) in self.by_goal for situation, _ in self.open())
+        self.expects = not strict and all((first, situation) in self.by_goal for situation, _ in self.open())
 
     def add(self, rules: Iterable[Rule]) -> None:
         """Follow more rules."""
@@ -135,7 +138,7 @@ class Guide:
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal comes first."""
-        return any(not self.call.met(other) for other in self.before.get(cell, ()))
+        return not self.strict and any(not self.call.met(other) for other in self.before.get(cell, ()))
 
     def candidates(
         self, level: int, cells: Mapping[Cell, str], below: int = FAR, off: Mapping[Cell, str] = NOTHING
@@ -164,7 +167,9 @@ class Guide:
         return found
 
     def ready(self) -> bool:
-        """Whether no more than a share of the effort was wasted so far."""
+        """Whether no more than a share of the effort was wasted so far; if strict, would be after one promise more."""
+        if self.strict:
+            return (self.wasted + LONG) * SHARE <= self.call.segments.expanded
         return self.wasted * WASTE <= self.call.segments.expanded
 
     def rank(self, cell: Cell) -> int:
@@ -177,20 +182,10 @@ class Guide:
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
-        if not self.ready():
-            return None
-        stream = self.following(level, targets, keep)
-        while True:
-            try:
-                next(stream)
-            except StopIteration as end:
-                done: list[RefinedStep] | None = end.value
-                return done
+        return self.tried(level, targets, keep) if self.ready() else None
 
-    def following(
-        self, level: int, targets: Mapping[Cell, str], keep: Keep
-    ) -> Generator[Candidate, None, list[RefinedStep] | None]:
-        """Do the same, and yield each candidate before it is tried."""
+    def tried(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
+        """Do the same, however much was wasted."""
         call = self.call
         table, segments = call.table, call.segments
         start = mark = len(table.trail)
@@ -208,7 +203,6 @@ class Guide:
             found = self.candidates(level, among, rank, off)
             possible = (c for c in found if segments.forward[c.ground[0]](*c.ground[1]) is not None)
             for candidate in islice(possible, TRIES):
-                yield candidate
                 used[candidate.rule.name] = None
                 done = self.do(level, candidate)
                 if done is not None:
@@ -279,15 +273,15 @@ class Guide:
         return len(self.names) > known
 
 
-def by_rules(guide: Guide) -> Iterator[Candidate]:
-    """Achieve goals by rules alone, as many as they can; yield each candidate before it is tried."""
+def by_rules(guide: Guide) -> None:
+    """Achieve goals by rules alone, as many as they can."""
     call, level = guide.call, guide.call.program.levels[0]
     reached = True
     while reached:
         reached = False
         for cell, value in sorted(guide.open().items(), key=lambda item: guide.waits(item[0])):
             if not call.met(cell):
-                steps = yield from guide.following(level, {cell: value}, call.segments.keeping(call.kept))
+                steps = guide.tried(level, {cell: value}, call.segments.keeping(call.kept))
                 if steps is not None:
                     call.steps += steps
                     call.kept[cell] = value

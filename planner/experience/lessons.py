@@ -116,8 +116,7 @@ def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     guide = Guide(call, rules, usable(experience))
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
-        for _ in by_rules(guide):
-            pass
+        by_rules(guide)
     for cell in open_:
         kinds = {rule.goals for rule in guide.by_goal.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [

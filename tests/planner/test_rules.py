@@ -127,9 +127,9 @@ def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> No
     kinds = {rule.goals for rule in memory.rules}
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
     call = Call(within, compiled(within), None, 1000)
-    followed = Memory(poor).guide(call, guarded=True).by_goal
+    followed = Memory(poor).guide(call, "guarded").by_goal
     assert {level for level, _ in followed} == {2, 3}  # the record is of goals of a task, not of refinements
-    assert Memory(poor).guide(call, guarded=False).names == memory.guide(call, guarded=True).names != set()
+    assert Memory(poor).guide(call, "leading").names == memory.guide(call, "guarded").names != set()
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
