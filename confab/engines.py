@@ -7,13 +7,20 @@ steps does what one of them says; `planner.validation` has the last word.
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from importlib.util import find_spec
+from os import killpg
+from pathlib import Path
 from pkgutil import iter_modules
+from signal import SIGKILL
+from subprocess import DEVNULL, Popen, TimeoutExpired
+from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import Any
 
 from confab.pddl_commands import read_pddl_plan
 from planner.hierarchical.regrouping import under_the_levels_above
@@ -26,6 +33,8 @@ from reasoner.symbols import Problem, Symbol
 
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines that take no amounts."""
+WITH_DEFINITIONS = {"up_fast_downward"}
+"""Packages of engines that take derived predicates; unified-planning itself reads none."""
 Answer = tuple[str, str, list[str]]
 """An engine's name, what became of it in unified-planning's words, and the steps of its plan as ``action object …``."""
 
@@ -47,17 +56,12 @@ def plan_by_engine(
     Raises
     ------
     KnowledgeError
-        There is no such engine or level, or something is defined or an amount, which no engine's reader or this engine takes.
+        There is no such engine or level, or something is defined or an amount, which this engine doesn't take.
     """
     began = perf_counter()
     level = problem.domain.levels[-1] if level is None else level
     if level not in problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
-    if problem.domain.rules:
-        defined = ", ".join(sorted(problem.domain.rules))
-        raise KnowledgeError(
-            f"unified-planning reads no derived predicates, and {defined} would be some; plan without --engine"
-        )
     wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
     exported = to_pddl(wanted, level)
     name, said, lines = answer(exported.domain, exported.problem, engine, seconds)
@@ -67,7 +71,7 @@ def plan_by_engine(
         left = tuple(levels_left(problem, plan)) if plan is not None else ()
         return Outcome(status, plan, why, seconds=perf_counter() - began, engine=name, left=left)
 
-    if said.startswith("UNSOLVABLE"):
+    if said == "UNSOLVABLE_PROVEN":
         return outcome(Status.UNSOLVABLE, reason=f"no plan exists on level {level}")
     if not said.startswith("SOLVED"):
         return outcome(Status.GAVE_UP, reason=said.lower().replace("_", " "))
@@ -84,11 +88,14 @@ def some_installed(problem: Problem) -> bool:
 
     By their names: importing them takes longer than most plans.
     """
-    if problem.domain.rules or find_spec("unified_planning") is None:
+    if find_spec("unified_planning") is None:
         return False
-    numbers = any(situation.quantity is not None for situation in problem.domain.situations.values())
     engines = {module.name for module in iter_modules() if module.name.startswith("up_")}
-    return bool(engines - WITHOUT_NUMBERS if numbers else engines)
+    if problem.domain.rules:
+        engines &= WITH_DEFINITIONS
+    if any(situation.quantity is not None for situation in problem.domain.situations.values()):
+        engines -= WITHOUT_NUMBERS
+    return bool(engines)
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
@@ -107,6 +114,7 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
     """
     try:
         from unified_planning import environment as environments
+        from unified_planning.engines import PDDLPlanner
         from unified_planning.environment import Environment
         from unified_planning.exceptions import UPException
         from unified_planning.io import PDDLReader
@@ -131,6 +139,12 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
         raise KnowledgeError(
             f"no engine '{engine}' is installed (installed: {known}); pip install up-{engine} may bring it"
         )
+    first = engine or next((name for name in factory.preference_list if name in factory.engines), None)
+    if first and issubclass(factory.engine(first), PDDLPlanner) and ":numeric-fluents" not in domain:
+        return first, *_directly(factory.engine(first)(), domain, problem, seconds)
+    if "(:derived" in domain:
+        said = f"{engine} takes no" if engine else "no installed engine takes"
+        raise KnowledgeError(f"{said} derived predicates, as what is defined would be; plan without --engine")
     with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
         warnings.simplefilter("ignore")
         try:
@@ -154,3 +168,30 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
     actions = result.plan.actions if result.plan is not None else ()
     lines = [" ".join((action.action.name, *map(str, action.actual_parameters))) for action in actions]
     return name, result.status.name, lines
+
+
+def _directly(planner: Any, domain: str, problem: str, seconds: float | None) -> tuple[str, list[str]]:
+    """Give the files to an engine that reads PDDL itself; return what became of it, and the steps of its plan.
+
+    unified-planning would read and write them anew first: that takes minutes where relations are large, and no derived predicates.
+    """
+    from unified_planning.model import Problem as Nothing
+
+    with TemporaryDirectory() as folder:
+        files = [Path(folder) / name for name in ("domain.pddl", "problem.pddl", "plan")]
+        files[0].write_text(domain)
+        files[1].write_text(problem)
+        process = Popen(  # in a session of its own, since it has children
+            planner._get_cmd(*map(str, files)), cwd=folder, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True
+        )
+        try:
+            code = process.wait(seconds)
+        except TimeoutExpired:
+            return "TIMEOUT", []
+        finally:
+            if process.poll() is None:
+                killpg(process.pid, SIGKILL)
+                process.wait()
+        if files[2].exists():
+            return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", files[2].read_text(), re.MULTILINE)
+        return planner._result_status(Nothing(), None, code, []).name, []

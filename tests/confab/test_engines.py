@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from time import sleep
 from types import SimpleNamespace
 
 import pytest
@@ -64,6 +66,7 @@ def test_a_level_of_ones_choice_is_planned() -> None:
     ("said", "status", "reason"),
     [
         ("UNSOLVABLE_PROVEN", Status.UNSOLVABLE, "e: no plan exists on level 3"),
+        ("UNSOLVABLE_INCOMPLETELY", Status.GAVE_UP, "e: unsolvable incompletely"),
         ("TIMEOUT", Status.GAVE_UP, "e: timeout"),
         ("SOLVED_SATISFICING", Status.GAVE_UP, "e: its plan is none here: the goal"),
     ],
@@ -120,9 +123,11 @@ def test_fast_downward_plans_the_lowest_level(monkeypatch: pytest.MonkeyPatch, s
     assert validate(problem, outcome.plan) == []
 
 
-def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_said() -> None:
+def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
-    domain = """(define (domain d) (:requirements :strips :action-costs) (:predicates (p)) (:functions (total-cost))
+    domain = """(define (domain d) (:requirements :strips :numeric-fluents) (:predicates (p)) (:functions (total-cost))
      (:action a :parameters () :effect (and (p) (increase (total-cost) 3))))"""
     problem = "(define (problem x) (:domain d) (:init (= (total-cost) 0)) (:goal (p)) (:metric minimize (total-cost)))"
     try:
@@ -130,16 +135,36 @@ def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_
     except KnowledgeError as error:  # where no engine is installed
         assert "no engine takes this problem" in str(error)
     with pytest.raises(KnowledgeError, match="unified-planning can't read this level"):
-        answer("(define (domain d) (:predicates", problem, None, 10.0)
+        answer("(define (domain d) (:requirements :numeric-fluents) (:predicates", problem, None, 10.0)
+    with pytest.raises(KnowledgeError, match="no installed engine takes derived predicates"):
+        monkeypatch.setattr("unified_planning.engines.factory.Factory.preference_list", [])
+        answer("(define (domain d) (:derived (p) (q)))", problem, None, 10.0)
 
 
 def test_what_no_engine_takes_is_said_and_no_time_is_kept_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
     monkeypatch.undo()
     defined, counted, plain = (confab.load(scene).problem for scene in ("gallery-small", "canteen-small", SCENE))
-    with pytest.raises(KnowledgeError, match=r"reads no derived predicates, and .* would be"):
-        plan_by_engine(defined, "fast-downward")
     with pytest.raises(KnowledgeError, match="fast-downward takes no numbers"):
         plan_by_engine(counted, "fast-downward")
     monkeypatch.setattr("confab.engines.iter_modules", lambda: [SimpleNamespace(name="up_fast_downward")])
+    assert [some_installed(problem) for problem in (plain, defined, counted)] == [True, True, False]
+    monkeypatch.setattr("confab.engines.iter_modules", lambda: [SimpleNamespace(name="up_pyperplan")])
     assert [some_installed(problem) for problem in (plain, defined, counted)] == [True, False, False]
+
+
+def test_an_engine_that_reads_pddl_takes_what_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
+    monkeypatch.undo()
+    problem = confab.load("gallery-small").problem
+    outcome = plan_by_engine(problem, "fast-downward")
+    assert outcome.status is Status.SOLVED and outcome.plan is not None and validate(problem, outcome.plan) == []
+
+
+def test_an_engine_is_stopped_at_the_time_limit_with_all_its_processes(tmp_path: Path) -> None:
+    pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
+    late = tmp_path / "late"
+    slow = SimpleNamespace(_get_cmd=lambda *_: ["sh", "-c", f"(sleep 1; touch {late}) & wait"])
+    assert engines._directly(slow, "", "", 0.1) == ("TIMEOUT", [])
+    sleep(1.1)
+    assert not late.exists()
