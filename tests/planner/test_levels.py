@@ -15,7 +15,7 @@ from planner.hierarchical.unsolvability import LEAST, looked_at
 from planner.levels import levels_left
 from planner.paper.hierarchy import DOUBT
 from planner.paper.hierarchy import plan as paper
-from planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
+from planner.plan import Outcome, Plan, Status, UnsolvableError
 from planner.solve import Request, _proof, solve
 from planner.validation import successor, validate
 from reasoner.pddl.importing import imported
