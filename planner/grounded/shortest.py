@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TypeAlias
@@ -26,12 +26,12 @@ Bound: TypeAlias = "Callable[[int], float]"
 class Shortest:
     """What was found: no plan is cheaper than `bound` or, if that is infinite, there is none cheaper than `upper`.
 
-    `plan` are the operators of a cheapest plan; `states` were reached.
+    `plan` are the operators of a cheapest plan; `states` were reached, each at a cost.
     """
 
     bound: float
     plan: tuple[int, ...] | None
-    states: int
+    states: Mapping[int, float]
 
 
 def nothing(state: int) -> float:
@@ -79,9 +79,9 @@ def shortest(
             while state in came_from:
                 state, operator = came_from[state]
                 steps.append(operator)
-            return Shortest(f, tuple(steps[::-1]), len(g))
+            return Shortest(f, tuple(steps[::-1]), g)
         if expanded >= most or (deadline is not None and perf_counter() > deadline):
-            return Shortest(lower, None, len(g))
+            return Shortest(lower, None, g)
         expanded += 1
         counts.expanded += 1
         so_far = g[state]
@@ -98,7 +98,7 @@ def shortest(
                 if new + estimate < upper:
                     number += 1
                     heapq.heappush(queue, (new + estimate, estimate, number, after))
-    return Shortest(upper, None, len(g))
+    return Shortest(upper, None, g)
 
 
 def ways(task: Task) -> Bound:

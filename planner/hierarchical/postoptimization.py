@@ -173,7 +173,7 @@ class Improver:
         task = replace(task, costs=[1.0] * len(task))
         upper = length(old, level)
         found = shortest(task, ways(task), upper, self.work, self.segments.deadline)
-        self.work -= found.states
+        self.work -= len(found.states)
         if found.plan is not None:
             return [task.describe(operator)[:2] for operator in found.plan]
         return [] if found.bound >= upper else None

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.hierarchical.operators import Achieve, Achiever, Program
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 LOOKING, LEAST = 1_800_000, 300
 """The work of looking at all states, in states times operators, that no search has to come before; a state takes at least as long
 as so many operators."""
+TOLD, NAMED = 5_000, 3
+"""Of so many states, at most, it is said what can be done in none of them; and so many facts are named."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
@@ -279,4 +283,32 @@ def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | 
     found = shortest(task, most=most, deadline=deadline)
     if found.plan is not None or found.bound < math.inf:
         return None
-    return Reason(f"all {found.states} states of level {task.level} that can be reached were looked at")
+    states = list(found.states)
+    text = f"all {len(states)} states of level {task.level} that can be reached were looked at"
+    ever = reduce(or_, states)
+    never = [text for bit, text in _named(task) if task.goal & ~ever & bit] or ["the whole goal"]
+    idle = _never_done(task, states[:TOLD]) if len(states) <= TOLD else []
+    said = f"; {', '.join(idle)} can never be done" if idle else ""
+    more = f" (nor do {len(never) - NAMED} more)" if len(never) > NAMED else ""
+    return Reason(f"{text}: in none does {' or '.join(never[:NAMED])} hold{more}{said}")
+
+
+def _named(task: Task) -> Iterator[tuple[int, str]]:
+    """Yield the bits that stand for facts, or for their not holding, and what these are in words."""
+    for bit, fact in enumerate(task.facts):
+        yield 1 << bit, str(fact)
+    for bit, fact in task.complements.items():
+        yield 1 << bit, f"not {fact}"
+
+
+def _never_done(task: Task, states: Sequence[int]) -> list[str]:
+    """Return the level's behaviours that can be done in none of some states."""
+    left = {behavior.name for behavior in task.problem.domain.at_level(task.level)}
+    for state in states:
+        if not left:
+            break
+        for operator in task.applicable(state)[0]:
+            name = task.describe(operator)[0]
+            if name in left and task.applied(state, operator) is not None:
+                left.discard(name)
+    return sorted(left)

@@ -126,7 +126,7 @@ def test_exhaustion_reaches_exactly_the_states_that_the_papers_model_reaches(lev
         task = grounded(problem, level, goal={})
         assert isinstance(task, Task)
         nowhere = replace(task, size=task.size + 1, goal=1 << task.size)
-        assert shortest(nowhere).states == len(seen), seed
+        assert len(shortest(nowhere).states) == len(seen), seed
 
 
 def test_a_place_that_no_hand_reaches_is_named() -> None:

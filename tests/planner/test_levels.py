@@ -11,7 +11,7 @@ from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.hierarchical.planner import Call, compiled
 from planner.hierarchical.planner import plan as default
-from planner.hierarchical.unsolvability import LEAST, looked_at
+from planner.hierarchical.unsolvability import LEAST, exhausted, looked_at
 from planner.levels import levels_left
 from planner.paper.hierarchy import DOUBT
 from planner.paper.hierarchy import plan as paper
@@ -252,5 +252,20 @@ def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> N
 
     assert paper(hierarchy(3000016), proof=proof).status is Status.UNSOLVABLE
     assert asked == [0, 3 * DOUBT]
-    with pytest.raises(UnsolvableError, match="IN can't be|can't be reached"):
+    with pytest.raises(UnsolvableError, match="can't be reached"):
         _proof(pen({"IN lion": "yard"}, key=False), 100, None)
+
+
+def test_where_no_state_will_do_it_is_said_which_goals_never_hold_and_what_can_never_be_done() -> None:
+    task = ground(
+        replace(pen({"IN lion": "yard"}), goal={Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): TRUE}), 2
+    )
+    assert isinstance(task, Task)
+    assert exhausted(task, 100) is None
+    shut = replace(task, barred={(task.initial, operator) for operator in range(len(task))})
+    reason = exhausted(shut, 100)
+    assert reason is not None
+    assert reason.text == (
+        "all 1 states of level 2 that can be reached were looked at: in none does gate AJAR true or lion IN yard hold; "
+        "B2_DRIVE, B2_OPEN, B2_SHUT can never be done"
+    )
