@@ -953,7 +953,7 @@ def _rules(parts: _Schema, schema: Schema, situations: Mapping[str, SituationTyp
             if iri in changed:
                 who = min(e for e in schema.of_kind("ValueEffect") if list(parts.values(e, "situationType")) == [iri])
                 raise KnowledgeError(
-                    f"<{who}> changes {name}, which is defined by <{min(by)}>; change what that reads, or drop the definition",
+                    f"<{who}> changes {name}, which is defined by <{min(by)}>; take the effect out, or drop the definition",
                     who,
                 )
             if not situations[name].boolean:

@@ -6,7 +6,7 @@ Each rule is a function from a `Case` to findings, written as (node, what, why, 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -20,7 +20,7 @@ from reasoner.amounts import Amount, Calculation, Expression, Measure, situation
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.definitions import Definitions
-from reasoner.reading.problem import Node, Reading
+from reasoner.reading.problem import Node, Reading, Schema
 from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,
@@ -419,8 +419,9 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
         for iri in schema.of_kind("SituationType")
         for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
     }
-    why = "only what no behaviour changes is defined by axioms; planning takes no notice of this one"
-    mend = "change another property, which follows into this one, or drop the axiom"
+    changed = {
+        iri for effect in schema.of_kind("ValueEffect") for iri in schema.nodes[effect].get(CORE + "situationType", ())
+    }
     for triple in case.triples:
         subject, predicate, value = triple.subject, triple.predicate.value, triple.object
         named = subject.value if isinstance(subject, ox.NamedNode) else ""
@@ -436,8 +437,12 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
             said, prop = f"{local_name(named)} is the inverse of {local_name(other)}", named
             if names.short(of[other]) in rules:
                 continue
-        if said and names.short(of[prop]) not in rules:
-            yield of[prop], f"that {said} isn't evaluated, since behaviours change it or nothing leads to it", why, mend
+        if (
+            said
+            and names.short(of[prop]) not in rules
+            and (fault := _unevaluated(schema, of[prop], prop, changed, said))
+        ):
+            yield fault
         if predicate in of and names.short(of[predicate]) in rules and named:
             yield (
                 named,
@@ -453,6 +458,37 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
                 "individuals are told apart by their names, and what isn't stated is false",
                 "say it in a rule or in the scene's facts, or drop it",
             )
+
+
+def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
+    """Return why an axiom about a value property is none that planning evaluates, unless the effects are at fault."""
+    name, what = local_name(prop), f"that {said} isn't evaluated, since "
+    nodes = {**schema.axioms, **schema.expressions}
+    into = any(
+        prop in node.get(by, ())
+        for node in nodes.values()
+        for by in (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+    )
+    into = into or any(nodes.get(prop, {}).get(OWL + by) for by in ("propertyChainAxiom", "equivalentProperty"))
+    if situation in changed and not into:
+        what += f"behaviours change {local_name(situation)}"
+        why = "only what no behaviour changes is defined by axioms; planning takes no notice of this one"
+        return (
+            situation,
+            what,
+            why,
+            "let behaviours change another property, which follows into this one, or drop the axiom",
+        )
+    if situation not in schema.pairs:
+        what += f"{name} is functional"
+        why = "what is defined is true or false for each pair; a functional value property gives one value"
+        return situation, what, why, f"drop owl:FunctionalProperty of {name}, or drop the axiom"
+    if situation in changed:
+        return None  # `effect-on-definition` says it where the effect is
+    what += f"no property leads into {name}"
+    why = "planning works out what follows from what behaviours change or what is static"
+    mend = f"make a property that behaviours change, or a static one, rdfs:subPropertyOf {name}; or drop the axiom"
+    return situation, what, why, mend
 
 
 WATCHED_BY_NOBODY = {

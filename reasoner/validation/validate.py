@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -54,6 +55,8 @@ CONSEQUENCES = {
     "tuple-outside-class",
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
+SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
+"""Checks that don't speak of a node of which another one does: who follows the remedy of the first makes it worse."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
 """What isn't said as long as the update of some behaviour can't be read."""
 
@@ -237,16 +240,20 @@ def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
 
 
 def _violations(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    for check in checks():
+    said: dict[str, set[str]] = defaultdict(set)
+    for check in sorted(checks(), key=lambda check: check.rule in SAID_BETTER):
         answer = graph.query(check.query, GRAPHS)
         assert isinstance(answer, ox.QuerySolutions)
         names = [variable.value for variable in answer.variables]
         for row in answer:
             words = {name: _word(term) for name, term in zip(names, row, strict=True)}
-            node = row["node"]
+            node = row["node"].value if isinstance(row["node"], ox.NamedNode) else ""
+            if node in said[SAID_BETTER.get(check.rule, "")]:
+                continue
+            said[check.rule].add(node)
             yield places.finding(
                 check.rule,
-                node.value if isinstance(node, ox.NamedNode) else "",
+                node,
                 fill(check.what, words),
                 fill(check.why, words),
                 fill(check.remedy, words),

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from reasoner.names import local_name
+from reasoner.validation.findings import Finding
 from reasoner.validation.validate import validate
 from worlds.entailed import implies
 
@@ -36,7 +37,7 @@ FEE = """
         ("# What follows.", CIRCLE, "theatre", "A.rule",
          "A is defined by B not being true, which is defined by A in turn", "take one of these conditions out of its rule"),
         (":PUSH.cart ; c:situationType :PARKED ; c:value :PUSH.room ; rdfs", ":PUSH.cart ; c:situationType :FULL ; rdfs",
-         "theatre", "PUSH.there", "changes FULL, which is defined by", "change what that reads, or drop the definition"),
+         "theatre", "PUSH.there", "changes FULL, which is defined by the class FullCart", "take the effect out"),
         ("# What follows.", FREE, "theatre", "Stowed",
          "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
         ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
@@ -84,3 +85,51 @@ def test_what_owl_demands_of_every_state_is_not_ignored_silently(tmp_path: Path,
     found = [f for f in validate([tmp_path / "first-night.ttl"]) if f.rule == "axiom-not-watched"]
     assert [f.what for f in found] == ([said] if said else [])
     assert not any(f.serious for f in found)
+
+
+NEAR = """:near a owl:ObjectProperty, owl:NamedIndividual{kind} .
+:NEAR a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :near .
+:Prop rdfs:subClassOf :NEAR . :Cart c:hasSituationType :NEAR . """
+FUNCTIONAL = """, owl:FunctionalProperty . :carries rdfs:subPropertyOf :near . :NEAR c:defaultValue :stage .
+:Room rdfs:subClassOf :NEAR"""
+
+
+def theatre_with(folder: Path, old: str, new: str, more: str) -> list[Finding]:
+    """Return the errors of the theatre with a text replaced and more added."""
+    for one in THEATRE.glob("*.ttl"):
+        text = one.read_text(encoding="utf-8")
+        added = more if one.stem == "theatre" else ""
+        (folder / one.name).write_text(text.replace(old, new) + added, encoding="utf-8")
+    return [f for f in validate([folder / "first-night.ttl"]) if f.serious]
+
+
+@pytest.mark.parametrize("subject", ["?cart", "?room"])
+def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_path: Path, subject: str) -> None:
+    """Nor is the object, which may lack the situation type: who gave it to its class would lose the definition for good."""
+    more = NEAR.format(kind=", owl:TransitiveProperty") + ":carries rdfs:subPropertyOf :near ."
+    insert = "INSERT { ?cart :carries ?prop"
+    (said,) = theatre_with(tmp_path, insert, f"{insert} . {subject} :near ?prop", more)
+    assert said.rule == "effect-on-definition"
+    assert "LOAD" in said.what
+    assert "changes NEAR, which is defined by the axiom that carries is below near" in said.what
+    assert said.remedy.startswith(
+        "take the effect out; or, if behaviours are to keep NEAR up to date themselves, drop the axiom"
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "effect", "what", "remedy"),
+    [
+        (", owl:TransitiveProperty", "", "since no property leads into near", "rdfs:subPropertyOf near"),
+        (", owl:TransitiveProperty", " . ?cart :near ?prop", "since behaviours change NEAR", "let behaviours change another"),
+        (FUNCTIONAL, "", "since near is functional", "drop owl:FunctionalProperty of near"),
+    ],
+)  # fmt: skip
+def test_an_axiom_that_is_not_evaluated_is_told_why(
+    tmp_path: Path, kind: str, effect: str, what: str, remedy: str
+) -> None:
+    insert = "INSERT { ?cart :carries ?prop"
+    found = theatre_with(tmp_path, insert, insert + effect, NEAR.format(kind=kind))
+    (said,) = (one for one in found if one.rule == "definition-without-effect")
+    assert what in said.what
+    assert remedy in said.remedy
