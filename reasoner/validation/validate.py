@@ -108,10 +108,18 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
     if len(graph.store) > QUICK:
         return []
     places = Places(graph)
-    case = Case(graph, None)
-    found = [*_violations(graph, places), *_by_rules(case, places)]
+    found = [finding for finding in _violations(graph, places) if finding.serious]
+    reading, problem = _read(graph)
+    if problem and not found:
+        found.append(_unreadable(graph, places, problem))
+    case = Case(graph, reading)
+    return unique(finding for finding in (*_sure(found, case), *_by_rules(case, places)) if finding.serious)
+
+
+def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
+    """Yield findings but for those that may only follow from a term that isn't declared."""
     unsure = misread(case)
-    return unique(f for f in found if f.serious and (f.rule not in CONSEQUENCES or f.node not in unsure))
+    yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
 
 
 def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
@@ -143,11 +151,10 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     done(f"reading {path.name} as the planner does")
     reading, problem = _read(graph)
     case = Case(graph, reading)
-    unsure = misread(case)
     unread = {fault.place.behavior for fault in faults}
     if faults:
         found = [f for f in found if f.node not in unread and f.rule not in NEEDS_ALL_BEHAVIORS]
-    yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
+    yield from _sure(found, case)
     if faults:
         yield from (finding for finding in _by_rules(case, places) if finding.rule == "undeclared-term")
         return

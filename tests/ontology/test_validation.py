@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
+import confab
 import ontology
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.validation.hermit import NoJavaError
-from reasoner.validation.rules import RULES
-from reasoner.validation.validate import checks, validate
+from reasoner.validation.rules import RULES, WARNINGS
+from reasoner.validation.validate import checks, quick_errors, validate
 from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, found, seed, skeleton
 
 
@@ -48,6 +49,14 @@ def test_a_seeded_fault_is_caught(fault: Fault, tmp_path: Path) -> None:
         assert finding.why
         assert finding.remedy
         assert Path(finding.file).parent in (tmp_path, ontology.ROOT)
+
+
+@pytest.mark.parametrize("rule", sorted(RULES.keys() - WARNINGS))
+def test_planning_tells_of_each_error_of_our_own_rules(rule: str, tmp_path: Path) -> None:
+    file = seed(next(fault for fault in FAULTS if fault.rule == rule), tmp_path)
+    errors = [error.rule for error in quick_errors(confab.load(file).knowledge)]
+    assert rule in errors
+    assert errors == [finding.rule for finding in validate([file]) if finding.serious]
 
 
 OUTSIDE = {"variable-outside-range", "relation-outside-domain", "relation-outside-range"}
