@@ -28,6 +28,7 @@ from planner.grounded.shortest import shortest, ways
 from planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12  # looked at for a cheapest plan, where the plan has no more steps
+WAYS = 20  # of what follows from others, gone through in the time in which an operator is looked at
 SIZES = (8, 16)  # steps of a window
 OPERATORS = 150  # of a window's search
 EVALUATIONS = 100  # of a window's search
@@ -51,7 +52,8 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     best = shortened(task, plan, deadline)
     if len(best) <= STEPS:
         cost = sum(task.costs[operator] for operator in best)
-        states = min(STATES, work // (1 + len(task.applicable(task.initial)[0])))
+        looked = (1 + len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
+        states = min(STATES, work // looked)
         exact = shortest(task, ways(task), cost, states, deadline)
         if exact.plan is not None or exact.bound >= cost:
             return best if exact.plan is None else list(exact.plan)

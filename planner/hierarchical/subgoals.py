@@ -66,7 +66,7 @@ class Wants:
         self._scopes: dict[tuple[int, int], tuple[str, ...]] = {}
         self._fresh: dict[tuple[object, ...], list[Want]] = {}
         self._free: dict[tuple[str, str], list[str]] = {}
-        self._tests: dict[tuple[int, tuple[str, ...], bool], Callable[..., Any]] = {}
+        self._tests: dict[tuple[int, ...], tuple[Callable[..., Any], Sequence[str]]] = {}
         self._worths: dict[int, Callable[..., Any]] = {}
         self._concern: frozenset[str] = frozenset()
         self._circular = circular(program.domain.rules)
@@ -371,10 +371,10 @@ class Wants:
         self, achiever: Achiever, condition: Condition, env: Env, whom: bool
     ) -> tuple[Callable[..., Any], Sequence[str]]:
         """Return the function that tells whether a condition holds, or for whom a witness does, and its arguments."""
-        names = tuple(sorted({name for name in self._about(condition)[2] if name in env} | needs(condition)))
-        key = id(condition), names, whom
-        found = self._tests.get(key)
-        if found is None:
+        key = id(condition), whom, *[name in env for name in self._about(condition)[2]]
+        known = self._tests.get(key)
+        if known is None:
+            names = tuple(sorted({name for name in self._about(condition)[2] if name in env} | needs(condition)))
             writer, bound = self.program.writer, set(names)
             if whom and isinstance(condition, Witness):
                 source, tests = writer.satisfying(condition, bound, achiever.kinds, achiever.behavior)
@@ -383,5 +383,5 @@ class Wants:
             else:
                 text = writer.expression(condition, bound, achiever.kinds, achiever.behavior)
             function = writer.function((), f"lambda {', '.join(map(written, names))}: {text}")
-            found = self._tests[key] = function(self.table.now, self.table.who)
-        return found, names
+            known = self._tests[key] = function(self.table.now, self.table.who), names
+        return known
