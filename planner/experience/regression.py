@@ -41,6 +41,7 @@ from reasoner.symbols import (
 
 WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf
 """What memory's files have words for; a rule that asks for anything else isn't learned."""
+STATIC = RelationCondition, ClassCondition
 LONGEST = 12
 """Rules for more steps than this ask for so much that they seldom apply."""
 
@@ -227,10 +228,32 @@ class Course:
             for other, holds in rests(c, ()) or [(c, False)]:
                 (need if holds else served)[other] = None
         if served:
+            for c in (*need, *served):
+                if isinstance(c, Witness) and c.negated:
+                    need.update(dict.fromkeys(self.apart(c, done, facts)))
             need.update(dict.fromkeys(done.asked))
             for c in served:
                 need.update(dict.fromkeys(self.before(c, done, facts)))
         return need, bool(served)
+
+    def apart(self, condition: Witness, done: Done, facts: Facts) -> Iterator[Condition]:
+        """Yield why a step doesn't bring about what nobody may be: what is static and doesn't hold of those whom it changes."""
+        conditions, kinds = opened([replace(condition, negated=False)], {})
+        for situation, key, value, _ in done.changes:
+            for c in conditions:
+                if not isinstance(c, ValueCondition) or c.negated or c.situation != situation:
+                    continue
+                pairs = list(zip((*c.arguments, c.value), (*key, value), strict=True))
+                who = {term: one for term, one in pairs if term in kinds}
+                if any(who.get(term, term) != one for term, one in pairs):
+                    continue
+                static = (
+                    substituted(other, who) for other in conditions if isinstance(other, STATIC) and not other.negated
+                )
+                ground = (one for one in static if not any(term in kinds for term in terms(one)))
+                wrong = next((one for one in ground if self.rules.satisfied([one], {}, {}, facts) is None), None)
+                if wrong is not None:
+                    yield replace(wrong, negated=True)
 
     def before(self, condition: Condition, done: Done, facts: Facts) -> Iterator[Condition]:
         """Yield what must hold before a step for what it makes true: its effects' conditions, and none but those it took away."""

@@ -282,6 +282,21 @@ def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
         )
 
 
+def test_rules_ask_why_a_step_does_not_bring_about_what_nobody_may_be() -> None:
+    experience = Experience("robot")
+    teach(experience, confab.load("laboratory-small").problem)
+    away = [
+        rule
+        for rule in rules_in(experience)
+        if rule.goal.situation == "SEPARATION" and rule.does[1][0] not in rule.goal.arguments and rule.steps == 2
+    ]
+    assert any(
+        isinstance(c, RelationCondition) and c.negated and c.relation == "holeOf" and c.arguments[0] == rule.does[1][1]
+        for rule in away
+        for c in rule.asks
+    )
+
+
 def test_rules_are_learned_where_amounts_are_compared() -> None:
     small, large = (confab.load(f"canteen-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
