@@ -231,7 +231,8 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
     names = (
         {local_name(q.subject.value) for q in graph.store if isinstance(q.subject, ox.NamedNode)} if unknown else set()
     )
-    return [f"{local_name(iri)}{nearest(local_name(iri), names)}" for iri in unknown]
+    elsewhere = [f"<{iri}>" for iri in unknown if local_name(iri) in names]  # another domain has such a name
+    return [*elsewhere, *(f"{name}{nearest(name, names)}" for name in map(local_name, unknown) if name not in names)]
 
 
 def migrate(memory: Path, renames: Sequence[str]) -> int:

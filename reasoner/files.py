@@ -44,7 +44,7 @@ def write_whole(
     """
     pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     target = _behind(path)
-    part = target.with_name(f".confab-{uuid4().hex}.part")
+    part = target.parent / f".confab-{uuid4().hex}.part"
     try:
         old = target.stat() if target.exists() else None
         if old is not None and not stat.S_ISREG(old.st_mode):

@@ -208,7 +208,7 @@ class Behavior:
 
     Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
     binding makes both false and true is true, as in PDDL. It can't be done where an amount that it changes would come to be
-    one that its situation type doesn't allow.
+    one that its situation type doesn't allow. `spread` are individuals that it names only because they are all of a kind.
     """
 
     name: str
@@ -219,6 +219,7 @@ class Behavior:
     effects: tuple[ValueEffect, ...] = ()
     cost: float = 1.0
     amounts: tuple[AmountEffect, ...] = ()
+    spread: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Put the effects in order."""
@@ -463,7 +464,11 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
     every = [one for effect in behavior.every_effect for one in single(effect)]
     effects = tuple(one for one in every if isinstance(one, ValueEffect))
     amounts = tuple(one for one in every if isinstance(one, AmountEffect))
-    return replace(behavior, effects=effects, amounts=amounts)
+    kinds = {effect.each.kind for effect in behavior.every_effect if effect.each is not None}
+    all_of = frozenset(one for kind in kinds for one in classes.get(kind, ()))
+    by_name = {one for effect in behavior.effects for one in (*effect.arguments, effect.value)}
+    by_name |= {one for one in all_of if any(substituted(c, {one: "?"}) != c for c in behavior.conditions)}
+    return replace(behavior, effects=effects, amounts=amounts, spread=all_of - by_name)
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:

@@ -40,6 +40,10 @@ def doubt(scene: Scene) -> None:
         remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
 
 
+NAMED = 3
+"""So many terms are named that a memory speaks of and a scene doesn't know."""
+
+
 def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     """Return the memory to plan with, if one was asked for."""
     if path is not None and none:
@@ -56,7 +60,8 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
 
             lines = memory_lines(path)
             if unknown := unknown_terms(lines, scene.knowledge):
-                remark(f"{path} counts what this scene doesn't know: {'; '.join(unknown)}")
+                more = f"; and {len(unknown) - NAMED} more" if len(unknown) > NAMED else ""
+                remark(f"{path} counts what this scene doesn't know: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
         if not path.is_file():

@@ -326,16 +326,17 @@ class Program:
 
 def named(problem: Problem) -> list[str]:
     """Return the individuals that behaviours and rules mention by name, and the values that situation types start or rest with."""
-    found: dict[str, None] = {}
-
+    every: set[str] = set()
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
     for behavior in (*problem.domain.behaviors.values(), *rules):
+        found: dict[str, None] = {}
         for condition in behavior.conditions:
             found.update(dict.fromkeys(term for inner in walk(condition) for term in terms(inner)))
         for effect in behavior.effects:
             found.update(dict.fromkeys((*effect.arguments, effect.value)))
         for change in behavior.amounts:
             found.update(dict.fromkeys((*change.arguments, *terms_of(change.amount))))
+        every |= found.keys() - behavior.spread
     for situation in problem.domain.situations.values():
-        found.update(dict.fromkeys(value for value in (situation.rest, situation.default) if value is not None))
-    return sorted(term for term in found if not term.startswith("?"))
+        every |= {value for value in (situation.rest, situation.default) if value is not None}
+    return sorted(term for term in every if not term.startswith("?"))

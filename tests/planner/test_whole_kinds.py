@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from planner.hierarchical.operators import named
 from planner.plan import Step
 from planner.solve import Request, solve
 from reasoner.graph.knowledge import KnowledgeError, load
@@ -115,3 +116,10 @@ def test_what_cant_be_meant_of_all_is_said(theatre: Theatre, old: str, new: str,
 def test_validation_names_a_class_that_never_has_the_situation_type(theatre: Theatre) -> None:
     found = [f.what for f in validate([theatre("c:about d:Lamp", "c:about d:Circuit")])]
     assert "the goal night.lit wants LIT of Circuit, which has no such situation type" in found
+
+
+def test_who_is_only_one_of_a_kind_is_not_taken_for_named(theatre: Theatre) -> None:
+    problem = read(load(THEATRE / "first-night.ttl")).problem
+    spread = {one for behavior in problem.domain.behaviors.values() for one in behavior.spread}
+    assert {"crown", "skull", "sword"} <= spread
+    assert spread.isdisjoint(named(problem))
