@@ -16,7 +16,7 @@ from urllib.parse import unquote
 import pyoxigraph as ox
 
 import ontology
-from reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in, terms_of
+from reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in, terms_of
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.definitions import Definitions
@@ -27,6 +27,7 @@ from reasoner.symbols import (
     AmountEffect,
     AnyOf,
     Behavior,
+    ClassCondition,
     Comparison,
     Condition,
     Problem,
@@ -644,6 +645,59 @@ def unlike_units(case: Case) -> Iterator[Fault]:
                 )
 
 
+def numbers_missing(case: Case) -> Iterator[Fault]:
+    """Find individuals without a number that a behaviour reads of their class: nothing can be done with them."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    lacking: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for behavior in problem.domain.behaviors.values():
+        among = {term: (kind, frozenset(problem.classes.get(kind, ()))) for term, kind in behavior.kinds.items()}
+        read = [*_measured(behavior.preconditions, among, problem)]
+        for effect in behavior.amounts:
+            conditions = (*behavior.preconditions, *effect.when, Comparison(effect.amount, "=", effect.amount))
+            read += _measured(conditions, among, problem)
+        for relation, kind, individuals in read:
+            stated = {row[0] for row in problem.relations.get(relation, ())}
+            for one in individuals - stated:
+                lacking[relation, kind][one].add(behavior.name)
+    for (relation, kind), found in sorted(lacking.items()):
+        who = sorted(found)
+        some = ", ".join(who[:5]) + (", …" if len(who) > 5 else "")
+        readers = " and ".join(sorted(set().union(*found.values())))
+        has = "have" if len(who) > 1 else "has"
+        yield (
+            names.iri(who[0]),
+            f"{some} {has} no {relation}, which {readers} read{'' if ' and ' in readers else 's'} of each {kind}",
+            "what isn't stated compares with nothing, so that no such behaviour can be done with it",
+            f"state {relation} of {some}, or give it to another class than {kind}",
+        )
+
+
+def _measured(
+    conditions: Sequence[Condition], among: Mapping[str, tuple[str, frozenset[str]]], problem: Problem
+) -> Iterator[tuple[str, str, frozenset[str]]]:
+    """Yield each relation that gives a number of one term, with the term's class and the individuals that it can stand for."""
+    among = dict(among)
+    for condition in conditions:
+        if isinstance(condition, ClassCondition) and not condition.negated and condition.term in among:
+            individuals = among[condition.term][1] & frozenset(problem.classes.get(condition.kind, ()))
+            among[condition.term] = condition.kind, individuals
+    for condition in conditions:
+        match condition:
+            case Comparison(left, _, right):
+                for part in (*inside(left), *inside(right)):
+                    match part:
+                        case Measure(relation, (term,)) if term in among:
+                            yield relation, *among[term]
+            case Witness(variable, kind, inner):
+                members = kind, frozenset(problem.classes.get(kind, ()))
+                yield from _measured(inner, {**among, variable: members}, problem)
+            case AnyOf(alternatives):
+                for group in alternatives:
+                    yield from _measured(group, among, problem)
+
+
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undeclared-term": undeclared_terms,
     "missing-all-different": individuals_not_different,
@@ -655,6 +709,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "definition-without-effect": definitions_without_effect,
     "axiom-not-watched": axioms_not_watched,
     "unit-mismatch": unlike_units,
+    "number-missing": numbers_missing,
 }
-WARNINGS = frozenset({"axiom-not-watched", "crowded"})
+WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing"})
 """Rules of what can be planned with all the same."""

@@ -186,3 +186,28 @@ def test_a_warning_leaves_the_exit_code_at_0_unless_it_shall_not(tmp_path: Path)
     assert done.returncode == 0, done.stderr
     assert {finding["severity"] for finding in json.loads(done.stdout)} == {"warning"}
     assert subprocess.run([*command, "--strict"], capture_output=True).returncode == 1
+
+
+def test_what_is_concluded_from_a_wrong_pair_does_not_hide_it(tmp_path: Path) -> None:
+    """OWL 2 RL runs for the symmetric relation, and concludes from its domain that an item is a place."""
+    scene = skeleton(tmp_path)
+    near = """
+    :near a owl:ObjectProperty, owl:SymmetricProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; rdfs:range :Place .
+    :basin a owl:NamedIndividual, :Sink ; c:index 9 ; :near :plate9 . :plate9 a owl:NamedIndividual, :Plate ; c:index 9 .
+    """
+    domain = tmp_path / "washing.ttl"
+    domain.write_text(domain.read_text(encoding="utf-8") + near, encoding="utf-8")
+    said = {finding.what for finding in validate([scene]) if finding.rule == "pair-outside-class"}
+    assert "basin states near with plate9, but plate9 is no Place, the range of near" in said
+
+
+def test_a_number_that_a_behaviour_reads_of_a_smaller_class_may_be_lacking_elsewhere(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "number-missing")
+    scene = seed(fault, tmp_path)
+    domain = tmp_path / "washing.ttl"
+    pot = """
+    :Pot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Item . :B1_WASH c:precondition :B1_WASH.pot .
+    :B1_WASH.pot a owl:NamedIndividual, c:ClassCondition ; c:about :B1_WASH.item ; c:ofClass :Pot .
+    """
+    domain.write_text(domain.read_text(encoding="utf-8") + pot, encoding="utf-8")
+    assert [finding for finding in validate([scene]) if finding.rule == "number-missing"] == []
