@@ -18,6 +18,7 @@ from confab.show import show
 from planner.plan import Status
 from reasoner.files import write_whole
 from reasoner.reading.observed import assert_observed, save_observed
+from reasoner.validation.findings import listing
 from reasoner.validation.validate import validate
 
 YES, NO, GAVE_UP = 0, 1, 3
@@ -44,7 +45,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     with progress("validating") as advance:
         findings = validate([name], done=lambda what: advance(what, 0))
     if findings:
-        print("\n".join(map(str, findings)))
+        print(listing(findings))
     if any(finding.serious for finding in findings):
         return NO
     tell("loading the scene")

@@ -110,7 +110,7 @@ def validate(files: tuple[str, ...], deep: bool, strict: bool, watch: bool, as_j
 
 def _validated(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> int:
     """Check some files, print what was found, and return the exit code."""
-    from reasoner.validation.findings import ERROR, WARNING
+    from reasoner.validation.findings import ERROR, WARNING, listing
     from reasoner.validation.validate import STAGES
     from reasoner.validation.validate import validate as check
 
@@ -120,7 +120,8 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) 
     if as_json:
         show_result([finding.as_dict() for finding in findings])
     else:
-        show_result("\n".join([*map(str, findings), *([] if errors or warnings else ["nothing is wrong"])]))
+        said = [listing(findings)] if findings else []
+        show_result("\n".join([*said, *([] if errors or warnings else ["nothing is wrong"])]))
         if errors or warnings:
             from confab.memory import counted
 

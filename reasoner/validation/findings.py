@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 
 import pyoxigraph as ox
@@ -60,13 +61,36 @@ class Finding:
 
     def __str__(self) -> str:
         """Return the finding as a compiler prints its own."""
+        return f"{self.headline}\n{self.advice}"
+
+    @property
+    def headline(self) -> str:
+        """Where it is and what is wrong, in one line."""
         place = f"{self.file}:{self.line}" if self.line else self.file
         place += "" if self.serious else f": {self.severity}"
-        return f"{place}: {self.what} [{self.rule}]\n    why: {self.why}\n    do:  {self.remedy}"
+        return f"{place}: {self.what} [{self.rule}]"
+
+    @property
+    def advice(self) -> str:
+        """Why it matters and what to do about it, in two lines."""
+        return f"    why: {self.why}\n    do:  {self.remedy}"
 
     def as_dict(self) -> dict[str, str | int]:
         """Return the finding as JSON can take it."""
         return asdict(self)
+
+
+def listing(findings: Sequence[Finding]) -> str:
+    """Return findings as a terminal shows them: errors last, where one looks first, and advice once for all that it is the same for."""
+    parts = []
+    for severity in (REMARK, WARNING, ERROR):
+        own = [finding for finding in findings if finding.severity == severity]
+        if severity != ERROR:
+            own.sort(key=lambda finding: (finding.rule, finding))
+        together = groupby(own, lambda finding: (finding.rule, finding.advice))
+        lines = [line for (_, advice), group in together for line in (*(one.headline for one in group), advice)]
+        parts += ["\n".join(lines)] if lines else []
+    return "\n\n".join(parts)
 
 
 class Places:

@@ -11,6 +11,7 @@ import pytest
 import confab
 import ontology
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.validation.findings import listing
 from reasoner.validation.hermit import NoJavaError
 from reasoner.validation.rules import RULES, WARNINGS
 from reasoner.validation.validate import checks, quick_errors, validate
@@ -20,6 +21,22 @@ from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, f
 @pytest.mark.parametrize("file", ontology.shipped().values(), ids=lambda path: path.stem)
 def test_nothing_that_is_shipped_has_a_fault(file: Path) -> None:
     assert [str(finding) for finding in validate([file]) if finding.severity != "remark"] == []
+
+
+def test_errors_stand_last_and_advice_once(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    text = scene.read_text(encoding="utf-8")
+    text = text.replace("d:cleanliness d:dirty", "d:cleanliness :table")
+    scene.write_text(re.sub(r" ; rdfs:label [^;.]*", "", text), encoding="utf-8")
+    findings = validate([scene])
+    warnings, errors = listing(findings).split("\n\n")
+    assert {line.rsplit("[", 1)[1] for line in errors.splitlines() if line[0] != " "} == {
+        "fact-outside-range]",
+        "unreachable]",
+    }
+    lines = warnings.splitlines()
+    assert [line.endswith("has no label [no-label]") for line in lines] == [True] * (len(lines) - 2) + [False] * 2
+    assert len(lines) - 2 == sum(finding.rule == "no-label" for finding in findings) > 2
 
 
 def test_a_choice_is_remarked_on_and_nothing_is_wrong_with_it() -> None:
