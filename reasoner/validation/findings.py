@@ -81,7 +81,7 @@ class Finding:
 
 
 def listing(findings: Sequence[Finding]) -> str:
-    """Return findings as a terminal shows them: errors last, where one looks first, and advice once for all that it is the same for."""
+    """Return findings as a terminal shows them: errors last, where one looks first; advice once for findings of a kind."""
     parts = []
     for severity in (REMARK, WARNING, ERROR):
         own = [finding for finding in findings if finding.severity == severity]
