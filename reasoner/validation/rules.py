@@ -17,6 +17,7 @@ import pyoxigraph as ox
 
 import ontology
 from reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in, terms_of
+from reasoner.derivation import needed
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.definitions import Definitions
@@ -492,6 +493,28 @@ def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], s
     return situation, what, why, mend
 
 
+def defined(case: Case) -> Iterator[Fault]:
+    """Tell of each situation type that is defined whether it is worked out in every state, and from what, or is static."""
+    if case.reading is None:
+        return
+    domain, names = case.reading.problem.domain, case.reading.names
+    changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
+    reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in domain.rules.items()}
+    for name in domain.rules:
+        below, waiting = {name}, [name]
+        while waiting:
+            waiting += (more := reads.get(waiting.pop(), set()) - below)
+            below |= more
+        if below & changed:
+            what = f"{name} is derived: in every state it follows from {' and '.join(sorted(reads[name] - {name}))}"
+            why = "planning works it out anew after each step, as its definition says; no behaviour changes it"
+            yield names.iri(name), what, why, "nothing"
+        else:
+            what = f"{name} is static: no behaviour changes what it follows from"
+            why = "it is the same in every state"
+            yield names.iri(name), what, why, "nothing, if it is meant; else define it by what behaviours change"
+
+
 WATCHED_BY_NOBODY = {
     OWL + "InverseFunctionalProperty": "leads to no two from one",
     OWL + "AsymmetricProperty": "never leads both ways",
@@ -710,6 +733,9 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "axiom-not-watched": axioms_not_watched,
     "unit-mismatch": unlike_units,
     "number-missing": numbers_missing,
+    "defined": defined,
 }
 WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing"})
 """Rules of what can be planned with all the same."""
+REMARKS = frozenset({"defined"})
+"""Rules that tell of what isn't wrong."""

@@ -34,8 +34,8 @@ from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGrap
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.updates.compiling import Fault
-from reasoner.validation.findings import ERROR, WARNING, Finding, Places, fill, unique
-from reasoner.validation.rules import RULES, WARNINGS, Case, misread
+from reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
+from reasoner.validation.rules import REMARKS, RULES, WARNINGS, Case, misread
 from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:
@@ -125,7 +125,8 @@ def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
 def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
     for rule, faults in RULES.items():
         for node, what, why, remedy in faults(case):
-            yield places.finding(rule, node, what, why, remedy, WARNING if rule in WARNINGS else ERROR)
+            severity = WARNING if rule in WARNINGS else REMARK if rule in REMARKS else ERROR
+            yield places.finding(rule, node, what, why, remedy, severity)
 
 
 def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -> Iterator[Finding]:

@@ -133,3 +133,15 @@ def test_an_axiom_that_is_not_evaluated_is_told_why(
     (said,) = (one for one in found if one.rule == "definition-without-effect")
     assert what in said.what
     assert remedy in said.remedy
+
+
+def test_each_defined_situation_type_is_told_to_be_derived_or_static(tmp_path: Path) -> None:
+    more = """:HUNG a owl:NamedIndividual, c:SituationType ; c:holdsOf :Hung . :Lamp c:hasSituationType :HUNG .
+    :Hung a owl:Class, owl:NamedIndividual ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf
+      ( :Lamp [ a owl:Restriction ; owl:onProperty :hangsOn ; owl:someValuesFrom :Circuit ] ) ] ."""
+    assert theatre_with(tmp_path, "", "", more) == []
+    assert {f.what for f in validate([tmp_path / "first-night.ttl"]) if f.rule == "defined"} == {
+        "FULL is derived: in every state it follows from LADEN",
+        "STOWED is derived: in every state it follows from LADEN",
+        "HUNG is static: no behaviour changes what it follows from",
+    }
