@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -273,11 +274,15 @@ class Known:
 
     def _asked(self, sparql: str) -> KnowledgeGraph:
         """Return the graph as a query shall see it; what is missing in it is told once."""
+        from confab.following import write_following
         from reasoner.reading.affordance import SITUATION, write_situation
 
         self.settle()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
+        if not self.knowledge.remote:
+            with suppress(KnowledgeError):  # what can't be planned in can be asked all the same
+                write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:
             log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
         self._told = True

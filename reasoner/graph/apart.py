@@ -19,12 +19,12 @@ from typing import Any, TypeAlias
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, Row
+from reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
 from reasoner.limits import LimitError
 from reasoner.names import nearest
 from reasoner.vocabulary import CORE
 
-UNION = tuple(BASE + name for name in GRAPHS)
+UNION = tuple(BASE + name for name in (*GRAPHS, DERIVED))
 PROCESS = Path(__file__).with_name("asked_apart.py")
 SECONDS, ROWS, MEGABYTES = 60.0, 100_000, 2_000
 TEXTS = re.compile(

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
+DERIVED = "derived"
+"""What follows in the initial state from definitions, for queries alone: planning works it out in every state."""
 SCENE = ("asserted", "inferred", "reach")
 """The graphs that a planning call starts from."""
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")

@@ -13,6 +13,8 @@ import ontology
 from confab.authoring import new_domain
 from confab.cli import app
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.reading.affordance import SITUATION
+from reasoner.validation.validate import quick_errors
 
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
 OF_CUP1 = "SELECT ?where WHERE { :cup1 k:location ?where }"
@@ -158,3 +160,32 @@ def test_one_missing_value_blocks_no_query(tmp_path: Path) -> None:
     with pytest.raises(KnowledgeError, match="has no value"):
         scene.plan()
     assert len(scene.query("SELECT ?x WHERE { ?x a d:Plate }")) >= 1
+
+
+INSIDE = "SELECT ?what ?where WHERE { ?what d:isInside ?where } ORDER BY ?what ?where"
+
+
+def test_what_follows_at_first_is_asked_for_like_what_is_stated() -> None:
+    packing = confab.load("packing-small")
+    rows = [("casket", "chest"), ("casket", "hall"), ("chest", "hall"), ("ring", "hall")]
+    assert list(packing.query(INSIDE)) == rows
+    by_sparql = f"SELECT ?what ?where WHERE {{ GRAPH <{SITUATION}> {{ {INSIDE[INSIDE.index('{') + 1 :]}".replace(
+        "}", "} }"
+    )
+    assert list(packing.query(by_sparql)) == rows
+    moved = packing.with_fact("ring LIES_IN casket")
+    assert list(moved.query(INSIDE)) == [*rows[:3], ("ring", "casket"), ("ring", "chest"), ("ring", "hall")]
+    stored = packing.with_fact("chest LIES_IN vault")
+    assert not packing.query("ASK { ?thing a d:StoredThing }")
+    assert [name for (name,) in stored.query("SELECT ?x WHERE { ?x a d:StoredThing }")] == [
+        "casket"
+    ]  # inside of a box and of a vault
+
+
+def test_what_follows_is_no_fact_of_the_scene() -> None:
+    """It is worked out anew in each state of a plan: what a query was told of the first one stays out of that."""
+    packing = confab.load("packing-small")
+    before = packing.plan()
+    packing.query(INSIDE)
+    assert quick_errors(packing.knowledge) == []
+    assert packing.plan().plan.steps == before.plan.steps

@@ -1,0 +1,65 @@
+"""What follows from definitions in a scene's initial state, written into the graph for the queries that name it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator
+from itertools import product
+
+import pyoxigraph as ox
+
+from planner.derived_facts import Rules
+from planner.transitions import Table, Writer, key_of
+from reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
+from reasoner.names import local_name
+from reasoner.reading.problem import Reading
+from reasoner.reading.restating import said, value_properties
+from reasoner.symbols import TRUE, Fact, Problem, Symbol
+from reasoner.vocabulary import CORE, TYPE
+
+DEFINED = """
+ASK {
+  { ?rule a :Rule } UNION { ?situation :holdsOf ?class } UNION
+  { ?situation :valueProperty ?property .
+    { ?other rdfs:subPropertyOf|owl:equivalentProperty|owl:inverseOf ?property }
+    UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
+    UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
+}"""
+"""Whether anything may be defined: asked first, since most scenes need not be read to be queried."""
+
+
+def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
+    """Write what follows in the initial state of the defined situation types that a query names into the graph `DERIVED`."""
+    name = ox.NamedNode(BASE + DERIVED)
+    graph.store.clear_graph(name)
+    if not graph.query(DEFINED, SCENE):
+        return
+    reading = read()
+    problem, properties = reading.problem, value_properties(graph)
+    classes: dict[str, list[str]] = {}
+    for situation in problem.domain.rules:
+        iri = reading.names.iri(situation)
+        of = list(reading.schema.nodes[iri].get(CORE + "holdsOf", ()))
+        words = (local_name(one) for one in (iri, properties.get(iri, iri), *of))
+        if any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", sparql) for word in words):
+            classes[situation] = of
+    for count, symbol in enumerate(_following(problem, classes)):
+        prop = properties.get(reading.names.iri(symbol.situation))
+        triples = list(said(reading, Fact(symbol, TRUE), prop, ox.BlankNode(f"follows{count}")))
+        about = ox.NamedNode(reading.names.iri(symbol.arguments[0]))
+        triples += [ox.Triple(about, ox.NamedNode(TYPE), ox.NamedNode(kind)) for kind in classes[symbol.situation]]
+        graph.store.extend(ox.Quad(one.subject, one.predicate, one.object, name) for one in triples)
+
+
+def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
+    """Yield what follows in the initial state of some defined situation types."""
+    if not situations:
+        return
+    table = Table(problem.domain.situations, problem.initial)
+    Rules(Writer(problem)).define(table)
+    for name in situations:
+        for arguments in product(
+            *(problem.classes.get(kind, ()) for kind in problem.domain.situations[name].arguments)
+        ):
+            if table.now[name].get(key_of(arguments)) == TRUE:
+                yield Symbol(name, arguments)
