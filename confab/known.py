@@ -16,6 +16,7 @@ from confab.accepting import sparql_of
 from confab.table import Table
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.limits import Deadline
 from reasoner.names import Names, nearest
 from reasoner.reading.problem import Reading, parse_fact, read
 from reasoner.symbols import Fact, Problem
@@ -250,7 +251,7 @@ class Known:
         from reasoner.graph.apart import ask, unheard_of
 
         sparql = sparql_of(sparql)
-        kind, columns, found = ask(self._asked(sparql), sparql, limits)
+        kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
         if not found and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
@@ -272,16 +273,21 @@ class Known:
         read_episodes(self.knowledge, map(Path, files))
         return self
 
-    def _asked(self, sparql: str) -> KnowledgeGraph:
+    def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
         """Return the graph as a query shall see it; what is missing in it is told once."""
         from confab.following import write_following
+        from reasoner.graph.apart import QueryLimits
         from reasoner.reading.affordance import SITUATION, write_situation
 
         self.settle()
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
         if not self.knowledge.remote:
-            with suppress(KnowledgeError):  # what can't be planned in can be asked all the same
+            deadline = Deadline.after((limits or QueryLimits()).seconds)
+            with (
+                suppress(KnowledgeError),
+                self.knowledge.until(deadline),
+            ):  # what can't be planned in can be asked all the same
                 write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:
             log.warning("confab: %s; it can be asked all the same, but not planned in", fault)
@@ -308,7 +314,7 @@ class Known:
         if path is not None:
             from reasoner.graph.construct import write_construct
 
-            return write_construct(self._asked(sparql), sparql, Path(path), limits)
+            return write_construct(self._asked(sparql, limits), sparql, Path(path), limits)
         import rdflib
 
         return rdflib.Graph().parse(data=self.query(sparql, limits).turtle(self.knowledge.spoken), format="turtle")
