@@ -97,7 +97,7 @@ def test_the_slice_has_whom_a_goal_names_by_their_class(theatre: Theatre) -> Non
 
 
 def test_the_theatre_is_valid() -> None:
-    assert [str(f) for f in validate([THEATRE / "first-night.ttl"])] == []
+    assert [str(f) for f in validate([THEATRE / "first-night.ttl"]) if f.severity != "remark"] == []
 
 
 @pytest.mark.parametrize(

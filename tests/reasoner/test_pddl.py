@@ -174,7 +174,7 @@ def test_an_imported_scene_is_valid_and_reads_back_as_the_same_problem(name: str
     (tmp_path / "d.pddl").write_text(OWN[name][0])
     (tmp_path / "p.pddl").write_text(OWN[name][1])
     problem = import_pddl(tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "scene.ttl")
-    assert validate([tmp_path / "scene.ttl"]) == []
+    assert [finding for finding in validate([tmp_path / "scene.ttl"]) if finding.severity != "remark"] == []
     assert same(problem, read(load(tmp_path / "scene.ttl")).problem)
 
 
@@ -226,7 +226,7 @@ def test_given_domains_go_in_and_out(path: Path, tmp_path: Path) -> None:
     found = given(path)
     scene = tmp_path / f"{found.problem.scene.rsplit('/', 1)[-1]}.ttl"
     scene.write_text(turtle(found.problem, "title", "description", found.said))
-    assert validate([scene]) == []
+    assert [finding for finding in validate([scene]) if finding.severity != "remark"] == []
     assert same(found.problem, read(load(scene)).problem)
     exported = to_pddl(found.problem)
     assert_same_behaviour(found.problem, exported, imported(parse(exported.domain, exported.problem)), 20)
