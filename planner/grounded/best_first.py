@@ -25,10 +25,10 @@ from time import perf_counter
 from typing import TypeAlias
 
 from planner.grounded.grounding import ground
-from planner.grounded.hff import Evaluate
+from planner.grounded.hff import Evaluate, Evaluation
 from planner.grounded.hff_amounts import heuristic as with_amounts
 from planner.grounded.hff_amounts import repeats
-from planner.grounded.hff_dense import effort
+from planner.grounded.hff_dense import Effort, EvaluateMany, effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
 from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks
@@ -106,7 +106,7 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Five searches share the time: by novelty, broad and deep; by h with lookahead, the same by landmarks too, and without it, since
+    Five searches share the time: by novelty, broad and deep; by h with lookahead; by landmarks, too, with it and without, since
     it can lead astray. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
     deadline can only cut the search short.
 
@@ -119,7 +119,7 @@ def search(
         On the clock of `time.perf_counter`.
     evaluate : function of a state, optional
         In place of h_FF: plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`);
-        for the searches by h by arrays, where these are less work.
+        for many states of the searches by h by arrays, where these are less work.
     found : function of a plan, optional
         Called with the first plan, before it is made shorter.
     """
@@ -127,23 +127,25 @@ def search(
     if task.initial & task.goal == task.goal:
         return Flat(Status.SOLVED, (), None, counts)
     bits = _bits(task)
-    work, by_arrays = effort(bits)
+    needed = effort(bits)
+    work = needed.followed
     if task.amounts is not None and repeats(task):
-        evaluate = often = evaluate or with_amounts(task)
-        quick = work
+        evaluate = evaluate or with_amounts(task)
+        many = None
     else:
-        arrays = evaluate is None and by_arrays < work
+        arrays = evaluate is None and needed.by_arrays(needed.width) < needed.width * work
         evaluate = evaluate or _on_bits(task, automatic(bits))
-        often, quick = (_on_bits(task, dense(bits)), by_arrays) if arrays else (evaluate, work)
+        many = _all_on_bits(task, cache(lambda: dense(bits))) if arrays else None
+    often = _Evaluator(evaluate, many, needed)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (6, by_novelty(task, evaluate, work, counts)),
-        (4, _best_first(task, often, quick, counts, lookahead)),
-        (3, by_novelty(task, evaluate, work, counts, marks)),
-        (1, _best_first(task, often, quick, counts, lookahead, marks)),
-        (1, _best_first(task, often, quick, counts)),
+        (4, by_novelty(task, evaluate, work, counts)),
+        (4, _best_first(task, often, counts, lookahead, marks)),
+        (3, _best_first(task, often, counts, None, marks)),
+        (2, _best_first(task, often, counts, lookahead)),
+        (2, by_novelty(task, evaluate, work, counts, marks)),
     ]
     spent = [0.0] * len(searches)
     total = 0
@@ -188,80 +190,131 @@ def _on_bits(task: Task, evaluate: Evaluate) -> Evaluate:
     return evaluate if task.amounts is None else lambda state: evaluate(state & low)
 
 
+def _all_on_bits(task: Task, made: Callable[[], EvaluateMany]) -> EvaluateMany:
+    """Return a function of the bits of states, made when it is first needed, as one of states that may have amounts besides."""
+    low = (1 << task.size) - 1
+    return lambda states: made()(states if task.amounts is None else [state & low for state in states])
+
+
+@dataclass(frozen=True)
+class _Evaluator:
+    """Evaluates states one by one or, where that is less work, all at once."""
+
+    one: Evaluate
+    many: EvaluateMany | None
+    effort: Effort
+
+    def __call__(self, states: Sequence[int]) -> tuple[list[Evaluation], int]:
+        """Return the evaluations, and the work done."""
+        apart, together = len(states) * self.effort.followed, self.effort.by_arrays(len(states))
+        if self.many is None or apart < together:
+            return [self.one(state) for state in states], apart
+        return self.many(states), together
+
+    @property
+    def width(self) -> int:
+        """How many states to evaluate at once."""
+        return self.effort.width if self.many else 1
+
+
+class _Queues:
+    """The nodes whose operators are still to be tried: by each rank two queues, with all operators and with the preferred ones.
+
+    They take turns; those with preferred operators get more of them whenever a rank is the least so far.
+    """
+
+    def __init__(self, ranks: int) -> None:
+        # of each node its rank, number, state, and operators, the last first
+        self.queues: list[list[tuple[int, int, int, list[int]]]] = [[] for _ in range(2 * ranks)]
+        self.turns = [0] * len(self.queues)
+        self.least = [FAR] * ranks
+        self.number = 0
+
+    def put(self, state: int, ranks: Sequence[int], relaxed_plan: Sequence[int], applicable: Sequence[int]) -> bool:
+        """Add a node; return whether a rank of it is the least so far."""
+        self.number += 1
+        possible = set(applicable)
+        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible][::-1]
+        rest = sorted(possible.difference(preferred), reverse=True)
+        for i, rank in enumerate(ranks):
+            if applicable:
+                heapq.heappush(self.queues[2 * i], (rank, self.number, state, rest + preferred))
+            if preferred:
+                heapq.heappush(self.queues[2 * i + 1], (rank, self.number, state, preferred[:]))
+        if all(rank >= known for rank, known in zip(ranks, self.least, strict=True)):
+            return False
+        self.least = [min(pair) for pair in zip(ranks, self.least, strict=True)]
+        self.turns = [turn - BOOST * (which % 2) for which, turn in enumerate(self.turns)]
+        return True
+
+    def draw(self) -> tuple[int, int, int, int] | None:
+        """Return the next state and operator, and by which rank it came and its value; None if there is none left."""
+        filled = [which for which, queue in enumerate(self.queues) if queue]
+        if not filled:
+            return None
+        which = min(filled, key=lambda which: (self.turns[which], -which))
+        self.turns[which] += 1
+        rank, _, state, operators = self.queues[which][0]
+        operator = operators.pop()
+        if not operators:
+            heapq.heappop(self.queues[which])
+        return state, operator, which // 2, rank
+
+
 def _best_first(
     task: Task,
-    evaluate: Evaluate,
-    work: int,
+    evaluate: _Evaluator,
     counts: Counts,
     lookahead: Callable[[int, Sequence[int]], Path] | None = None,
     marked: Callable[[], int] | None = None,
 ) -> Generator[int, None, tuple[Seen, int] | None]:
-    """Search greedily; yield the `work` of each evaluation, return what was seen and the last state, or None if there is no plan.
+    """Search greedily; yield the work of each evaluation, return what was seen and the last state, or None if there is no plan.
 
     Where there are landmarks (`marked`), two more queues go by how many of them (and of goals that were undone) are still to come.
     """
-    apply, goal = task.applied, task.goal
+    goal = task.goal
     marks = marked() | goal if marked else 0
     came_from: Seen = {task.initial: (task.initial, ())}
     met = {task.initial: task.initial & marks}
-    # (h or marks to come, number, state, operators still to be tried); all operators and the preferred ones by turns
-    queues: list[list[tuple[int, int, int, list[int]]]] = [[] for _ in range(4 if marks else 2)]
-    turns = [0] * len(queues)
-    least = [FAR] * (len(queues) // 2)
-    number = 0
-    waiting = [task.initial]  # states to be evaluated, the last first
+    queues = _Queues(2 if marks else 1)
+    waiting = [(task.initial, 0, FAR)]  # states to be evaluated; which rank led there, and its value
 
-    def reached(after: int, before: int, path: tuple[int, ...]) -> None:
+    def reached(after: int, before: int, path: tuple[int, ...], which: int = 0, rank: int = FAR) -> bool:
         came_from[after] = (before, path)
         if marks:
             met[after] = met[before] | after & marks
-        waiting.append(after)
+        waiting.append((after, which, rank))
+        return after & goal == goal
 
+    at_once = 1  # states that are evaluated together: twice as many each time, until one is better than what led to it
     while True:
-        if not waiting:
-            filled = [which for which, queue in enumerate(queues) if queue]
-            if not filled:
-                return None
-            which = min(filled, key=lambda which: (turns[which], -which))
-            turns[which] += 1
-            _, _, state, operators = queues[which][0]
-            operator = operators.pop()
-            if not operators:
-                heapq.heappop(queues[which])
-            after = apply(state, operator)
+        while len(waiting) < at_once and (drawn := queues.draw()):
+            state, operator, which, rank = drawn
+            after = task.applied(state, operator)
             counts.generated += 1
-            if after is None or after in came_from:
-                continue
-            reached(after, state, (operator,))
-        state = waiting.pop()
-        if state & goal == goal:
-            return came_from, state
-        evaluation = evaluate(state)
-        counts.evaluated += 1
+            if after is not None and after not in came_from and reached(after, state, (operator,), which, rank):
+                return came_from, after
+        if not waiting:
+            return None
+        now, waiting = waiting, []
+        evaluations, work = evaluate([state for state, _, _ in now])
+        counts.evaluated += len(now)
         yield work
-        if evaluation is None:
-            continue
-        counts.expanded += 1
-        h, relaxed_plan, applicable = evaluation
-        ranks = [h]
-        if marks:
-            ranks.append((marks & ~met[state]).bit_count() + (goal & met[state] & ~state).bit_count())
-        number += 1
-        possible = set(applicable)
-        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
-        rest = sorted(possible.difference(preferred), reverse=True)
-        for i, rank in enumerate(ranks):
-            if applicable:
-                heapq.heappush(queues[2 * i], (rank, number, state, [*rest, *preferred[::-1]]))
-            if preferred:
-                heapq.heappush(queues[2 * i + 1], (rank, number, state, preferred[::-1]))
-        if any(rank < known for rank, known in zip(ranks, least, strict=True)):
-            least = [min(pair) for pair in zip(ranks, least, strict=True)]
-            turns = [turn - BOOST * (which % 2) for which, turn in enumerate(turns)]
-            if lookahead:
+        at_once = min(2 * at_once, evaluate.width)
+        for (state, which, rank), evaluation in zip(now, evaluations, strict=True):
+            if evaluation is None:
+                continue
+            counts.expanded += 1
+            h, relaxed_plan, applicable = evaluation
+            ranks = [h]
+            if marks:
+                ranks.append((marks & ~met[state]).bit_count() + (goal & met[state] & ~state).bit_count())
+            if ranks[which] < rank:
+                at_once = 1
+            if queues.put(state, ranks, relaxed_plan, applicable) and lookahead:
                 after, path = lookahead(state, relaxed_plan)
-                if len(path) > 1 and after not in came_from:
-                    reached(after, state, tuple(path))
+                if len(path) > 1 and after not in came_from and reached(after, state, tuple(path)):
+                    return came_from, after
 
 
 def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:

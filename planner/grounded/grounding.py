@@ -24,7 +24,7 @@ import numpy as np
 
 from planner.grounded.amounts import Amounts, Linear, Move, pushes
 from planner.grounded.derived import Bit, Derived, in_parts
-from planner.grounded.joins import Ints, Table
+from planner.grounded.joins import Ints, Table, ranges
 from planner.grounded.reachability import Flags, Formulas, Literals, Reached
 from planner.grounded.schemas import Schema
 from planner.grounded.shortage import shortage
@@ -218,7 +218,7 @@ class _Assembly:
             counts = sizes[inverse]
             starts = (np.cumsum(sizes) - sizes)[inverse]
             row = np.repeat(np.arange(len(rows)), counts)
-            pairs.append((row, flat[_ranges(starts, counts)]))
+            pairs.append((row, flat[ranges(starts, counts)]))
         for atom in schema.atoms:
             if atom.fluent and len(rows):
                 name = atom.table[1]
@@ -326,7 +326,7 @@ class _Assembly:
         of_operator = _grouped(own_row[own_row < operators], own_bit[own_row < operators], operators)
         extra = np.arange(operators, count)
         lengths = np.diff(of_operator.starts)[owner[extra]]
-        inherited = of_operator.items[_ranges(of_operator.starts[owner[extra]], lengths)]
+        inherited = of_operator.items[ranges(of_operator.starts[owner[extra]], lengths)]
         need = _grouped(
             np.concatenate([own_row, np.repeat(extra, lengths)]), np.concatenate([own_bit, inherited]), count
         )
@@ -574,7 +574,7 @@ def _meaning(
 def _expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
     """Return pairs of row and bit with what each bit means in its place."""
     counts = np.diff(means.starts)[bit]
-    return np.repeat(row, counts), means.items[_ranges(means.starts[bit], counts)]
+    return np.repeat(row, counts), means.items[ranges(means.starts[bit], counts)]
 
 
 def _mask(bits: Sequence[int]) -> int:
@@ -590,11 +590,3 @@ def _grouped(owner: Ints, items: Ints, count: int) -> Grouped:
         new[1:] = (owner[1:] != owner[:-1]) | (items[1:] != items[:-1])
         owner, items = owner[new], items[new]
     return Grouped(np.searchsorted(owner, np.arange(count + 1)), items)
-
-
-def _ranges(starts: Ints, counts: Ints) -> Ints:
-    """Return start, start + 1, … for each start, as many as its count."""
-    ends = np.cumsum(counts)
-    total = int(ends[-1]) if len(ends) else 0
-    result: Ints = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(starts, counts)
-    return result

@@ -105,3 +105,11 @@ def pack(rows: Ints, radix: int) -> NDArray[np.generic]:
             keys = keys * radix + rows[:, column]
         return keys
     return np.ascontiguousarray(rows.astype(">u4")).view(f"S{4 * arity}").ravel()
+
+
+def ranges(starts: Ints, counts: Ints) -> Ints:
+    """Return start, start + 1, … for each start, as many as its count."""
+    ends = np.cumsum(counts)
+    total = int(ends[-1]) if len(ends) else 0
+    result: Ints = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(starts, counts)
+    return result

@@ -12,6 +12,7 @@ import pytest
 from planner.grounded.best_first import ahead, plan_level, search
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
+from planner.grounded.hff_dense import Effort
 from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.hff_numba import heuristic as compiled_heuristic
 from planner.grounded.novelty import Seen, by_novelty, landmarks
@@ -98,7 +99,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr("planner.grounded.best_first.automatic", slow)
     monkeypatch.setattr("planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
-    monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: (100, 100))
+    monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
     for module in ("best_first", "plan_windows", "reachability"):
         monkeypatch.setattr(f"planner.grounded.{module}.perf_counter", lambda: float(evaluated))
     problem = carrier(16)
@@ -251,8 +252,10 @@ def test_relaxing_by_arrays_finds_what_relaxing_bit_by_bit_finds(tabletop: Probl
         task = ground(problem)
         assert isinstance(task, Task)
         plain, arrays, choice, state = heuristic(task), by_arrays(task), random.Random(1), task.initial
+        states = []
         for _ in range(60):
-            one, other = plain(state), arrays(state)
+            states.append(state)
+            one, other = plain(state), arrays([state])[0]
             assert (one is None) == (other is None)
             if one is None or other is None or not one[2]:
                 break
@@ -260,13 +263,30 @@ def test_relaxing_by_arrays_finds_what_relaxing_bit_by_bit_finds(tabletop: Probl
             state = task.applied(state, choice.choice(one[2])) or 0
             if state & task.goal == task.goal:
                 break
+        assert arrays(states) == [arrays([state])[0] for state in states]
+
+
+@pytest.mark.parametrize(("parts", "layers"), [(300, 1), (2, 40)])
+def test_arrays_reach_what_costs_more_than_a_number_holds(parts: int, layers: int) -> None:
+    facts = [(layer, part) for layer in range(layers) for part in range(parts)] + [(layers, 0)]
+    actions = "".join(
+        f"(:action make{layer}-{part} :parameters () "
+        f":precondition (and {' '.join(f'(p{layer - 1}-{i})' for i in range(parts)) if layer else ''}) "
+        f":effect (p{layer}-{part}))"
+        for layer, part in facts
+    )
+    domain = f"(define (domain d) (:predicates {' '.join(f'(p{a}-{b})' for a, b in facts)}) {actions})"
+    task = ground(imported(parse(domain, f"(define (problem p) (:domain d) (:init) (:goal (p{layers}-0)))")).problem)
+    assert isinstance(task, Task)
+    found = by_arrays(task)([task.initial])[0]
+    assert found is not None and found[0] == layers * parts + 1
 
 
 def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("numba", reason="needs the extra 'fast'")
     task = ground(tabletop)
     assert isinstance(task, Task)
-    plain = search(task, evaluate=heuristic(task))
+    plain = search(task)
     monkeypatch.setattr("planner.grounded.hff_numba.PLAIN", 5 * len(task.owners))
     assert search(task) == plain
 
