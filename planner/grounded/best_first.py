@@ -16,8 +16,9 @@ What is found is made shorter by `planner.grounded.plan_windows`.
 from __future__ import annotations
 
 import heapq
+from array import array
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 from operator import or_
@@ -31,7 +32,7 @@ from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import Effort, EvaluateMany, effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
-from planner.grounded.novelty import OutOfMemoryError, Seen, by_novelty, landmarks
+from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, OutOfMemoryError, Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
@@ -106,8 +107,8 @@ def search(
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Five searches share the time: by novelty, broad and deep; by h with lookahead; by landmarks, too, with it and without, since
-    it can lead astray. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
+    Five searches share the time: by h and landmarks, with lookahead and without, since it can lead astray; by h alone; by novelty,
+    broad and deep. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
     deadline can only cut the search short.
 
     Parameters
@@ -141,11 +142,11 @@ def search(
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (4, by_novelty(task, evaluate, work, counts)),
-        (4, _best_first(task, often, counts, lookahead, marks)),
-        (3, _best_first(task, often, counts, None, marks)),
-        (2, _best_first(task, often, counts, lookahead)),
-        (2, by_novelty(task, evaluate, work, counts, marks)),
+        (6, _best_first(task, often, counts, lookahead, marks)),
+        (4, _best_first(task, often, counts, None, marks)),
+        (3, by_novelty(task, evaluate, work, counts)),
+        (1, _best_first(task, often, counts, lookahead)),
+        (1, by_novelty(task, evaluate, work, counts, marks)),
     ]
     spent = [0.0] * len(searches)
     total = 0
@@ -158,6 +159,8 @@ def search(
             spent[turn] += done / share
         except OutOfMemoryError:
             del searches[turn], spent[turn]
+            if not searches:
+                return Flat(Status.GAVE_UP, (), Reason("every search holds as many states as it may"), counts)
         except StopIteration as end:
             if end.value is None:
                 return Flat(
@@ -198,7 +201,7 @@ def _all_on_bits(task: Task, made: Callable[[], EvaluateMany]) -> EvaluateMany:
 
 @dataclass(frozen=True)
 class _Evaluator:
-    """Evaluates states one by one or, where that is less work, all at once."""
+    """Evaluates states one by one or, where that is less work for many, by arrays: by the same costs throughout a search."""
 
     one: Evaluate
     many: EvaluateMany | None
@@ -206,10 +209,9 @@ class _Evaluator:
 
     def __call__(self, states: Sequence[int]) -> tuple[list[Evaluation], int]:
         """Return the evaluations, and the work done."""
-        apart, together = len(states) * self.effort.followed, self.effort.by_arrays(len(states))
-        if self.many is None or apart < together:
-            return [self.one(state) for state in states], apart
-        return self.many(states), together
+        if self.many is None:
+            return [self.one(state) for state in states], len(states) * self.effort.followed
+        return self.many(states), self.effort.by_arrays(len(states))
 
     @property
     def width(self) -> int:
@@ -224,23 +226,24 @@ class _Queues:
     """
 
     def __init__(self, ranks: int) -> None:
-        # of each node its rank, number, state, and operators, the last first
-        self.queues: list[list[tuple[int, int, int, list[int]]]] = [[] for _ in range(2 * ranks)]
+        # of each node its rank, number, state, and the operators that are left
+        self.queues: list[list[tuple[int, int, int, Iterator[int]]]] = [[] for _ in range(2 * ranks)]
         self.turns = [0] * len(self.queues)
         self.least = [FAR] * ranks
-        self.number = 0
+        self.number = self.bytes = 0
 
     def put(self, state: int, ranks: Sequence[int], relaxed_plan: Sequence[int], applicable: Sequence[int]) -> bool:
         """Add a node; return whether a rank of it is the least so far."""
         self.number += 1
         possible = set(applicable)
-        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible][::-1]
-        rest = sorted(possible.difference(preferred), reverse=True)
+        preferred = [operator for operator in dict.fromkeys(relaxed_plan) if operator in possible]
+        operators = array("q", (*preferred, *sorted(possible.difference(preferred))))
+        self.bytes += operators.itemsize * len(operators)
         for i, rank in enumerate(ranks):
             if applicable:
-                heapq.heappush(self.queues[2 * i], (rank, self.number, state, rest + preferred))
+                heapq.heappush(self.queues[2 * i], (rank, self.number, state, iter(operators)))
             if preferred:
-                heapq.heappush(self.queues[2 * i + 1], (rank, self.number, state, preferred[:]))
+                heapq.heappush(self.queues[2 * i + 1], (rank, self.number, state, iter(operators[: len(preferred)])))
         if all(rank >= known for rank, known in zip(ranks, self.least, strict=True)):
             return False
         self.least = [min(pair) for pair in zip(ranks, self.least, strict=True)]
@@ -249,16 +252,15 @@ class _Queues:
 
     def draw(self) -> tuple[int, int, int, int] | None:
         """Return the next state and operator, and by which rank it came and its value; None if there is none left."""
-        filled = [which for which, queue in enumerate(self.queues) if queue]
-        if not filled:
-            return None
-        which = min(filled, key=lambda which: (self.turns[which], -which))
-        self.turns[which] += 1
-        rank, _, state, operators = self.queues[which][0]
-        operator = operators.pop()
-        if not operators:
+        while filled := [which for which, queue in enumerate(self.queues) if queue]:
+            which = min(filled, key=lambda which: (self.turns[which], -which))
+            rank, _, state, operators = self.queues[which][0]
+            operator = next(operators, None)
+            if operator is not None:
+                self.turns[which] += 1
+                return state, operator, which // 2, rank
             heapq.heappop(self.queues[which])
-        return state, operator, which // 2, rank
+        return None
 
 
 def _best_first(
@@ -271,6 +273,11 @@ def _best_first(
     """Search greedily; yield the work of each evaluation, return what was seen and the last state, or None if there is no plan.
 
     Where there are landmarks (`marked`), two more queues go by how many of them (and of goals that were undone) are still to come.
+
+    Raises
+    ------
+    OutOfMemoryError
+        There are more states and operators than it may keep.
     """
     goal = task.goal
     marks = marked() | goal if marked else 0
@@ -300,6 +307,8 @@ def _best_first(
         evaluations, work = evaluate([state for state, _, _ in now])
         counts.evaluated += len(now)
         yield work
+        if len(came_from) * (STATE_BYTES + task.size // 4) + queues.bytes > MOST_BYTES:
+            raise OutOfMemoryError
         at_once = min(2 * at_once, evaluate.width)
         for (state, which, rank), evaluation in zip(now, evaluations, strict=True):
             if evaluation is None:

@@ -282,6 +282,14 @@ def test_arrays_reach_what_costs_more_than_a_number_holds(parts: int, layers: in
     assert found is not None and found[0] == layers * parts + 1
 
 
+def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.grounded.novelty.MOST_BYTES", 0)
+    monkeypatch.setattr("planner.grounded.best_first.MOST_BYTES", 0)
+    outcome = plan_level(carrier(40))
+    assert outcome.status is Status.GAVE_UP and outcome.reason is not None
+    assert outcome.reason.text == "every search holds as many states as it may"
+
+
 def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("numba", reason="needs the extra 'fast'")
     task = ground(tabletop)
