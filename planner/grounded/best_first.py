@@ -16,6 +16,7 @@ What is found is made shorter by `planner.grounded.plan_windows`.
 from __future__ import annotations
 
 import heapq
+import math
 from array import array
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -23,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 from operator import or_
 from time import perf_counter
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation
@@ -48,14 +49,56 @@ Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""
 
 
+class Turn(NamedTuple):
+    """A search and its share of the time: by novelty or by h, with landmarks, with lookahead."""
+
+    share: int
+    by_novelty: bool = False
+    by_landmarks: bool = False
+    ahead: bool = False
+
+
+@dataclass(frozen=True)
+class Portfolio:
+    """The searches that share the time, and how many states are relaxed at once at most where arrays are less work."""
+
+    turns: tuple[Turn, ...]
+    widest: int
+
+
+LEVEL = Portfolio(
+    (
+        Turn(6, by_landmarks=True, ahead=True),
+        Turn(4, by_landmarks=True),
+        Turn(3, by_novelty=True),
+        Turn(1, ahead=True),
+        Turn(1, by_novelty=True, by_landmarks=True),
+    ),
+    widest=32,
+)
+"""For a whole level: large tasks, which landmarks lead through."""
+WORLD = Portfolio(
+    (
+        Turn(6, by_novelty=True),
+        Turn(4, ahead=True),
+        Turn(3, by_novelty=True, by_landmarks=True),
+        Turn(1, by_landmarks=True, ahead=True),
+        Turn(1),
+    ),
+    widest=1,
+)
+"""For a small world on the way to one goal: short plans, found before landmarks would pay."""
+
+
 @dataclass(frozen=True)
 class Flat:
-    """What a flat search found: `plan`, operators of the task, is there exactly if `status` is solved."""
+    """What a flat search found: `plan`, operators of the task, is there exactly if `status` is solved; and its work, in bits."""
 
     status: Status
     plan: tuple[int, ...] = ()
     reason: Reason | None = None
     counts: Counts = field(default_factory=Counts)
+    work: int = 0
 
 
 def plan_level(
@@ -104,12 +147,14 @@ def search(
     deadline: float | None = None,
     evaluate: Evaluate | None = None,
     found: Callable[[Sequence[int]], None] | None = None,
+    most_work: float = math.inf,
+    portfolio: Portfolio = LEVEL,
 ) -> Flat:
     """Search a plan for a grounded task.
 
-    Five searches share the time: by h and landmarks, with lookahead and without, since it can lead astray; by h alone; by novelty,
-    broad and deep. Work is counted and not timed: the same limit of expansions (of those by h) gives the same plan, and a
-    deadline can only cut the search short.
+    Several searches share the time (`LEVEL`, `WORLD`): by novelty, broad and deep; by h and by landmarks, too, with lookahead and
+    without, since it can lead astray. Work is counted and not timed: the same limit of expansions (of those by h) gives the
+    same plan, and a deadline can only cut the search short.
 
     Parameters
     ----------
@@ -123,6 +168,10 @@ def search(
         for many states of the searches by h by arrays, where these are less work.
     found : function of a plan, optional
         Called with the first plan, before it is made shorter.
+    most_work : float
+        In bits followed by relaxed plans, or what takes as long.
+    portfolio : Portfolio
+        The searches that share the time.
     """
     counts = Counts()
     if task.initial & task.goal == task.goal:
@@ -134,19 +183,24 @@ def search(
         evaluate = evaluate or with_amounts(task)
         many = None
     else:
-        arrays = evaluate is None and needed.by_arrays(needed.width) < needed.width * work
+        width = min(needed.width, portfolio.widest)
+        arrays = evaluate is None and needed.by_arrays(width) < width * work
         evaluate = evaluate or _on_bits(task, automatic(bits))
         many = _all_on_bits(task, cache(lambda: dense(bits))) if arrays else None
-    often = _Evaluator(evaluate, many, needed)
+    often = _Evaluator(evaluate, many, needed, min(needed.width, portfolio.widest) if many else 1)
     if evaluate(task.initial) is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
-        (6, _best_first(task, often, counts, lookahead, marks)),
-        (4, _best_first(task, often, counts, None, marks)),
-        (3, by_novelty(task, evaluate, work, counts)),
-        (1, _best_first(task, often, counts, lookahead)),
-        (1, by_novelty(task, evaluate, work, counts, marks)),
+        (
+            turn.share,
+            by_novelty(task, evaluate, work, counts, marks if turn.by_landmarks else None)
+            if turn.by_novelty
+            else _best_first(
+                task, often, counts, lookahead if turn.ahead else None, marks if turn.by_landmarks else None
+            ),
+        )
+        for turn in portfolio.turns
     ]
     spent = [0.0] * len(searches)
     total = 0
@@ -173,7 +227,9 @@ def search(
             if found:
                 found(plan)
             shortening = SHORTEN + total // SHORTENING
-            return Flat(Status.SOLVED, tuple(shorter(task, plan, shortening, deadline)), None, counts)
+            return Flat(Status.SOLVED, tuple(shorter(task, plan, shortening, deadline)), None, counts, total)
+        if total >= most_work:
+            return Flat(Status.GAVE_UP, (), Reason("the limit of work came first"), counts, total)
         if counts.expanded >= limits.expansions:
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
@@ -201,22 +257,18 @@ def _all_on_bits(task: Task, made: Callable[[], EvaluateMany]) -> EvaluateMany:
 
 @dataclass(frozen=True)
 class _Evaluator:
-    """Evaluates states one by one or, where that is less work for many, by arrays: by the same costs throughout a search."""
+    """Evaluates states one by one or, where that is less work, `width` of them by arrays: by the same costs throughout a search."""
 
     one: Evaluate
     many: EvaluateMany | None
     effort: Effort
+    width: int
 
     def __call__(self, states: Sequence[int]) -> tuple[list[Evaluation], int]:
         """Return the evaluations, and the work done."""
         if self.many is None:
             return [self.one(state) for state in states], len(states) * self.effort.followed
         return self.many(states), self.effort.by_arrays(len(states))
-
-    @property
-    def width(self) -> int:
-        """How many states to evaluate at once."""
-        return self.effort.width if self.many else 1
 
 
 class _Queues:

@@ -25,7 +25,7 @@ from planner.plan import Counts
 MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
 STATE_BYTES = 400  # that a state takes besides its bits
 # bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
-CHILD, VISIT = 40, 4
+CHILD, VISIT = 20, 2
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""

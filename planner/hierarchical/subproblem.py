@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 FEW = 4
 """Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
 
+BITS = 20
+"""Bits that a flat search follows for each relaxed operator of a state, with what it does besides."""
 LEAST, MAKING = 300, 100
 """A task counts as having at least so many relaxed operators, since a state costs something whatever can be done there; and
 making it as much as looking at so many states. A world of which not a fifth as many could be looked at isn't grounded."""
@@ -89,13 +91,15 @@ class World:
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
-        from planner.grounded.best_first import search
+        from planner.grounded.best_first import WORLD, search
 
         if self.task is None:
             return None
         size = max(len(self.task.owners), LEAST)
-        found = search(self.task, Limits(self.width.work // size), self.segments.deadline)
-        self.segments.spend(self.level, found.counts, MAKING * size + found.counts.expanded * size)
+        limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
+        found = search(self.task, limits, self.segments.deadline, most_work=most, portfolio=WORLD)
+        work = max(LEAST * found.counts.expanded, found.work // BITS)
+        self.segments.spend(self.level, found.counts, MAKING * size + work)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
             return None
