@@ -16,11 +16,12 @@ Every plan that leaves here was accepted by `planner.validation`, which shares n
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import Limits, Outcome, Reason
+from planner.plan import Limits, Outcome, OutOfTimeError, Reason
 from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -129,8 +130,10 @@ def _proof(problem: Problem, states: int, deadline: float | None) -> Reason | No
 
     if not states:
         return impossible(problem)
-    task = proved(problem, problem.domain.levels[-1], deadline)
-    return None if isinstance(task, Reason) else exhausted(task, states, deadline)
+    with suppress(OutOfTimeError):  # then nothing is shown
+        task = proved(problem, problem.domain.levels[-1], deadline)
+        return None if isinstance(task, Reason) else exhausted(task, states, deadline)
+    return None
 
 
 Mode: TypeAlias = "Callable[[Request], Outcome]"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from planner.hierarchical.operators import Achieve, Achiever, Program
 from planner.hierarchical.subplans import Segments, Watch, nobody
+from planner.hierarchical.subproblem import LEAST
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.symbols import (
@@ -33,9 +34,8 @@ if TYPE_CHECKING:
     from planner.grounded.reachability import Reached
     from planner.grounded.task import Task
 
-LOOKING, LEAST = 1_800_000, 300
-"""The work of looking at all states, in states times operators, that no search has to come before; a state takes at least as long
-as so many operators."""
+LOOKING = 1_800_000
+"""The work of looking at all states, in states times relaxed operators, that no search has to come before."""
 TOLD, NAMED = 5_000, 3
 """Of so many states, at most, it is said what can be done in none of them; and so many facts are named."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000

@@ -11,7 +11,8 @@ from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.hierarchical.planner import Call, compiled
 from planner.hierarchical.planner import plan as default
-from planner.hierarchical.unsolvability import LEAST, exhausted, looked_at
+from planner.hierarchical.subproblem import LEAST
+from planner.hierarchical.unsolvability import exhausted, looked_at
 from planner.levels import levels_left
 from planner.paper.hierarchy import DOUBT
 from planner.paper.hierarchy import plan as paper
@@ -254,6 +255,7 @@ def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> N
     assert asked == [0, 3 * DOUBT]
     with pytest.raises(UnsolvableError, match="can't be reached"):
         _proof(pen({"IN lion": "yard"}, key=False), 100, None)
+    assert _proof(pen({"IN lion": "yard"}, key=False), 100, 0.0) is None  # the deadline came first
 
 
 def test_where_no_state_will_do_it_is_said_which_goals_never_hold_and_what_can_never_be_done() -> None:
