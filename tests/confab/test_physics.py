@@ -116,7 +116,8 @@ def test_a_behaviour_without_a_skill_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_the_committed_reach_facts_fit_the_geometry() -> None:
-    for name in ("beverage-serving", "beverage-serving-moved", "one-arm-serving", "panda-serving", "two-cups"):
+    bases = ("beverage-serving", "beverage-serving-moved", "one-arm-serving", "two-cups")
+    for name in (*bases, "panda-serving", "panda-pair-serving"):
         shipped = confab.load(name)
         assert reach_hash(shipped.knowledge) == fingerprint(shipped.embodiment)
         assert shipped.problem.relations["canReach"] == reach(shipped.embodiment).pairs

@@ -48,6 +48,15 @@ def test_the_panda_of_pybullet_s_own_data_serves() -> None:
     assert rollout.poured == (1.0,)
 
 
+def test_two_pandas_hand_a_glass_over_and_fill_another_one_together() -> None:
+    one = case("panda-pair-serving")
+    assert len(one.embodiment.robots) == 2
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
+    assert rollout.failure is None
+    taken = [step.arguments[0] for step in one.steps if step.arguments[1:] == ("cup1",)]
+    assert taken == ["left_gripper", "right_gripper"]
+
+
 def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     one = case("two-cups")
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
