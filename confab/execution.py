@@ -329,9 +329,11 @@ def carry_out(
 ) -> Execution:
     """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
     from confab.live import spectator
+    from confab.planning import check_goal
 
     scene.settle()
     problem = getattr(plan, "problem", None) or with_goals(scene.reading, several(goals))
+    check_goal(scene, problem)
     begun = None if plan is None else plan_of(plan, problem)
     if isinstance(memory, str | Path):
         from confab.memory import Memory

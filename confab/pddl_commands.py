@@ -61,9 +61,13 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     Raises
     ------
     KnowledgeError
-        There is no such level, or the folder can't be written.
+        There is no such level, or none at all, or the folder can't be written.
     """
     levels = problem.domain.levels
+    if not levels:
+        raise KnowledgeError(
+            "the scene has no behaviours, so that there is no level to export; import a domain that has some"
+        )
     if level is not None and level not in levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}")
     exported = to_pddl(problem, level)

@@ -149,7 +149,7 @@ def _plan(
     scene.knowledge.confirm()
     problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
     quantified = perf_counter() - begin
-    _check_goal(scene, problem)
+    check_goal(scene, problem)
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
@@ -199,10 +199,12 @@ def _then_by_an_engine(problem: Problem, deadline: Deadline, ours: Outcome) -> O
     return replace(ours, reason=reason, seconds=ours.seconds + perf_counter() - begin)
 
 
-def _check_goal(scene: Known, problem: Problem) -> None:
+def check_goal(scene: Known, problem: Problem) -> None:
     """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type; or no behaviour."""
     if not problem.domain.behaviors:
-        raise KnowledgeError(f"{scene.iri} has no behaviours, so that nothing can be done; import a domain that has some")
+        raise KnowledgeError(
+            f"{scene.iri} has no behaviours, so that nothing can be done; import a domain that has some"
+        )
     if not problem.goal:
         raise KnowledgeError(f"{scene.iri} has no task with goals; plan in a scene that has one, or give a goal")
     allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}

@@ -18,20 +18,21 @@ SLACK, LEAST, MOST = 0.2, 0.004, 0.02
 """How far spheres may stand out, as a share of a mesh's thickness, and within how many metres: more takes fewer spheres."""
 MOST_POINTS, CANDIDATES, SHARES = 1_500, 150, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """So many points of a surface are covered, by spheres about so many at each of these shares of the way from the middle to it."""
-MOST_PIECES = 400_000
+MOST_PIECES, FARTHEST = 400_000, 1_000.0
+"""Of a mesh that is taken: points, and metres from its link's origin."""
 DIRECTIONS = np.array(
     [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=float
 )
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
-def triangles(file: Path) -> Array:
-    """Return the triangles (n, 3, 3) of a mesh in an OBJ or STL file, in the file's units.
+def triangles(file: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Array:
+    """Return the triangles (n, 3, 3) of a mesh in an OBJ or STL file, in metres if that is the file's scale.
 
     Raises
     ------
     ValueError
-        There is no such file, it is of another kind, or has no triangles.
+        There is no such file, it is of another kind, has no triangles, or lies too far away.
     """
     try:
         data = file.read_bytes()
@@ -42,11 +43,15 @@ def triangles(file: Path) -> Array:
         raise ValueError(f"the mesh {file} is no OBJ or STL file; convert it, or cover the link with primitives")
     try:
         found = reader(data)
-    except (ValueError, IndexError) as problem:
+    except (ValueError, IndexError, OverflowError) as problem:
         raise ValueError(f"the mesh {file} can't be read: {problem}") from problem
     if not len(found) or not np.isfinite(found).all():
         raise ValueError(f"the mesh {file} has no triangles, or vertices that are no points")
-    return found
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled: Array = found * np.array(scale)
+    if not np.abs(scaled).max() <= FARTHEST:
+        raise ValueError(f"the mesh {file} lies more than {FARTHEST:.0f} m away; give its scale in metres")
+    return scaled
 
 
 def _obj(data: bytes) -> Array:
@@ -79,9 +84,10 @@ def surface(corners: Array) -> Array:
     """Return points (n, 3) on triangles (m, 3, 3), at most about `SPACING` apart."""
     found = [corners.reshape(-1, 3)]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(1)
-    parts = np.ceil(edges / SPACING).astype(int)
-    if (parts**2).sum() > MOST_PIECES:
+    parts = np.ceil(edges / SPACING)
+    if not (parts**2).sum() <= MOST_PIECES:
         raise ValueError(f"a mesh that takes more than {MOST_PIECES} points; give its scale in metres")
+    parts = parts.astype(int)
     for count in sorted(set(parts.tolist()) - {0, 1}):
         u, v = (part.ravel() / count for part in np.mgrid[0 : count + 1, 0 : count + 1])
         inside = u + v <= 1 + 1e-9
@@ -93,12 +99,12 @@ def surface(corners: Array) -> Array:
 @lru_cache(maxsize=256)
 def covered_mesh(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
     """Return the spheres of `cover` for a mesh file; a file is looked at once in a process."""
-    return cover(triangles(file) * np.array(scale))
+    return cover(triangles(file, scale))
 
 
 def bounds(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
     """Return the corners of the box around a mesh."""
-    corners = (triangles(file) * np.array(scale)).reshape(-1, 3)
+    corners = triangles(file, scale).reshape(-1, 3)
     return corners.min(0), corners.max(0)
 
 

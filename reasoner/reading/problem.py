@@ -693,11 +693,16 @@ class _Schema:
     def arguments(self, iri: str) -> tuple[str, ...]:
         return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
 
-    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
-        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+    def situation(self, iri: str) -> str:
+        """Return the situation type that a condition, an effect or a calculation is about."""
         situation = self.one(iri, "situationType")
         if situation not in self.nodes or not _is(self.nodes[situation], "SituationType"):
             raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
+        return situation
+
+    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+        situation = self.situation(iri)
         if _is(self.nodes[situation], "Amount"):
             raise KnowledgeError(
                 f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
@@ -808,8 +813,8 @@ class _Schema:
             if relation not in self.nodes or not _is(self.nodes[relation], "Relation", "ReachRelation"):
                 raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
             return Measure(self.names.short(relation), self.arguments(iri))
-        situation = self.one(iri, "situationType")
-        if situation not in self.nodes or not _is(self.nodes[situation], "Amount"):
+        situation = self.situation(iri)
+        if not _is(self.nodes[situation], "Amount"):
             raise KnowledgeError(
                 f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
                 "declare it as :Amount, or use a value condition or effect"

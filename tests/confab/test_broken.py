@@ -331,6 +331,36 @@ def test_a_goal_about_too_few_individuals_is_refused(tmp_path: Path, ask: Ask) -
     assert "<casket, INSIDE>: a goal about 1 individuals; INSIDE is about 2" in err
 
 
+@pytest.mark.parametrize("command", ["plan", "execute", "explain", "export -o out"])
+def test_a_scene_in_which_nothing_can_be_done_is_refused(
+    tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.chdir(tearoom.parent)
+    domain = tearoom.with_name("tearoom.ttl")
+    domain.write_text(domain.read_text().replace("c:Behavior", "c:Action"))
+    name, *options = command.split()
+    code, out, err = ask(name, tearoom, *options)
+    assert (code, out, err.count("\n")) == (MISUSE, "", 1)
+    assert "has no behaviours" in err
+    assert not Path("out").exists()
+
+
+def test_an_amount_that_is_no_situation_type_is_refused(tmp_path: Path, ask: Ask) -> None:
+    scene = tmp_path / "canteen-small.ttl"
+    scene.write_text(shipped_scenes()["canteen-small"].read_text())
+    (tmp_path / "canteen.ttl").write_text((ROOT / "domains/canteen.ttl").read_text())
+    (tmp_path / "catalog-v001.xml").write_text(
+        '<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">'
+        '<uri name="https://w3id.org/confab/canteen" uri="canteen.ttl"/></catalog>'
+    )
+    change(
+        tmp_path / "canteen.ttl", ":BATTERY a owl:NamedIndividual, c:SituationType,", ":BATTERY a owl:NamedIndividual,"
+    )
+    code, out, err = ask("plan", scene)
+    assert (code, out, err.count("\n")) == (MISUSE, "", 1)
+    assert "canteen#BATTERY> is no situation type; declare it as one" in err
+
+
 def test_what_follows_from_axioms_about_a_property_has_an_owner(tmp_path: Path, ask: Ask) -> None:
     for name, file in (("gallery", "domains/gallery.ttl"), ("scene", "scenes/gallery-small.ttl")):
         (tmp_path / f"{name}.ttl").write_text((ROOT / file).read_text())

@@ -38,6 +38,8 @@ def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name:
         ("a.obj", "v 0 0 0\n", "has no triangles"),
         ("a.obj", "v 0 0 x\nf 1 1 1\n", "can't be read"),
         ("a.obj", "v 0 0 0\nf 1 2 3\n", "can't be read"),
+        ("a.obj", f"v 0 0 0\nf 1 1 {10**30}\n", "can't be read"),
+        ("a.obj", "v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nf 1 2 3\n", "more than 1000 m away"),
         ("a.stl", "solid\n", "has no triangles"),
         ("a.dae", "<x/>", "no OBJ or STL file; convert it"),
     ],
@@ -46,3 +48,16 @@ def test_what_is_no_mesh_is_said(tmp_path: Path, name: str, text: str, said: str
     (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=said):
         triangles(tmp_path / name)
+
+
+@pytest.mark.parametrize("wide", [100.0, 1e20, 1e200])
+def test_a_huge_triangle_is_refused_before_it_is_divided(wide: float) -> None:
+    with pytest.raises(ValueError, match="takes more than"), np.errstate(over="ignore"):
+        surface(np.array([[(0, 0, 0), (wide, 0, 0), (0, wide, 0)]], dtype=float))
+
+
+def test_a_scale_that_leads_out_of_the_world_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+    for scale in (1e9, 1e308, float("nan")):
+        with pytest.raises(ValueError, match="give its scale in metres"):
+            bounds(tmp_path / "a.obj", (scale, scale, scale))
