@@ -12,7 +12,7 @@ from confab.interchange import read_plan
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
-from reasoner.symbols import Problem
+from reasoner.symbols import FALSE, TRUE, Problem
 
 
 class HasPlan(Protocol):
@@ -47,6 +47,20 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
             f"wanted a plan, what has one in it (a result, an execution) or a file's name; got {type(given).__name__}"
         )
     return found
+
+
+def check_goal(scene: str, problem: Problem) -> None:
+    """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type; or no behaviour."""
+    if not problem.domain.behaviors:
+        raise KnowledgeError(f"{scene} has no behaviours, so that nothing can be done; import a domain that has some")
+    if not problem.goal:
+        raise KnowledgeError(f"{scene} has no task with goals; plan in a scene that has one, or give a goal")
+    allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}
+    for symbol, value in problem.goal.items():
+        counted = problem.domain.situations[symbol.situation].quantity is not None
+        if not counted and value not in allowed[symbol.situation]:
+            values = allowed[symbol.situation] - {TRUE, FALSE}
+            raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
 
 
 def several(given: Facts) -> list[str]:

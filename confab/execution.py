@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from confab.accepting import AnyPlan, Facts, number, plan_of, several
+from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, several
 from confab.interchange import step_json
 from planner.acting.episode import Change, End, Episode, Intervention, World
 from planner.acting.executive import Moment, Patience, act
@@ -329,11 +329,10 @@ def carry_out(
 ) -> Execution:
     """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
     from confab.live import spectator
-    from confab.planning import check_goal
 
     scene.settle()
     problem = getattr(plan, "problem", None) or with_goals(scene.reading, several(goals))
-    check_goal(scene, problem)
+    check_goal(scene.iri, problem)
     begun = None if plan is None else plan_of(plan, problem)
     if isinstance(memory, str | Path):
         from confab.memory import Memory

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from confab.accepting import Facts, number, several
+from confab.accepting import Facts, check_goal, number, several
 from confab.interchange import outcome_json
 from confab.known import Known
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
@@ -20,10 +20,9 @@ from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline
 from reasoner.memory.links import Links
-from reasoner.names import nearest
 from reasoner.reading.problem import Reading, read, with_goals
 from reasoner.reading.relevance import recognise
-from reasoner.symbols import FALSE, TRUE, Problem
+from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     import networkx
@@ -149,7 +148,7 @@ def _plan(
     scene.knowledge.confirm()
     problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
     quantified = perf_counter() - begin
-    check_goal(scene, problem)
+    check_goal(scene.iri, problem)
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
@@ -197,22 +196,6 @@ def _then_by_an_engine(problem: Problem, deadline: Deadline, ours: Outcome) -> O
         said = theirs.reason.text if theirs.reason else "it found no plan"
     reason = Reason(f"{ours.reason.text if ours.reason else 'gave up'}; an installed engine was asked then: {said}")
     return replace(ours, reason=reason, seconds=ours.seconds + perf_counter() - begin)
-
-
-def check_goal(scene: Known, problem: Problem) -> None:
-    """Raise `KnowledgeError` if there is no goal, or one that wants what is no value of its situation type; or no behaviour."""
-    if not problem.domain.behaviors:
-        raise KnowledgeError(
-            f"{scene.iri} has no behaviours, so that nothing can be done; import a domain that has some"
-        )
-    if not problem.goal:
-        raise KnowledgeError(f"{scene.iri} has no task with goals; plan in a scene that has one, or give a goal")
-    allowed = {name: {*problem.classes.get(s.range, ()), TRUE, FALSE} for name, s in problem.domain.situations.items()}
-    for symbol, value in problem.goal.items():
-        counted = problem.domain.situations[symbol.situation].quantity is not None
-        if not counted and value not in allowed[symbol.situation]:
-            values = allowed[symbol.situation] - {TRUE, FALSE}
-            raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
 
 
 def _seen(reading: Reading, observed: str | Path | None) -> Reading:
