@@ -1,4 +1,4 @@
-"""Definitions in random states: what search and checker derive, each by itself, beside what HermiT entails.
+"""Definitions in random states: what search, checker and plain Python derive, each by itself, beside what HermiT entails.
 
 python -m benchmarks entailed
 CONFAB_STATES=10000 …        how many states; 10,000 take an hour of one core
@@ -25,11 +25,12 @@ from reasoner.amounts import written
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import decimal, read
 from reasoner.symbols import TRUE, Problem, Symbol
-from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, random_state
+from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, plainly, random_state
 
 BATCH = 500
 SITUATIONS = {"liesIn": "LIES_IN", "cleanliness": "CLEANLINESS", "holds": "HOLDS", "weight": "WEIGHT"}
 NAMES = {"INSIDE": "isInside", "CONTAINS": "contains", "ON_FLOOR": "onFloor", "SEES": "sees", "LINKED": "linked"}
+NAMES |= {"LEADS_TO": "leadsTo", "ENDS_ON": "endsOn"}
 NAMES |= {situation: kind[1:] for situation, (kind, _) in DEFINED.items()}
 NAMES |= {situation: kind[1:] for situation, kind in CONCLUDED.items()}
 
@@ -90,7 +91,7 @@ def compared(problem: Problem, seeds: range) -> tuple[Counter[str], Mapping[str,
     wrong: dict[str, list[str]] = {}
     for seed, facts, truth in zip(seeds, states, truths, strict=True):
         true.update(name for name, *_ in truth)
-        for who, found in derived(in_state(problem, facts)):
+        for who, found in (*derived(in_state(problem, facts)), ("plain Python", plainly(facts))):
             wrong.setdefault(who, [])
             wrong[who] += [f"seed {seed}: {' '.join(row)}" for row in sorted(found ^ truth)]
     return true, wrong

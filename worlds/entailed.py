@@ -81,11 +81,12 @@ DEFINED = {
     "HEAVY": (":Heavy", every(":Box", some(":weight", "owl:someValuesFrom [ a rdfs:Datatype ; owl:onDatatype xsd:decimal ; "
         "owl:withRestrictions ( [ xsd:minInclusive 2.5 ] [ xsd:maxExclusive 7.0 ] ) ]"))),
     "DEEP": (":Deep", every(":Thing", some(":isInside", f"owl:someValuesFrom {every(':Box', ':Heavy')}"))),
+    "FOUND": (":Found", every(":Place", some("[ owl:inverseOf :leadsTo ]", "owl:someValuesFrom :Hand"))),
 }  # fmt: skip
 """Situation types that hold of classes, and how these are defined."""
-CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched"}
+CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched", "SOUGHT": ":Sought"}
 """Situation types that hold of classes that SWRL rules conclude."""
-PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked")
+PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked", "leadsTo", "endsOn")
 LOGIC = f"""
 :Place a owl:Class . :Thing a owl:Class . :Floor a owl:Class . :Hand a owl:Class . :Cleanliness a owl:Class .
 :Room a owl:Class ; rdfs:subClassOf :Place . :Box a owl:Class ; rdfs:subClassOf :Place, :Thing .
@@ -97,6 +98,8 @@ LOGIC = f"""
 :partOf a owl:ObjectProperty .
 :onFloor a owl:ObjectProperty ; owl:propertyChainAxiom ( :isInside :partOf ) .
 :cleanliness a owl:ObjectProperty, owl:FunctionalProperty .
+:leadsTo a owl:ObjectProperty, owl:TransitiveProperty .
+:endsOn a owl:ObjectProperty ; owl:propertyChainAxiom ( :leadsTo :partOf ) .
 :holds a owl:ObjectProperty . :near a owl:ObjectProperty . :sees a owl:ObjectProperty . :linked a owl:ObjectProperty .
 :weight a owl:DatatypeProperty, owl:FunctionalProperty .
 :clean a owl:NamedIndividual, :Cleanliness . :dirty a owl:NamedIndividual, :Cleanliness .
@@ -110,10 +113,15 @@ LOGIC = f"""
 {implies(":Guarded ?x", ":liesIn ?x ?b", ":Guarded ?b")}
 {implies(":Touched ?x", ":Servable ?x")}
 {implies(":Touched ?x", ":holds ?h ?y", ":liesIn ?y ?b", ":liesIn ?x ?b", ":Cup ?x")}
+{implies(":leadsTo ?h ?x", ":Hand ?h", ":holds ?h ?x")}
+{implies(":leadsTo ?h ?x", ":Hand ?h", ":near ?h ?x")}
+{implies(":leadsTo ?x ?y", ":liesIn ?x ?y", ":cleanliness ?x :clean")}
+{implies(":Sought ?x", ":Deep ?x", ":liesIn ?x ?y", ":Found ?y")}
 """
-"""Definitions of every kind that planning knows: expressions, a chain, transitive and recursive ones, numbers, SWRL.
+"""Definitions of every kind that planning knows: expressions, chains, transitive and recursive ones, numbers, SWRL.
 
-No SWRL rule asks for the transitive property: HermiT then doesn't find all that follows; Openllet does, and agrees with planning.
+SWRL concludes what is transitive, a chain goes on from there, and a rule asks for classes that these define. No rule asks for a
+transitive property itself: HermiT then doesn't find all that follows.
 """
 
 THINGS = ("box1", "box2", "box3", "cup1", "cup2", "cup3")
@@ -127,16 +135,20 @@ def domain() -> str:
     parts = [
         f"{PREFIXES}<https://example.org/yard> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .",
         LOGIC,
-        ":Thing c:hasSituationType :LIES_IN, :INSIDE, :ON_FLOOR, :LINKED, :DEEP, :CLEANLINESS, :GUARDED .",
+        ":Thing c:hasSituationType :LIES_IN, :INSIDE, :ON_FLOOR, :LINKED, :DEEP, :CLEANLINESS, :GUARDED, :SOUGHT .",
         ":Cup c:hasSituationType :SERVABLE, :TOUCHED . :Box c:hasSituationType :TIDY, :CROWDED, :HEAVY, :WEIGHT .",
-        ":Place c:hasSituationType :SPARSE, :CONTAINS . :Hand c:hasSituationType :PAIRED, :HOLDS, :SEES .",
+        ":Place c:hasSituationType :SPARSE, :CONTAINS, :FOUND . :Hand c:hasSituationType :PAIRED, :HOLDS, :SEES .",
         ":WEIGHT a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :weight . :weight rdfs:range xsd:decimal .",
         ":Place rdfs:subClassOf :LIES_IN, :INSIDE . :Floor rdfs:subClassOf :ON_FLOOR . :Cleanliness rdfs:subClassOf :CLEANLINESS .",
-        ":Thing rdfs:subClassOf :HOLDS, :LINKED, :CONTAINS, :SEES .",
+        ":Thing rdfs:subClassOf :HOLDS, :LINKED, :CONTAINS, :SEES, :LEADS_TO . :Place rdfs:subClassOf :LEADS_TO .",
+        ":Source a owl:Class ; c:hasSituationType :LEADS_TO, :ENDS_ON .",
+        ":Thing rdfs:subClassOf :Source . :Hand rdfs:subClassOf :Source .",
+        ":Floor rdfs:subClassOf :ENDS_ON .",
         ":partOf a c:Relation ; rdfs:domain :Place ; rdfs:range :Floor .",
         ":near a c:Relation ; rdfs:domain :Hand ; rdfs:range :Place .",
     ]
     defined = {"INSIDE": "isInside", "ON_FLOOR": "onFloor", "LINKED": "linked", "CONTAINS": "contains", "SEES": "sees"}
+    defined |= {"LEADS_TO": "leadsTo", "ENDS_ON": "endsOn"}
     for situation, prop in (changed | defined).items():
         parts.append(f":{situation} a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :{prop} .")
     for situation, kind in ({s: kind for s, (kind, _) in DEFINED.items()} | CONCLUDED).items():
@@ -171,6 +183,54 @@ def asserted(facts: Sequence[tuple[str, str, str]]) -> str:
             lines.append(f':{name} a {some(role, f"""owl:maxCardinality "{many}"^^xsd:nonNegativeInteger""")} .')
     different = " ".join(f":{name}" for name in (*ALL, "clean", "dirty"))
     return "\n".join([*lines, f"[ a owl:AllDifferent ; owl:distinctMembers ( {different} ) ] ."])
+
+
+def plainly(facts: Sequence[tuple[str, str, str]]) -> set[tuple[str, ...]]:
+    """Return what `LOGIC` makes of a state, in plain Python that reads neither Turtle nor knows of rules: a judge of its own."""
+    of: dict[str, set[tuple[str, str]]] = {
+        prop: set() for prop in ("liesIn", "holds", "near", "partOf", "cleanliness", "weight")
+    }
+    for one, prop, other in facts:
+        of[prop].add((one, other))
+    boxes, cups = (tuple(name for name in THINGS if name.startswith(kind)) for kind in ("box", "cup"))
+    lies, holds, clean = of["liesIn"], of["holds"], {x for x, how in of["cleanliness"] if how == "clean"}
+    inside = _closed(lies)
+    heavy = {x for x, weight in of["weight"] if 2.5 <= float(weight) < 7}
+    leads = _closed(holds | of["near"] | {(x, y) for x, y in lies if x in clean})
+    sees = {(h, x) for h, r in of["near"] for x, y in inside if y == r}
+    held = {x for _, x in holds}
+    servable = {x for x, y in lies if x in cups and x in clean and y.startswith("room") and x not in held}
+    deep = {x for x, y in inside if y in heavy}
+    guarding = {b for b in heavy if b in clean}
+    around = {y for h, x in holds for z, y in lies if z == x}
+    found = {y for x, y in leads if x.startswith("hand") and y in PLACES}
+    into = {place: [x for x, y in lies if y == place] for place in PLACES}
+    own = {
+        "Servable": servable, "Deep": deep, "Guarded": {x for x, b in inside if b in guarding}, "Heavy": heavy, "Found": found,
+        "Tidy": {box for box in boxes if all(x in boxes or x in clean for x in into[box])},
+        "Crowded": {box for box in boxes if sum(x in cups for x in into[box]) >= 2},
+        "Sparse": {place for place in PLACES if len(into[place]) <= 1},
+        "Paired": {hand for hand in ("hand1", "hand2") if sum(h == hand for h, _ in holds) == 2},
+        "Touched": servable | {x for x, y in lies if x in cups and y in around},
+        "Sought": {x for x, y in lies if x in deep and y in found},
+    }  # fmt: skip
+    pairs = {
+        "isInside": inside, "contains": {(y, x) for x, y in inside}, "sees": sees, "leadsTo": leads,
+        "linked": _closed({(x, y) for h, x in holds for g, y in holds if h == g and x != y}),
+        "onFloor": {(x, f) for x, y in inside for p, f in of["partOf"] if p == y},
+        "endsOn": {(x, f) for x, y in leads for p, f in of["partOf"] if p == y},
+    }  # fmt: skip
+    return {(name, x) for name, those in own.items() for x in those} | {
+        (name, *both) for name, those in pairs.items() for both in those
+    }
+
+
+def _closed(pairs: set[tuple[str, str]]) -> set[tuple[str, str]]:
+    """Return pairs with all that follow, one behind the other."""
+    found: set[tuple[str, str]] = set()
+    while found != (found := found | pairs | {(x, z) for x, y in found for w, z in pairs if w == y}):
+        pass
+    return found
 
 
 def entailed(states: Sequence[str]) -> list[set[tuple[str, ...]]]:
