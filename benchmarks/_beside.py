@@ -13,6 +13,7 @@ from statistics import median
 from benchmarks.pddl import Run, planners, run
 from planner.hierarchical import bounds as optimal
 from planner.plan import Limits
+from planner.plan_costs import cost_of
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import load
 from reasoner.pddl.exporting import to_pddl
@@ -138,7 +139,7 @@ def optimal_costs(python: str, seed: int) -> None:
             for file, text in zip(files, (exported.domain, exported.problem), strict=True):
                 file.write_text(text)
             outcome = optimal.plan(problem, limits=Limits(expansions=10**7, seconds=PROVING))
-            cost = optimal.cost(problem, outcome.plan) if outcome.plan is not None else None
+            cost = cost_of(problem, outcome.plan) if outcome.plan is not None else None
             peer = run(command, files[0], files[1], PROVING)
             theirs = len(peer.plan) if peer.plan is not None else None
             print(

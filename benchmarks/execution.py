@@ -25,11 +25,12 @@ from confab.scene import Scene
 from planner.acting.episode import Change, End, Episode, Intervention
 from planner.acting.executive import Patience, act
 from planner.acting.failure_memory import Caution
-from planner.acting.repair import cost, difference, mend, replan
+from planner.acting.repair import difference, mend, replan
 from planner.acting.symbolic_world import Said, SymbolicWorld, disturbed, with_individual
 from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Plan, Step
+from planner.plan_costs import cost_of
 from planner.validation import successor
 from reasoner.files import write_whole
 from reasoner.generate import write_scene
@@ -249,7 +250,7 @@ def _repair_row(objects: int, count: int) -> None:
             assert mended.steps is None and scratch is None
             continue
         anew += mended.kind == "replan"
-        costs.append((mended.cost, cost(problem, scratch)))
+        costs.append((mended.cost, cost_of(problem, Plan(scratch))))
         distances.append((sum(difference(rest, mended.steps)), sum(difference(rest, scratch))))
         seconds.append((middle - begin, end - middle))
     worst = max((a / b for a, b in costs if b), default=1.0)

@@ -38,6 +38,8 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
     if outcome.plan is not None:
         data["length"] = {str(level): count for level, count in outcome.plan.length.items()}
         data["steps"] = [step_json(step) for step in outcome.plan.steps]
+    if outcome.cost is not None:
+        data["cost"] = outcome.cost
     if outcome.bound is not None:
         data["bound"] = outcome.bound
     if outcome.engine is not None:

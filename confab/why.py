@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from confab.labels import Labels
 from confab.report.markup import Markup, styled, tag
 from planner.causal_links import Change, Kind, Need, Purpose
-from planner.contrast import Ask, Contrast, NoChoiceError, cost_of, instead_of, with_choice
+from planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
 from planner.plan import Outcome, Plan, Status, Step
+from planner.plan_costs import cost_of
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
 from reasoner.reading.problem import parse_fact

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from planner.causal_links import on_level
 from planner.levels import lacking
 from planner.plan import Outcome, Plan, Reason, Step, renumbered
+from planner.plan_costs import cost_of
 from planner.validation import Bindings, Facts, Rules, successor, validate
 from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
@@ -42,11 +43,6 @@ class Contrast:
     plan: Plan | None = None
     cost: float | None = None
     reason: Reason | None = None
-
-
-def cost_of(problem: Problem, plan: Plan) -> float:
-    """Return what the primitives of a plan cost."""
-    return sum(problem.domain.behaviors[step.behavior].cost for step in plan.primitives)
 
 
 def instead_of(

@@ -135,7 +135,8 @@ class Outcome:
     `plan` is there exactly if `status` is solved; `reason` exactly if it isn't. `search` counts per level, summed over the
     calls at that level; `fallbacks` counts how often a level could not do what the level above wanted of it; `hits` and `misses`
     count the refinements that the cache had and those that had to be searched.
-    `bound` is what any plan costs at least on the lowest level, where that was proved; `engine` the other planner whose plan it is.
+    `cost` is what the plan costs, where some behaviour has a price; `bound` what any plan costs at least on the lowest level,
+    where that was proved; `engine` the other planner whose plan it is.
     `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
     break that only the level above asks.
     """
@@ -147,6 +148,7 @@ class Outcome:
     fallbacks: int = 0
     seconds: float = 0.0
     bound: float | None = None
+    cost: float | None = None
     hits: int = 0
     misses: int = 0
     engine: str | None = None

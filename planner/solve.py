@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, OutOfTimeError, Reason
+from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
 
@@ -90,10 +91,13 @@ def solve(request: Request) -> Outcome:
             f"mode {request.mode} returned steps that are no plan: {faults[0].text} (step {list(faults[0].path)}); "
             "this is a fault of the planner, not of the scene: please report it with the scene's files"
         )
+    plan = outcome.plan
+    if any(behavior.price is not None for behavior in request.problem.domain.behaviors.values()):
+        outcome = replace(outcome, cost=cost_of(request.problem, plan))
     first = request.problem.domain.levels[0]
-    if all(step.level == first for step in outcome.plan.steps):
+    if all(step.level == first for step in plan.steps):
         return outcome  # no level is left: nothing to tell
-    return replace(outcome, left=tuple(levels_left(request.problem, outcome.plan)))
+    return replace(outcome, left=tuple(levels_left(request.problem, plan)))
 
 
 def _with_experience(request: Request) -> Outcome:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
-from planner.amount_transitions import change, comparison, settled
+from planner.amount_transitions import amount, change, comparison, settled
 from planner.generated import code, identifier, key_written, tuple_written, written
 from planner.language import DomainError, needs, nothing_determines
 from reasoner.amounts import terms_of
@@ -185,6 +185,13 @@ class Writer:
             yield f"    if not {self.constant(('amounts', 'settled'), settled)}(amounts, {known}, changes): return None"
         yield f"    return {tuple_written(map(written, variables))}, changes"
         yield f"forward[{behavior.name!r}] = {identifier('forward', behavior.name)}"
+
+    def priced(self, behavior: Behavior) -> Iterator[str]:
+        """Yield the line that puts the function of what a behaviour costs into `prices`; its variables follow its parameters."""
+        if behavior.price is not None:
+            terms = [*(p.name for p in behavior.parameters), *(f"?{name}" for name in self.variables[behavior.name])]
+            price = amount(behavior.price, self.problem.relations, self.constant)
+            yield f"prices[{behavior.name!r}] = lambda {', '.join(map(written, terms))}: {price}"
 
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str

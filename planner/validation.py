@@ -305,6 +305,12 @@ class Rules:
         more = changed(read.on_amounts(values, facts), facts.value, quantities)
         return None if more is None else found + more
 
+    def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
+        """Return what a behaviour costs where it is done, if that is worked out and it can be done."""
+        read = self.read(behavior)
+        values = [*arguments, *read.terms[len(arguments) :]]
+        return read.price(facts.value, values) if read.price and _hold(read.preconditions, facts, values) else None
+
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
     ) -> Bindings | None:
@@ -355,6 +361,7 @@ class _Behavior:
             for e in behavior.amounts
             if e.operation in operations
         ]
+        self.price = None if behavior.price is None else worth(behavior.price, reading.key, rules.problem.relations)
         self.terms = tuple(reading.places)
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import product
 from math import prod
@@ -209,6 +210,7 @@ class Behavior:
     Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
     binding makes both false and true is true, as in PDDL. It can't be done where an amount that it changes would come to be
     one that its situation type doesn't allow. `spread` are individuals that it names only because they are all of a kind.
+    Where it has a `price`, that is what it costs, instead of `cost`; its preconditions ask that there is one (`priced`).
     """
 
     name: str
@@ -220,6 +222,7 @@ class Behavior:
     cost: float = 1.0
     amounts: tuple[AmountEffect, ...] = ()
     spread: frozenset[str] = frozenset()
+    price: Expression | None = None
 
     def __post_init__(self) -> None:
         """Put the effects in order."""
@@ -227,6 +230,16 @@ class Behavior:
         if self.amounts:
             ordered = sorted(self.amounts, key=lambda effect: OPERATIONS.index(effect.operation))
             object.__setattr__(self, "amounts", tuple(ordered))
+
+    @cached_property
+    def priced(self) -> Comparison | None:
+        """What a price asks: that it is a number, and none below zero."""
+        return None if self.price is None else Comparison(self.price, ">=", Fraction(0))
+
+    @cached_property
+    def asked(self) -> tuple[Condition, ...]:
+        """Its preconditions without what its price asks."""
+        return tuple(condition for condition in self.preconditions if condition != self.priced)
 
     @cached_property
     def every_effect(self) -> tuple[ValueEffect | AmountEffect, ...]:

@@ -145,6 +145,7 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
             if room in SUBROOMS and to not in {
                 room,
                 "plan",
+                "plan_costs",
                 "validation",
                 "checked_amounts",
                 "checked_definitions",

@@ -16,6 +16,7 @@ from confab.report.pieces import Tile, anchor, number, table, tiles, timeline, t
 from confab.show import lengths
 from planner.causal_links import purposes
 from planner.plan import Outcome, Status
+from planner.plan_costs import cost_of
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import local_name
 from reasoner.symbols import Fact, Problem
@@ -177,7 +178,7 @@ def _tiles(
         found.append(("search", f"{expanded:,} expansions", ""))
         found.append(("planning", f"{outcome.seconds * 1000:.0f} ms", ""))
         if outcome.plan is not None:
-            cost = sum(problem.domain.behaviors[step.behavior].cost for step in outcome.plan.primitives)
+            cost = cost_of(problem, outcome.plan)
             if cost != len(outcome.plan.primitives):
                 found.append(("cost", number(cost), ""))
     return found

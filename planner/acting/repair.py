@@ -26,6 +26,7 @@ from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.unsolvability import refuted
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
+from planner.plan_costs import cost_of, costs_of_steps
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
 from reasoner.amounts import meets
@@ -97,9 +98,9 @@ def mend(
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
     anew, outcome = replan(problem, planner, using, limits)
-    if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost(problem, anew)):
+    if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
         return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
-    return Mended("replan", anew, cost(problem, anew or ()), perf_counter() - begin, outcome)
+    return Mended("replan", anew, cost_of(problem, Plan(anew or ())), perf_counter() - begin, outcome)
 
 
 def repair(
@@ -136,7 +137,7 @@ def repair(
         solved = False
     if not solved:
         return None
-    costs = [_cost(call, done) for done in call.steps]
+    costs = costs_of_steps(call.problem, call.tree().steps)
     needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
     needed |= {i for i in _last_steps(call) if i < begun or i >= finished}
     old, first = {(step.behavior, step.arguments) for step in rest}, call.program.levels[0]
@@ -240,12 +241,6 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
     before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
     same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
     return len(before) - same, len(after) - same
-
-
-def cost(problem: Problem, steps: Iterable[Step]) -> float:
-    """Return what the primitives of some steps cost."""
-    behaviors = problem.domain.behaviors
-    return sum(behaviors[step.behavior].cost for step in Plan(tuple(steps)).primitives)
 
 
 # -------------------------------------------------------------------------------------------------------------- replaying
@@ -377,12 +372,6 @@ def _at_rest(call: Call) -> bool:
         if situation.level > call.program.levels[0] and situation.rest is not None
         for value in call.table.now[name].values()
     )
-
-
-def _cost(call: Call, done: RefinedStep) -> float:
-    """Return what the primitives of a step cost."""
-    below = done[4]
-    return sum([_cost(call, child) for child in below]) if below else call.problem.domain.behaviors[done[1]].cost
 
 
 def _last_steps(call: Call) -> set[int]:

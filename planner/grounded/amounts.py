@@ -40,6 +40,20 @@ class Linear:
             total += vector[place] * factor
         return total
 
+    def worth(self, vector: Vector) -> float:
+        """Return what it comes to, as a cost."""
+        return float(self.of(vector))
+
+    def least(self, quantities: Sequence[Quantity]) -> float:
+        """Return what it comes to at least, none below zero, where each amount keeps to its bounds."""
+        total = self.constant
+        for place, factor in self.terms:
+            limit = quantities[place].least if factor > 0 else quantities[place].most
+            if limit is None:
+                return 0.0
+            total += factor * limit
+        return max(float(total), 0.0)
+
     def plus(self, other: Linear, times: Exact = 1) -> Linear:
         """Return the sum with another, that one multiplied."""
         found = defaultdict[int, Exact](int, self.terms)

@@ -32,6 +32,7 @@ from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
 from planner.plan import Reason
+from reasoner.amounts import Quantity
 from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
@@ -414,9 +415,7 @@ class _Assembly:
             more = zip(schema.terms[parameters:], words[parameters:], strict=True)
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
-        costs = np.concatenate(
-            [np.full(len(rows[i]), schemas_[i].behavior.cost) for i in bases] or [np.empty(0)]
-        ).tolist()
+        costs, prices = self._costs(bases, rows, first, [one for one in quantities if one is not None])
         # Derived bits in the relaxed task: an operator of no cost per alternative, owned by nobody.
         need, add, owner = _with_derived(need, add, owner, cases)
         return Task(
@@ -436,7 +435,30 @@ class _Assembly:
             change=change,
             describe=describe,
             amounts=amounts,
+            prices=prices,
         )
+
+    def _costs(
+        self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int], quantities: Sequence[Quantity]
+    ) -> tuple[list[float], dict[int, Linear]]:
+        """Return what each operator costs, at least, and what those do whose cost depends on amounts."""
+        costs: list[float] = []
+        prices: dict[int, Linear] = {}
+        for i in bases:
+            schema = self.reached.schemas[i]
+            price = schema.behavior.price
+            if price is None:
+                costs += [schema.behavior.cost] * len(rows[i])
+                continue
+            self.reached.check_time()
+            for operator, row in enumerate(rows[i].tolist(), first[i]):
+                terms = dict(zip(schema.terms, (self.reached.individuals[n] for n in row), strict=True))
+                found = self.reached.amounts.linear(price, terms)
+                assert found is not None  # which the preconditions ask
+                if found.terms:
+                    prices[operator] = found
+                costs.append(found.least(quantities))
+        return costs, prices
 
     def _initial_bits(self) -> Iterator[int]:
         true = set()

@@ -50,8 +50,10 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         On the clock of `time.perf_counter`.
     """
     best = shortened(task, plan, deadline)
+    if task.prices and task.cost_of(best) > task.cost_of(plan):
+        best = list(plan)
     if len(best) <= STEPS:
-        cost = sum(task.costs[operator] for operator in best)
+        cost = task.cost_of(best)
         looked = (1 + len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
         states = min(STATES, work // looked)
         exact = shortest(task, ways(task), cost, states, deadline)

@@ -61,7 +61,7 @@ def shortest(
         Grows by what is generated and expanded.
     """
     counts = counts or Counts()
-    goal, costs = task.goal, task.costs
+    goal, costs, priced = task.goal, task.costs, bool(task.prices)
     g = {task.initial: 0.0}
     came_from: dict[int, tuple[int, int]] = {}
     estimate = bound(task.initial)
@@ -90,7 +90,7 @@ def shortest(
             if after is None:
                 continue
             counts.generated += 1
-            new = so_far + costs[operator]
+            new = so_far + (task.spent(state, operator) if priced else costs[operator])
             if new < g.get(after, math.inf):
                 g[after] = new
                 came_from[after] = state, operator

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from planner.grounded.amounts import Amounts
+from planner.grounded.amounts import Amounts, Linear
 from planner.grounded.derived import Derived
 from planner.grounded.joins import Ints
 from planner.grounded.successors import tree
@@ -67,7 +67,7 @@ class Task:
     constants : mapping of Symbol to value
         The symbols that no operator changes.
     costs : list of float
-        Per operator.
+        Per operator; where that depends on amounts, what it costs at least.
     owners : list of int
         Per relaxed operator, the operator that it is or a conditional effect of which it is.
     needs, adds : Grouped
@@ -80,6 +80,8 @@ class Task:
         To its behaviour, arguments and bindings.
     amounts : Amounts, optional
         Where some operator changes amounts.
+    prices : mapping of operator to Linear
+        What operators cost whose cost depends on amounts.
     barred : set of (state, operator)
         What isn't to be done where: steps that turned out not to be refinable there.
     """
@@ -100,12 +102,28 @@ class Task:
     change: Callable[[int], tuple[int, tuple[Change, ...]]]
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
     amounts: Amounts | None = None
+    prices: Mapping[int, Linear] = field(default_factory=dict)
     barred: set[tuple[int, int]] = field(default_factory=set, repr=False)
     _changes: dict[int, tuple[int, tuple[Change, ...]]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         """Return the number of operators."""
         return len(self.costs)
+
+    def spent(self, state: int, operator: int) -> float:
+        """Return what an operator costs in a state."""
+        price = self.prices.get(operator)
+        return (
+            self.costs[operator] if price is None or self.amounts is None else price.worth(self.amounts.vector(state))
+        )
+
+    def cost_of(self, plan: Sequence[int]) -> float:
+        """Return what a plan costs."""
+        total, state = 0.0, self.initial
+        for operator in plan:
+            total += self.spent(state, operator)
+            state = (self.applied(state, operator) if self.prices else state) or state
+        return total
 
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:
         """Return the state after an operator, or None where it isn't applicable.

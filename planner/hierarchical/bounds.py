@@ -23,6 +23,7 @@ from planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.unsolvability import closed, refusal
 from planner.plan import Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.symbols import Problem
 
@@ -71,11 +72,6 @@ def _left(limits: Limits, deadline: float | None) -> Limits:
     return limits if deadline is None else Limits(limits.expansions, max(deadline - perf_counter(), 0.0))
 
 
-def cost(problem: Problem, plan: Plan) -> float:
-    """Return the cost of a plan's primitives."""
-    return sum(problem.domain.behaviors[step.behavior].cost for step in plan.primitives)
-
-
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
     """Improve a plan by ever more clusters, until that stops helping or half of the time is gone."""
     begin = perf_counter()
@@ -85,7 +81,7 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
             break
         again = fast_plan(problem, limits=_left(limits, deadline), using=using, improve=shapes)
         shapes *= 4
-        if again.plan is not None and cost(problem, again.plan) < cost(problem, best.plan):
+        if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again
     return best
 
@@ -98,7 +94,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))
-    upper = cost(problem, best.plan) if best.plan is not None else math.inf
+    upper = cost_of(problem, best.plan) if best.plan is not None else math.inf
     try:
         if refusal(closed(problem, level, deadline)) is not None:
             return 0.0, None

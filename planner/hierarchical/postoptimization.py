@@ -170,7 +170,7 @@ class Improver:
             return None
         if isinstance(task, Reason) or len(task) > OPERATORS:
             return None
-        task = replace(task, costs=[1.0] * len(task))
+        task = replace(task, costs=[1.0] * len(task), prices={})
         upper = length(old, level)
         found = shortest(task, ways(task), upper, self.work, self.segments.deadline)
         self.work -= len(found.states)

@@ -44,7 +44,7 @@ def a_star(
     start: Values,
     goal: Goal,
     successors: Callable[[Values], Iterable[Applied]],
-    cost: Callable[[Applied], float],
+    cost: Callable[[Values, Applied], float],
     rank: Callable[[Values], Callable[[Applied], float]] | None = None,
     bonus: Callable[[float, int], float] = lambda c, n: 0.0,
     limits: Limits = Limits(),  # noqa: B008 - frozen
@@ -57,7 +57,7 @@ def a_star(
     start : Values
     goal : Goal
     successors : function of a state to what can be done there
-    cost : function of one of them to its cost
+    cost : function of a state and one of them to its cost
     rank : function of a state to the ranking scores of what can be done there (eq. 4), in [0, 1]; None leaves c at 0
     bonus : function of ranking score and depth to the term c of eq. (3)
     limits : Limits
@@ -87,7 +87,7 @@ def a_star(
         score = rank(state) if rank else None
         for applied in successors(state):
             counts.generated += 1
-            next_state, next_g = applied.after, g_state + cost(applied)
+            next_state, next_g = applied.after, g_state + cost(state, applied)
             if next_g >= g.get(next_state, float("inf")):
                 continue
             counts.evaluated += 1

@@ -236,7 +236,6 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
     The states searched are those of the model with the marks of the target behind.
     """
     grounds, size = call.grounds[level], len(start)
-    behaviors = call.model.problem.domain.behaviors
     rank = ranker(call, level)
 
     def successors(state: Values) -> Iterable[Applied]:
@@ -259,7 +258,7 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
         start=start + (SETTLED,) * len(wanted.restless),
         goal={**wanted.values, **{size + j: SETTLED for j in range(len(wanted.restless))}},
         successors=successors,
-        cost=lambda applied: behaviors[applied.ground.behavior].cost,
+        cost=call.model.cost,
         rank=lambda state: rank(state[:size]),
         bonus=call.constants.bonus,
         limits=call.limits,

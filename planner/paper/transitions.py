@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 from planner.derived_facts import Rules
 from planner.transitions import Forward, Table, Writer, key_of
+from reasoner.amounts import Number
 from reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
 
 Values = tuple[str, ...]
@@ -45,8 +46,11 @@ class Model:
         if problem.domain.rules:
             Rules(self.writer).define(self.table)
         lines = [line for b in problem.domain.behaviors.values() for line in self.writer.forward(b)]
-        bind = self.writer.function(["forward = {}", *lines], "forward")
-        self.forward: Mapping[str, Forward] = bind(self.table.now, self.table.who)
+        lines += [line for b in problem.domain.behaviors.values() for line in self.writer.priced(b)]
+        bind = self.writer.function(["forward, prices = {}, {}", *lines], "(forward, prices)")
+        self.forward: Mapping[str, Forward]
+        self.prices: Mapping[str, Callable[..., Number]]
+        self.forward, self.prices = bind(self.table.now, self.table.who)
 
     def values(self, state: State) -> Values:
         """Return a state as the tuple that search works on."""
@@ -83,6 +87,15 @@ class Model:
                 after[self.index[situation, key]] = value
         bindings = dict(zip(self.writer.variables[ground.behavior], done[0], strict=True))
         return Applied(ground, bindings, self.completed(tuple(after)))
+
+    def cost(self, values: Values, applied: Applied) -> float:
+        """Return what a behaviour costs where it is done."""
+        name = applied.ground.behavior
+        if name not in self.prices:
+            return self.problem.domain.behaviors[name].cost
+        self._move(values[: len(self.cells)])
+        variables = [applied.bindings[variable] for variable in self.writer.variables[name]]
+        return float(self.prices[name](*applied.ground.arguments, *variables))
 
     def successors(self, grounds: Sequence[GroundBehavior], values: Values) -> Iterator[Applied]:
         """Yield what each applicable one of the ground behaviours does, in their order."""

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, terms_of, written
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, inside, terms_of, written
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -124,6 +124,7 @@ class _Action:
     ends: list[str] = field(default_factory=list)
     begins: list[str] = field(default_factory=list)
     effects: list[str] = field(default_factory=list)  # conditional ones
+    price: str = ""
 
 
 class _Export:
@@ -430,6 +431,7 @@ class _Export:
             used = {t for c in (*behavior.preconditions, *extra) for t in _terms(c)}
             used |= {t for _, effects, _ in cases for e in effects for t in (*e.arguments, e.value)}
             used |= {t for e in behavior.amounts if not e.when for t in (*e.arguments, *terms_of(e.amount))}
+            used |= set() if behavior.price is None else {*terms_of(behavior.price)}
             terms = {p.name: self.type_of.get(p.kind, "object") for p in behavior.parameters}
             terms |= {n: self.type_of.get(v.kind, "object") for n, v in declared.items() if n in used}
             action = _Action(behavior, terms)
@@ -437,9 +439,11 @@ class _Export:
                 if t.kind not in self.type_of:
                     action.needs.append(self.is_a(t.name, t.kind))
             limits = allowed(behavior, self.problem.domain.situations)
-            conditions = list(dict.fromkeys((*behavior.preconditions, *limits, *extra)))
+            conditions = list(dict.fromkeys((*behavior.asked, *limits, *extra)))
             for c in conditions:
                 self.condition(c, action, action.needs)
+            if behavior.price is not None:
+                self.price(behavior.price, action)
             for _, effects, conditional in cases:
                 for effect in effects:
                     self.effect(effect, conditions, action)
@@ -451,6 +455,21 @@ class _Export:
                 action.ends or action.begins or action.effects
             ):  # one that does something
                 yield action
+
+    def price(self, price: Expression, action: _Action) -> None:
+        """Have an action cost what a price comes to; where a relation gives no number, it can't be done.
+
+        That there is one is said by a predicate, since planners that know costs needn't know how to compare numbers.
+        """
+        for part in inside(price):
+            if isinstance(part, Measure):
+                rows = {row[:-1] for row in self.problem.relations.get(part.relation, ())}
+                if any(row not in rows for row in product(*(sorted(self.members(action, t)) for t in part.arguments))):
+                    name = self.name("predicate", f"has {part.relation}", f"has_{part.relation}")
+                    self.arity[name] = len(part.arguments)
+                    self.statics[name] = rows
+                    action.needs.append(f"({' '.join([name, *map(self.term, part.arguments)])})")
+        action.price = self.amount(price)
 
     def same_or_not(
         self, behavior: Behavior, effect: ValueEffect
@@ -614,7 +633,7 @@ class _Export:
             text = f"(when {when} {_and(parts)})"
             effects.append(f"(forall ({typed}) {text})" if typed else text)
         if self.costs:
-            effects.append(f"(increase (total-cost) {action.behavior.cost:g})")
+            effects.append(f"(increase (total-cost) {action.price or format(action.behavior.cost, 'g')})")
         terms = {self.term(n): kind for n, kind in action.terms.items()}
         needs = "\n      ".join(dict.fromkeys(action.needs))
         does = "\n      ".join(effects)
@@ -623,9 +642,15 @@ class _Export:
             f"    :precondition (and\n      {needs})\n    :effect (and\n      {does}))"
         )
 
+    def counts(self, body: str) -> bool:
+        """Whether functions are used otherwise than to say what actions cost."""
+        rest = "\n".join(line for line in body.splitlines() if "(increase (total-cost)" not in line)
+        asked = any(symbol.situation in self.quantities for symbol in self.problem.goal)
+        return asked or any(re.search(rf"\({re.escape(name)}[ )]", rest) for name in self.functions)
+
     @property
     def costs(self) -> bool:
-        return any(b.cost != 1 for b in self.behaviors)
+        return any(b.cost != 1 or b.price is not None for b in self.behaviors)
 
     def individuals(self) -> list[str]:
         used = [s for s in self.situations.values() if self.name("predicate", s.name) in self.arity]
@@ -652,7 +677,7 @@ class _Export:
             ":equality": "(= " in body,
             ":derived-predicates": "(:derived " in body,
             ":action-costs": self.costs,
-            ":numeric-fluents": bool(self.functions),
+            ":numeric-fluents": self.counts(body),
         }
         requirements = " ".join([":strips", ":typing", *(key for key, needed in wanted.items() if needed)])
         types = "\n    ".join(f"{kind} - {above}" for kind, above in self.above.items())

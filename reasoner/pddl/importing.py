@@ -25,7 +25,6 @@ inequalities.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -75,7 +74,6 @@ from reasoner.symbols import (
 THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
 REACH_GOAL = "reach-goal"
-MOST_COSTS = 200  # of one action; with more it has their mean
 WORLD, THE_WORLD = "World", "the_world"
 """The class, and its only individual, that a predicate without arguments is about."""
 BASE = "https://w3id.org/confab/pddl/"
@@ -113,15 +111,10 @@ def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
         Last part of the scene's IRI; the problem's name if not given.
     level : int
         The level of the behaviours: more than 1 leaves room for abstract ones above them.
-
-    Raises
-    ------
-    PddlError
-        An action's cost adds up several functions.
     """
     table = _Import(pddl, scene or pddl.problem, level)
     problem = table.problem()
-    return Imported(problem, {ours: theirs.split(" = ")[0] for (_, theirs), ours in table.names.items()})
+    return Imported(problem, {ours: theirs for (_, theirs), ours in table.names.items()})
 
 
 @dataclass
@@ -143,7 +136,7 @@ class _Import:
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
         self.weights = self.costing(changed)
         self.amounts = changed & (read | (changed - self.weights.keys()))
-        counted = [e.amount for effects in self.numeric.values() for e in effects if e.function.head in self.amounts]
+        counted = [e.amount for effects in self.numeric.values() for e in effects]
         conditions = [a.precondition for a in self.pddl.actions.values()]
         conditions += [axiom.condition for axiom in self.pddl.axioms]
         whens = [f for effects in self.numeric.values() for e in effects for f in e.when]
@@ -212,7 +205,7 @@ class _Import:
             measured = {(*(self.name("object", w) for w in words), written(n)) for words, n in numbers.items()}
             relations[self.name("static", f"({function})", function)] = frozenset(measured)
         situations = self.situations(classes, parents)
-        behaviors = {b.name: b for name in pddl.actions for b in self.behaviors(name, relations)}
+        behaviors = {b.name: b for b in map(self.behavior, pddl.actions)}
         initial = self.initial(situations, classes)
         goal, reach = self.goal(situations)
         if reach:
@@ -381,8 +374,8 @@ class _Import:
         value = place.value if place.part.counted is None else terms[place.part.counted]
         return ValueCondition(place.situation, (terms[place.part.key],), value)
 
-    def behaviors(self, name: str, relations: dict[str, frozenset[tuple[str, ...]]]) -> Iterator[Behavior]:
-        """Yield the behaviour of an action: one, or one per cost."""
+    def behavior(self, name: str) -> Behavior:
+        """Return the behaviour of an action."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
         conditions = tuple(c for form in conjuncts(action.precondition) for c in variables.condition(form))
@@ -394,41 +387,27 @@ class _Import:
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
         named = self.name("action", name, name.upper())
         behavior = Behavior(named, self.level, parameters, (), conditions, effects, amounts=amounts)
-        constant, functions, weight = 0.0, [], 1.0
+        price = self.price(name)
+        if not price and not self.pddl.minimize:
+            price = Fraction(1)
+        if price is None or isinstance(price, Fraction):
+            return replace(behavior, cost=max(float(price or 0), 0.0))
+        return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
+
+    def price(self, name: str) -> Expression | None:
+        """Return what an action adds to what is minimised: what it increases, times its weight there; None if it is nothing."""
+        found: Expression | None = None
         for effect in self.numeric[name]:
             if effect.function.head not in self.weights or effect.when or effect.variables:
                 continue
-            weight = float(self.weights[effect.function.head])
-            if isinstance(effect.amount, Word):
-                number = Fraction(effect.amount.text) * self.weights[effect.function.head]
-                constant += float(number if effect.head == "increase" else -number)
-            elif effect.amount.head in self.pddl.functions and effect.amount.head not in self.amounts:
-                functions.append(words_of(effect.amount))
-            elif effect.function.head == "total-cost":
-                raise PddlError(f"action '{name}': a cost that is calculated is not supported")
-        constant = max(constant, 0.0)
-        if not self.pddl.minimize and not functions and not constant:
-            constant = 1.0
-        if not functions:
-            yield replace(behavior, cost=constant)
-            return
-        if len(functions) > 1:
-            raise PddlError(f"action '{name}': a cost that adds up several functions is not supported")
-        function, terms = functions[0][0], tuple(self.term(t) for t in functions[0][1:])
-        by_cost = defaultdict(set)
-        for words, number in self.pddl.numbers.items():
-            if words[0] == function:
-                by_cost[weight * float(number)].add(tuple(self.name("object", w) for w in words[1:]))
-        if not terms or len(by_cost) > MOST_COSTS:
-            yield replace(behavior, cost=constant + sum(by_cost) / max(len(by_cost), 1))
-            return
-        for price, rows in sorted(by_cost.items()):
-            text = f"{price:g}".replace(".", "_").replace("-", "minus_")
-            relation = self.name("static", f"{function} = {price}", f"{function}_is_{text}")
-            relations[relation] = frozenset(rows)
-            more = RelationCondition(relation, terms)
-            own = self.name("action", f"{name} = {price}", f"{name}_at_{text}".upper())
-            yield replace(behavior, name=own, preconditions=(*conditions, more), cost=constant + price)
+            factor, one = self.weights[effect.function.head], self.number(effect.amount, {})
+            factor = factor if effect.head == "increase" else -factor
+            one = one * factor if isinstance(one, Fraction) else one if factor == 1 else Calculation("*", factor, one)
+            if isinstance(one, Fraction) and isinstance(found, Fraction | None):
+                found = one + (found or 0)
+            else:
+                found = one if found is None else Calculation("+", found, one)
+        return found
 
     def costing(self, changed: set[str]) -> dict[str, Fraction]:
         """Return the functions that what is minimised adds up, with their factors: whoever increases one costs that."""

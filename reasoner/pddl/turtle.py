@@ -224,7 +224,7 @@ class _Writer:
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
         self.where, self.nodes = one.name, []
         self.terms = {t.name: f":{one.name}.{t.name[1:]}" for t in (*one.parameters, *one.variables)}
-        conditions = [self.condition(c) for c in one.preconditions]
+        conditions = [self.condition(c) for c in one.asked]
         effects = []
         for position, effect in enumerate(one.effects, start=1):
             when = [self.condition(c) for c in effect.when]
@@ -241,6 +241,7 @@ class _Writer:
             self.nodes.append(f"{iri} a owl:NamedIndividual, {said} .")
             effects.append(iri)
         cost = [] if one.cost == 1 else [f"{one.cost:f}"]
+        price = [] if one.price is None else [self.calculation(one.price)]
         yield self.node(
             one.name,
             "owl:NamedIndividual, c:Behavior",
@@ -248,6 +249,7 @@ class _Writer:
             ("c:level", str(one.level)),
             ("c:index", str(index)),
             ("c:cost", cost),
+            ("c:price", price),
             ("c:parameter", [self.terms[p.name] for p in one.parameters]),
             ("c:precondition", conditions),
             ("c:postcondition", effects),
@@ -324,6 +326,10 @@ class _Writer:
             return f"c:amount {decimal(one)}"
         if name == "left" and isinstance(one, Amount | Measure):
             return self.measured(one)
+        return f"c:{name} {self.calculation(one)}"
+
+    def calculation(self, one: Expression) -> str:
+        """Write a calculation and those inside it; return its IRI."""
         position = len(self.nodes)
         self.nodes.append("")
         iri = f":{self.where}.amount{position:03}"
@@ -338,7 +344,7 @@ class _Writer:
                 whole = Calculation("/", Fraction(number.numerator), Fraction(number.denominator))
                 said = f'c:sign "/" ; {self.side("left", whole.left)} ; {self.side("right", whole.right)}'
         self.nodes[position] = f"{iri} a owl:NamedIndividual, c:Calculation ; {said} ."
-        return f"c:{name} {iri}"
+        return iri
 
     def measured(self, one: Amount | Measure) -> str:
         key, name = ("situationType", one.situation) if isinstance(one, Amount) else ("relation", one.relation)

@@ -636,6 +636,13 @@ class _Schema:
     def level(self, iri: str) -> int:
         return self.number(iri, "level", 1, HIGHEST_LEVEL)
 
+    def price(self, iri: str) -> Expression | None:
+        if not self.values(iri, "price"):
+            return None
+        if self.values(iri, "cost"):
+            raise KnowledgeError(f"<{iri}> has a :cost and a :price; keep one of them")
+        return self.expression(self.one(iri, "price"))
+
     def cost(self, iri: str) -> float:
         if not self.values(iri, "cost"):
             return 1.0
@@ -881,6 +888,7 @@ class _Schema:
         parameters = tuple(map(self.parameter, _ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
         effects = [self.effect(effect) for effect in self.values(iri, "postcondition")]
+        price = self.price(iri)
         return Behavior(
             name=self.names.short(iri),
             level=self.level(iri),
@@ -889,10 +897,12 @@ class _Schema:
             preconditions=(
                 *self.conditions(iri, "precondition"),
                 *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
+                *([] if price is None else [Comparison(price, ">=", Fraction(0))]),
             ),
             effects=tuple(effect for effect in effects if isinstance(effect, ValueEffect)),
             cost=self.cost(iri),
             amounts=tuple(effect for effect in effects if isinstance(effect, AmountEffect)),
+            price=price,
         )
 
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:

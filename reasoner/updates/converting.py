@@ -298,6 +298,8 @@ def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> boo
 
 def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, prefixes: Mapping[str, str]) -> str:
     """Return what an update doesn't say as the behaviour does; nothing if it says the same."""
+    if behavior.price is not None:
+        return "a price that is calculated stays with individuals"
     again = compiled_again(graph, iri, written, prefixes)
     if isinstance(again, str):
         return again
@@ -345,7 +347,8 @@ def plainly(behavior: Behavior) -> object:
         behavior.parameters,
         frozenset(behavior.variables),
         behavior.cost,
-        _plain(behavior.preconditions),
+        behavior.price,
+        _plain(behavior.asked),
         frozenset(effects),
         frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when)) for e in behavior.amounts),
     )

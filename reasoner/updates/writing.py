@@ -97,14 +97,14 @@ class _Writer:
             self.put(term.name)
         chosen = " ".join(f"{self.put(p.name)} a {self.spell(p.kind)} ." for p in behavior.parameters)
         self.scope = self.chosen()
-        lines = self.group(behavior.preconditions, self.scope, labels)
-        return self.operation(effects, behavior.preconditions, [chosen, *lines] if chosen else lines)
+        lines = self.group(behavior.asked, self.scope, labels)
+        return self.operation(effects, behavior.asked, [chosen, *lines] if chosen else lines)
 
     def conditional(self, when: tuple[Condition, ...], effects: Sequence[ValueEffect | AmountEffect]) -> str:
         """Return a further operation."""
         known = self.chosen()
-        self.group(self.behavior.preconditions, known)
-        return self.operation(effects, (*self.behavior.preconditions, *when), self.group(when, known))
+        self.group(self.behavior.asked, known)
+        return self.operation(effects, (*self.behavior.asked, *when), self.group(when, known))
 
     def chosen(self) -> dict[str, bool]:
         return {parameter.name: True for parameter in self.behavior.parameters}

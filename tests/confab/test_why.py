@@ -9,7 +9,7 @@ import confab
 from confab.cli import app
 from confab.labels import labels_of
 from confab.lifted import Sayings
-from planner.contrast import cost_of
+from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.memory.experience import ITSELF
 

@@ -8,9 +8,10 @@ from random import Random
 import pytest
 
 from planner.causal_links import Kind, Need, purposes
-from planner.contrast import cost_of, instead_of
+from planner.contrast import instead_of
 from planner.hierarchical.planner import plan as default
 from planner.plan import Limits, Plan, Step
+from planner.plan_costs import cost_of
 from planner.validation import Fault, validate
 from reasoner.symbols import Behavior, Problem, Symbol, ValueEffect
 from tests.planner.small import CASES

@@ -14,6 +14,7 @@ from planner.grounded.task import Task
 from planner.hierarchical import bounds as optimal
 from planner.hierarchical.bounds import lm_cut
 from planner.plan import Limits, Reason, Status
+from planner.plan_costs import cost_of
 from planner.solve import Request, solve
 from planner.validation import validate
 from reasoner.symbols import FALSE, TRUE, SituationType, Symbol
@@ -49,7 +50,7 @@ def test_a_plan_is_optimal_when_its_cost_is_the_bound() -> None:
     assert outcome.plan is not None
     task = ground(problem, 3)
     assert isinstance(task, Task)
-    assert optimal.cost(problem, outcome.plan) == outcome.bound == shortest(task).bound
+    assert cost_of(problem, outcome.plan) == outcome.bound == shortest(task).bound
     assert validate(problem, outcome.plan) == []
 
 
@@ -59,7 +60,7 @@ def test_when_time_runs_out_there_is_a_plan_and_a_bound_below_it() -> None:
     assert outcome.status is Status.SOLVED
     assert outcome.plan is not None
     assert outcome.bound is not None
-    assert 0 < outcome.bound <= optimal.cost(problem, outcome.plan)
+    assert 0 < outcome.bound <= cost_of(problem, outcome.plan)
     assert outcome.seconds < 1.5 * 1.1 + 0.5
 
 
@@ -67,7 +68,7 @@ def test_a_shorter_plan_that_leaves_a_hand_lowered_is_none() -> None:
     problem = family("served", 2, hands=1)
     outcome = solve(Request(problem, "optimal"))
     assert outcome.plan is not None
-    assert outcome.bound == optimal.cost(problem, outcome.plan)
+    assert outcome.bound == cost_of(problem, outcome.plan)
     task = ground(problem, 3)
     assert isinstance(task, Task)
     assert shortest(task).bound < outcome.bound, "the world has no such plan; choose another"
@@ -80,7 +81,7 @@ def test_the_bound_holds_where_something_not_at_rest_need_not_be_touched() -> No
     outcome = solve(Request(problem, "optimal"))
     assert outcome.plan is not None
     assert outcome.bound is not None
-    assert outcome.bound <= optimal.cost(problem, outcome.plan)
+    assert outcome.bound <= cost_of(problem, outcome.plan)
 
 
 def test_what_is_true_or_false_and_not_stated_is_at_rest_in_the_end_of_a_best_plan() -> None:
@@ -101,5 +102,5 @@ def test_what_is_true_or_false_and_not_stated_is_at_rest_in_the_end_of_a_best_pl
     assert problem.goal_on(2) == {Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): FALSE}
     outcome, flat = optimal.plan(problem), plan_level(problem)
     assert outcome.plan is not None and flat.plan is not None
-    assert outcome.bound == optimal.cost(problem, outcome.plan) == len(flat.plan.steps) == 3
+    assert outcome.bound == cost_of(problem, outcome.plan) == len(flat.plan.steps) == 3
     assert validate(problem, flat.plan) == validate(problem, outcome.plan) == []

@@ -5,10 +5,11 @@ from functools import cache
 
 import pytest
 
-from planner.acting.repair import CLOSE, cost, difference, mend, rejected, replan, vanished
+from planner.acting.repair import CLOSE, difference, mend, rejected, replan, vanished
 from planner.hierarchical.planner import plan
 from planner.hierarchical.serialization import Compiled, compiled
 from planner.plan import Limits, Plan, Step
+from planner.plan_costs import cost_of
 from planner.validation import successor
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
@@ -83,7 +84,7 @@ def test_it_costs_at_most_a_tenth_more_than_replanning() -> None:
             scratch, _ = replan(now, None, using(), Limits())
             assert (mended.steps is None) == (scratch is None)
             if scratch is not None:
-                assert mended.cost <= CLOSE * cost(now, scratch)
+                assert mended.cost <= CLOSE * cost_of(now, Plan(scratch))
 
 
 def test_what_is_not_there_is_named() -> None:

@@ -11,7 +11,7 @@ from reasoner.symbols import GroundBehavior
 
 def graph(
     edges: dict[str, dict[str, float]],
-) -> tuple[Callable[[Values], Iterable[Applied]], Callable[[Applied], float]]:
+) -> tuple[Callable[[Values], Iterable[Applied]], Callable[[Values, Applied], float]]:
     """Return successors and cost of a graph given as node → {node: cost}."""
     names = {
         (a, b): GroundBehavior(i, f"{a}{b}", ()) for i, (a, b) in enumerate((a, b) for a in edges for b in edges[a])
@@ -21,7 +21,7 @@ def graph(
     def successors(state: Values) -> Iterable[Applied]:
         return [Applied(names[state[0], b], {}, (b,)) for b in edges.get(state[0], {})]
 
-    return successors, lambda applied: costs[applied.ground.behavior]
+    return successors, lambda state, applied: costs[applied.ground.behavior]
 
 
 def names(path: tuple[Applied, ...]) -> list[str]:
@@ -50,7 +50,7 @@ def test_the_limit_of_expansions_gives_up_instead_of_claiming_anything() -> None
 
 
 def test_a_start_that_is_the_goal_needs_no_step() -> None:
-    found = a_star(("a",), {0: "a"}, lambda state: (), lambda applied: 1.0)
+    found = a_star(("a",), {0: "a"}, lambda state: (), lambda state, applied: 1.0)
     assert (found.status, found.path, found.counts.expanded) == (Status.SOLVED, (), 0)
 
 

@@ -17,6 +17,7 @@ from planner.grounded.task import Task
 from planner.plan import Limits, Plan, Status, Step
 from planner.solve import Request, solve
 from planner.validation import validate as faults
+from reasoner.amounts import Measure
 from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.pddl.exporting import Exported, plan_of, to_pddl
 from reasoner.pddl.importing import Imported, imported
@@ -218,7 +219,13 @@ def accepted(domain: str, problem: str, plan: list[str]) -> bool:
 
 def test_costs_that_depend_on_objects_are_kept() -> None:
     problem = imported(parse(*TOLLS)).problem
-    assert {b.name: b.cost for b in problem.domain.behaviors.values()} == {"GO_AT_1": 1, "GO_AT_2": 2, "GO_AT_9": 9}
+    assert {b.name: b.price for b in problem.domain.behaviors.values()} == {"GO": Measure("toll", ("?a", "?b"))}
+    exported = to_pddl(problem)
+    assert "(increase (total-cost) (toll ?a ?b))" in exported.domain
+    assert ":numeric-fluents" not in exported.domain  # so that planners take it that only know costs
+    for one in (problem, imported(parse(exported.domain, exported.problem)).problem):
+        outcome = solve(Request(one, "optimal"))
+        assert outcome.cost == outcome.bound == 3
 
 
 @pytest.mark.parametrize("path", given_problems(), ids=lambda p: str(p.relative_to(GIVEN)))

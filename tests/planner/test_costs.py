@@ -1,0 +1,144 @@
+"""What behaviours cost is worked out from relations and amounts: cheapest plans are cheapest, whoever adds up."""
+
+import heapq
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+
+import pytest
+
+import confab
+from planner.plan import Limits, Status
+from planner.plan_costs import cost_of
+from planner.solve import Request, solve
+from planner.validation import validate
+from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
+from reasoner.symbols import AmountEffect, Behavior, Comparison, Parameter, Problem, SituationType
+from tests.planner import naive
+from worlds.writing import becomes, has, world
+
+PLACES = ("yard", "north", "south", "hill")
+LOAD = Amount("LOAD", ("van",))
+WAY: Expression = Measure("WAY", ("?from", "?to"))
+HEAVY = Calculation("*", WAY, Calculation("+", Fraction(1), LOAD))  # a way is as dear as what is carried along it
+
+
+def rounds(rng: Random, price: Expression, parcels: int = 2) -> Problem:
+    """Return a van that brings parcels about; some ways don't exist, some are said to cost less than nothing."""
+    names = tuple(f"parcel{i}" for i in range(parcels))
+    to, parcel, at = Parameter("?to", "PLACE"), Parameter("?p", "Parcel"), Parameter("?from", "PLACE")
+    asked = Comparison(price, ">=", Fraction(0))
+    drive = Behavior("DRIVE", 1, (to,), (at,), (has("PLACE", "van", "?from"), asked),
+                     (becomes("PLACE", "van", "?to"),), price=price)  # fmt: skip
+    more, less = (AmountEffect("LOAD", ("van",), how, Measure("weight", ("?p",))) for how in ("increase", "decrease"))
+    take = Behavior("TAKE", 1, (parcel,), (at,), (has("PLACE", "van", "?from"), has("IN", "?p", "?from")),
+                    (becomes("IN", "?p", "van"),), amounts=(more,), cost=0.5)  # fmt: skip
+    give = Behavior("GIVE", 1, (parcel,), (at,), (has("PLACE", "van", "?from"), has("IN", "?p", "van")),
+                    (becomes("IN", "?p", "?from"),), amounts=(less,), cost=0.5)  # fmt: skip
+    ways = {
+        (a, b, str(rng.choice((-1, 1, 2, 3, 5, 8)))) for a in PLACES for b in PLACES if a != b and rng.random() < 0.8
+    }
+    weights = {(name, str(rng.choice((1, 2, 3)))) for name in names}
+    starts = {f"IN {name}": rng.choice(PLACES) for name in names}
+    return world(
+        [
+            SituationType("PLACE", ("Van",), "PLACE"),
+            SituationType("IN", ("Parcel",), "IN"),
+            SituationType("LOAD", ("Van",), "LOAD", quantity=Quantity("kg", least=Fraction(0), most=Fraction(4))),
+        ],
+        [drive, take, give],
+        {"Van": ("van",), "Parcel": names, "PLACE": PLACES, "IN": (*PLACES, "van")},
+        {"PLACE van": rng.choice(PLACES), "LOAD van": "0", **starts},
+        {f"IN {name}": rng.choice(PLACES) for name in names},
+        {"WAY": frozenset(ways), "weight": frozenset(weights)},
+    )
+
+
+def cheapest(problem: Problem) -> float | None:
+    """Return what the cheapest plan costs, by trying everything in every state."""
+    behaviors = problem.domain.behaviors.values()
+    start = naive.complete(problem)
+    best, waiting, number = {frozenset(start.items()): 0.0}, [(0.0, 0, start)], 0
+    while waiting:
+        spent, _, state = heapq.heappop(waiting)
+        if spent > best[frozenset(state.items())]:
+            continue
+        if naive.wanted(problem, state):
+            return spent
+        for behavior in behaviors:
+            for arguments, after in naive.results(problem, behavior, state):
+                terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
+                terms["?from"] = next(value for symbol, value in state.items() if symbol.situation == "PLACE")
+                price = None if behavior.price is None else naive.worth(problem, state, behavior.price, terms)
+                total = spent + (behavior.cost if price is None else float(price))
+                key = frozenset(after.items())
+                if total < best.get(key, float("inf")):
+                    best[key] = total
+                    number += 1
+                    heapq.heappush(waiting, (total, number, dict(after)))
+    return None
+
+
+@pytest.mark.parametrize("price", [WAY, HEAVY], ids=["by ways", "by ways and load"])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_plan_said_to_be_cheapest_is(seed: int, price: Expression) -> None:
+    problem = rounds(Random(seed), price)
+    least = cheapest(problem)
+    found = solve(Request(problem, "optimal", Limits(1_000_000, 30.0)))
+    if least is None:
+        assert found.status is Status.UNSOLVABLE
+        return
+    assert found.plan is not None
+    assert validate(problem, found.plan) == []
+    assert found.bound == pytest.approx(least) == pytest.approx(cost_of(problem, found.plan))
+
+
+DELIVERY = """@prefix : <https://example.org/van#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/van> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Van a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT, :LOAD .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :AT .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at . :at a owl:ObjectProperty, owl:FunctionalProperty .
+:LOAD a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :load ; c:leastAmount 0.0 .
+:load a owl:DatatypeProperty, owl:FunctionalProperty ; rdfs:domain :Van ; rdfs:range xsd:decimal .
+:WAY a owl:NamedIndividual, c:Relation ; c:parameter :WAY.from, :WAY.to .
+:WAY.from a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Place .
+:WAY.to a owl:NamedIndividual, c:Parameter ; c:index 2 ; c:termType :Place .
+:DRIVE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:price :DRIVE.fare ;
+  c:update "INSERT { ?van :at ?to } WHERE { ?van a :Van . ?to a :Place . ?van :at ?from FILTER(?from != ?to) }" .
+:DRIVE.fare a owl:NamedIndividual, c:Calculation ; c:sign "*" ; c:left :DRIVE.way ; c:right :DRIVE.heavy .
+:DRIVE.way a owl:NamedIndividual, c:Calculation ; c:relation :WAY ; c:about :DRIVE.from ; c:argument2 :DRIVE.to .
+:DRIVE.heavy a owl:NamedIndividual, c:Calculation ; c:sign "+" ; c:about :DRIVE.van ; c:situationType :LOAD ; c:amount 1.0 .
+:UNLOAD a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:cost 4.0 ;
+  c:update "DELETE { ?van :load ?n } INSERT { ?van :load 0.0 } WHERE { ?van a :Van . ?van :load ?n }" .
+:van1 a owl:NamedIndividual, :Van ; c:index 1 ; :at :yard ; :load 2.0 .
+:yard a owl:NamedIndividual, :Place ; c:index 2 . :north a owl:NamedIndividual, :Place ; c:index 3 .
+:south a owl:NamedIndividual, :Place ; c:index 4 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :van1 :yard :north :south ) ] .
+:w1 a owl:NamedIndividual, c:SituatedObjectInstance ; c:relation :WAY ; c:about :yard ; c:argument2 :north ; c:amount 3.0 .
+:w2 a owl:NamedIndividual, c:SituatedObjectInstance ; c:relation :WAY ; c:about :north ; c:argument2 :south ; c:amount 1.0 .
+:w3 a owl:NamedIndividual, c:SituatedObjectInstance ; c:relation :WAY ; c:about :yard ; c:argument2 :south ; c:amount 5.0 .
+:task a owl:NamedIndividual, c:Task ; c:goal :there .
+:there a owl:NamedIndividual, c:ValueCondition ; c:about :van1 ; c:situationType :AT ; c:value :south .
+"""
+
+
+def test_a_price_in_turtle_leads_to_the_cheapest_plan_and_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "van.ttl"
+    path.write_text(DELIVERY)
+    found = confab.load(path).plan(optimal=True)
+    assert found.outcome.plan is not None
+    assert [step.behavior for step in found.outcome.plan.steps] == ["UNLOAD", "DRIVE", "DRIVE"]  # 4 + 3 + 1, not 3 * 5
+    assert (found.outcome.cost, found.json()["cost"], found.json()["bound"]) == (8.0, 8.0, 8.0)
+    assert "costs 8, at least 8 proved" in str(found)
+    assert confab.load(path).plan(mode="paper").outcome.cost == 8.0
+
+
+def test_a_cost_beside_a_price_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "van.ttl"
+    path.write_text(DELIVERY.replace("c:price :DRIVE.fare", "c:price :DRIVE.fare ; c:cost 1.0"))
+    with pytest.raises(confab.KnowledgeError, match="DRIVE> has a :cost and a :price; keep one of them"):
+        confab.load(path).plan()
