@@ -7,6 +7,7 @@ python -m benchmarks.kills save 20  so many for one
 from __future__ import annotations
 
 import json
+import logging
 import math
 import mmap
 import os
@@ -18,6 +19,7 @@ import time
 import warnings
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -37,6 +39,7 @@ COMMANDS = {
     "execute": "execute --learn --save",
     "save": "Result.save",
     "run": "run",
+    "crowd": "learn`, one of eight at a time, by whichever path, `learn",
 }
 LEARNING = ("learn", "execute", "run")
 """What adds an episode."""
@@ -100,12 +103,59 @@ def spent(process: int) -> float:
 
 
 def learn(file: Path, number: int) -> None:
-    """Learn one more episode into a memory, as `confab learn` does."""
+    """Learn one more episode into a memory."""
     with alone(file):
         memory = Memory.load(file)
         cups = GoalKind("LOCATION", ("Cup",))
         memory.experience.learn(Lesson(counted=[(cups, ("turn", str(number)), Tally(1))]))
         memory.save(file)
+
+
+def crowd(kills: int, seed: int = 0) -> tuple[int, int]:
+    """Let eight processes learn at a time into one memory, each by a path of its own, and kill one of them; as `trial` returns."""
+    draw, lost, done = random.Random(seed), 0, 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name).resolve()
+        file, inside, beside = folder / "m.ttl", folder / "inside", folder / "beside"
+        inside.mkdir()
+        beside.symlink_to(folder)
+        (inside / "link.ttl").symlink_to(Path("..") / "m.ttl")
+        (folder / "again.ttl").symlink_to(inside / "link.ttl")
+        paths = [file, Path("m.ttl"), Path("inside/../m.ttl"), inside / "link.ttl", Path("inside/link.ttl")]
+        paths += [folder / "again.ttl", beside / "m.ttl", beside / "inside" / "link.ttl"]
+        memory = Memory.of(confab_scene("living-room"))
+        memory.experience = Experience("me", {"me": 1})
+        memory.save(file)
+        _, seconds, _ = killed(lambda: learn(file, -1), after=1e9)
+        acknowledged = Memory.load(file).experience.episodes["me"]
+        for number in range(kills):
+            children = [forked(partial(learn, path, number), folder) for path in paths]
+            time.sleep(draw.uniform(0.0, len(paths) * seconds))
+            os.kill(draw.choice(children), signal.SIGKILL)
+            ended = [os.waitpid(child, 0)[1] for child in children]
+            done += all(state == 0 for state in ended)
+            acknowledged += sum(state == 0 for state in ended)
+            found = Memory.load(file).experience.episodes["me"]
+            lost += max(0, acknowledged - found) + len(torn(folder))
+            acknowledged = found
+    return done, lost
+
+
+def forked(write: Callable[[], object], folder: Path) -> int:
+    """Run something in a folder, in a process of its own; return its number."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.chdir(folder)
+            logging.disable()  # each says that it waits
+            write()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
 
 
 def torn(folder: Path) -> list[str]:
@@ -144,7 +194,7 @@ def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
         memory.experience = Experience("you", {"you": 7})
         memory.save(other)
         writes: dict[str, Callable[[int], object]] = {
-            "learn": lambda number: learn(file, number),
+            "learn": lambda _: confab(["learn", where, "--memory", str(file)]),
             "merge": lambda _: confab(["memory", "merge", str(file), str(other), "-o", str(file)]),
             "trust": lambda _: confab(["memory", "trust", str(file), "all"]),
             "migrate": lambda _: confab(["memory", "migrate", str(file), rename(file)]),
@@ -178,7 +228,7 @@ def main() -> int:
     kills, worst = int(sys.argv[2]) if len(sys.argv) > 2 else 100, 0
     print("| killed | times | answered before | acknowledged episodes lost, or files torn |\n|---|---|---|---|")
     for command in commands:
-        done, lost = trial(kills, command)
+        done, lost = crowd(kills) if command == "crowd" else trial(kills, command)
         worst = max(worst, lost)
         print(f"| `{COMMANDS[command]}` | {kills} | {done} | {lost} |", flush=True)
     return int(bool(worst))

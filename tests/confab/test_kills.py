@@ -1,6 +1,7 @@
 """A writer of a memory that is killed at any moment loses nothing acknowledged. More kills: `python -m benchmarks.kills`."""
 
 import random
+from contextlib import nullcontext
 
 import pytest
 
@@ -10,7 +11,12 @@ from confab.memory import Memory
 
 @pytest.mark.parametrize("command", ["learn", "migrate"])
 def test_a_kill_loses_no_acknowledged_episode(command: str) -> None:
-    _, lost = kills.trial(8, command)
+    _, lost = kills.trial(5, command)
+    assert lost == 0
+
+
+def test_eight_at_a_time_by_whichever_path_lose_nothing_though_one_is_killed() -> None:
+    _, lost = kills.crowd(5)
     assert lost == 0
 
 
@@ -24,4 +30,10 @@ def test_a_loss_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Memory, "save", forgetful)
     monkeypatch.setattr(random.Random, "uniform", lambda *_: 2.0)  # it ends before it is killed
     _, lost = kills.trial(2, "learn")
+    assert lost > 0
+
+
+def test_a_loss_among_eight_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kills, "alone", lambda _: nullcontext())  # nobody waits for anybody
+    _, lost = kills.crowd(3)
     assert lost > 0
