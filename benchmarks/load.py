@@ -3,7 +3,8 @@
     python -m benchmarks.load        1,000 at once, as docs/promises.md quotes them
     python -m benchmarks.load 200    so many
 
-All are open before the first has an answer. What is malformed has a broken line, header, length or query, or never ends.
+All are open before the first has an answer. What is malformed has a broken line, header, length or query; what is endless stops
+within its header, and what is slow sends a byte of it a second.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ MALFORMED = (
     POST + b"Transfer-Encoding: chunked\r\n\r\nzz\r\n",
     b"DELETE /sparql HTTP/1.1\r\nHost: localhost\r\n\r\n",
 )
+KINDS = ("whole", "malformed", "endless", "slow")
 PATIENCE = 300.0
 
 
@@ -57,7 +59,7 @@ class Gate:
         await self.open.wait()
 
 
-async def asked(port: int, request: bytes, all_open: Gate, endless: bool) -> tuple[str, bytes]:
+async def asked(port: int, request: bytes, all_open: Gate, kind: str) -> tuple[str, bytes]:
     """Open a connection, wait for all others, send a request; return how it was answered, and with what."""
     try:
         reader, writer = await asyncio.wait_for(asyncio.open_connection("127.0.0.1", port), PATIENCE)
@@ -66,9 +68,12 @@ async def asked(port: int, request: bytes, all_open: Gate, endless: bool) -> tup
         return type(error).__name__, b""
     try:
         await all_open.wait()
-        writer.write(request)
-        await writer.drain()
-        if not endless and request is not WHOLE:
+        for piece in (request,) if kind != "slow" else (request[i : i + 1] for i in range(len(request))):
+            writer.write(piece)
+            await writer.drain()
+            if kind == "slow":
+                await asyncio.sleep(1.0)
+        if kind == "malformed":
             writer.write_eof()
         answer = await asyncio.wait_for(reader.read(), PATIENCE)
     except (ConnectionError, OSError):
@@ -84,12 +89,12 @@ async def asked(port: int, request: bytes, all_open: Gate, endless: bool) -> tup
 async def crowd(port: int, many: int) -> list[tuple[str, str, bytes]]:
     """Send so many requests at once, half of them whole; return of each what it was and how it was answered."""
     draw, all_open = random.Random(0), Gate(many)
-    kinds = [draw.choice(("whole", "malformed", "endless")) if draw.random() < 0.5 else "whole" for _ in range(many)]
+    kinds = [draw.choice(KINDS) if draw.random() < 0.5 else "whole" for _ in range(many)]
     requests = [
         draw.choice(MALFORMED) if kind == "malformed" else WHOLE[:-9] if kind == "endless" else WHOLE for kind in kinds
     ]
     answers = await asyncio.gather(
-        *(asked(port, request, all_open, kind == "endless") for kind, request in zip(kinds, requests, strict=True))
+        *(asked(port, request, all_open, kind) for kind, request in zip(kinds, requests, strict=True))
     )
     return [(kind, *answer) for kind, answer in zip(kinds, answers, strict=True)]
 
@@ -104,7 +109,7 @@ def main() -> int:
         after = asyncio.run(crowd(server.server_port, 1))[0]
         left = len(list(Path("/proc/self/task").iterdir())) - threads
     print("| requests | at once | answered with |\n|---|---|---|")
-    for kind in ("whole", "malformed", "endless"):
+    for kind in KINDS:
         said = Counter(status for which, status, _ in found if which == kind)
         print(
             f"| {kind} | {said.total()} | {', '.join(f'{times} × {status}' for status, times in sorted(said.items()))} |"

@@ -12,15 +12,18 @@ machine isn't answered, whatever name the machine is called by.
 from __future__ import annotations
 
 import html
+import io
 import logging
 import queue
 import re
+import socket
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from string import Template
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -38,8 +41,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 PORT = 7879
-AT_ONCE, WAITING, LARGEST, SLOWEST = 2, 64, 1_000_000, 20.0
-"""Queries that are answered at once, connections that are open at once, bytes of a request, seconds to wait for one."""
+AT_ONCE, WAITING, LARGEST = 2, 64, 1_000_000
+"""Queries that are answered at once, connections that are open at once, bytes of a request."""
+SLOWEST, HURRIED = 20.0, 1.0
+"""Seconds that a whole request may take to come: as long as there is a place for others, and when there is none."""
 LOOPBACK = re.compile(r"(localhost|127(?:\.\d{1,3}){3}|\[::1\])(:\d+)?", re.IGNORECASE)
 ROWS = {
     "application/sparql-results+json": "sparql-json",
@@ -167,7 +172,8 @@ class Server(ThreadingHTTPServer):
 
     def __init__(self, port: int, service: Service) -> None:
         self.service = service
-        self._places = threading.BoundedSemaphore(WAITING)
+        self.unfinished: dict[socket.socket, float] = {}  # whose requests are waited for now, and since when
+        self._places, self._ends = threading.BoundedSemaphore(WAITING), threading.Event()
         super().__init__(("127.0.0.1", port), Handler)
 
     @property
@@ -176,9 +182,21 @@ class Server(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_port}/"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own, once there is a place for one more."""
-        self._places.acquire()
+        """Answer in a thread of its own, once there is a place for one more; who is slow, or idle, gives place."""
+        while not self._places.acquire(timeout=0.1):
+            if self._ends.is_set():
+                self.shutdown_request(request)
+                return
+            for connection, since in list(self.unfinished.items()):
+                if monotonic() - since > HURRIED:
+                    with suppress(OSError):
+                        connection.shutdown(socket.SHUT_RDWR)
         super().process_request(request, client_address)
+
+    def shutdown(self) -> None:
+        """End, also while connections wait for a place."""
+        self._ends.set()
+        super().shutdown()
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Answer, and give the place back."""
@@ -192,13 +210,50 @@ class Server(ThreadingHTTPServer):
         log.debug("%s: the connection broke", client_address, exc_info=True)
 
 
+class Incoming(io.RawIOBase):
+    """What comes from a connection: all of a request within `SLOWEST` seconds, however slowly its bytes drop in."""
+
+    def __init__(self, connection: socket.socket, server: Server) -> None:
+        self.connection, self.server, self.begin = connection, server, monotonic()
+
+    def readable(self) -> bool:
+        """Return that it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Wait for bytes, as long as there is time left for this request."""
+        left = self.begin + SLOWEST - monotonic()
+        if left <= 0:
+            raise TimeoutError(f"the request took more than {SLOWEST:.0f} s to come")
+        self.server.unfinished[self.connection] = self.begin
+        try:
+            self.connection.settimeout(left)
+            return self.connection.recv_into(buffer)
+        finally:
+            del self.server.unfinished[self.connection]
+            self.connection.settimeout(SLOWEST)
+
+
 class Handler(BaseHTTPRequestHandler):
-    """One request."""
+    """The requests of one connection."""
 
     server: Server
+    connection: socket.socket
     protocol_version = "HTTP/1.1"
     server_version = "confab"
     timeout = SLOWEST
+
+    def setup(self) -> None:
+        """Begin to read what comes."""
+        super().setup()
+        self.rfile.close()
+        self.incoming = Incoming(self.connection, self.server)
+        self.rfile = io.BufferedReader(self.incoming)
+
+    def handle_one_request(self) -> None:
+        """Answer the next request; its time begins now."""
+        self.incoming.begin = monotonic()
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer GET."""
@@ -246,7 +301,10 @@ class Handler(BaseHTTPRequestHandler):
             raise RefusedError(411, "wanted a Content-Length")
         if int(length) > LARGEST:
             raise RefusedError(413, f"a request has at most {LARGEST:,} bytes")
-        content = self.rfile.read(int(length))
+        try:
+            content = self.rfile.read(int(length))
+        except TimeoutError as error:
+            raise RefusedError(408, str(error)) from error
         if len(content) < int(length):
             raise RefusedError(400, "the request ends before its Content-Length")
         self.close_connection = False

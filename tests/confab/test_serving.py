@@ -7,6 +7,8 @@ import socket
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from time import monotonic, sleep
 from urllib.parse import urlencode
 
 import pytest
@@ -195,6 +197,61 @@ def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, 
         assert {task.result() for task in asking} == {200}
     assert pool.request("GET", f"{server.url}sparql?{urlencode({'query': CUPS})}").status == 200
     assert threading.active_count() < 120
+
+
+def test_clients_that_trickle_or_idle_hold_nobody_up(
+    monkeypatch: pytest.MonkeyPatch, pool: urllib3.PoolManager
+) -> None:
+    monkeypatch.setattr("confab.serving.WAITING", 3)
+    monkeypatch.setattr("confab.serving.HURRIED", 0.2)
+    with serving(confab.load("living-room"), 0) as server:
+        slow = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(9)]
+        stop = threading.Event()
+
+        def trickle() -> None:
+            while not stop.wait(0.05):
+                for connection in slow:
+                    with suppress(OSError):
+                        connection.send(b"G")
+
+        trickling = threading.Thread(target=trickle)
+        trickling.start()
+        assert pool.request("GET", server.url, timeout=10.0).status == 200
+        stop.set()
+        trickling.join()
+        for connection in slow:
+            connection.close()
+
+
+@pytest.mark.parametrize("begun", [b"GET / HT", b"POST /sparql HTTP/1.1\r\nContent-Length: 99\r\n\r\n"])
+def test_a_request_has_one_time_to_come_in_however_it_trickles(monkeypatch: pytest.MonkeyPatch, begun: bytes) -> None:
+    monkeypatch.setattr("confab.serving.SLOWEST", 0.5)
+    with (
+        serving(confab.load("living-room"), 0) as server,
+        socket.create_connection(("127.0.0.1", server.server_port), timeout=10.0) as slow,
+    ):
+        slow.sendall(begun)
+        begin, answer = monotonic(), b""
+        with suppress(OSError):
+            while monotonic() - begin < 5.0 and b"\n" not in answer:
+                slow.send(b"x")
+                slow.settimeout(0.1)
+                with suppress(TimeoutError):
+                    answer += slow.recv(1000)
+                    if not answer:
+                        break
+        assert monotonic() - begin < 5.0
+        assert answer == b"" or b" 408 " in answer
+
+
+def test_it_ends_though_connections_wait_for_a_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("confab.serving.WAITING", 1)
+    monkeypatch.setattr("confab.serving.HURRIED", 60.0)
+    with serving(confab.load("living-room"), 0) as server:
+        waiting = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(4)]
+        sleep(0.2)
+    for connection in waiting:
+        connection.close()
 
 
 def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
