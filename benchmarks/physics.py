@@ -7,6 +7,7 @@
     python -m benchmarks.physics speed        rollouts per minute by workers, and on a Ray cluster
     python -m benchmarks.physics perception   perception held against the truth over thirty random scenes
     python -m benchmarks.physics 5000 5020    perturbed rollouts of the beverage-serving plan, one per seed
+    python -m benchmarks.physics 5000 5020 three-cups    the same of another scene's plan
 
 Seeds from 5000 are for development: what fails there may be mended. Seeds from 9000 are for reporting only.
 """
@@ -158,9 +159,9 @@ def die_once(mark: Path, world: World) -> None:
     os._exit(9)
 
 
-def perturbed(seeds: Sequence[int], workers: int | str = WORKERS) -> None:
-    """Print perturbed rollouts of the beverage-serving plan, and how many were verified."""
-    one, begin = case("beverage-serving", Perturbation()), time.perf_counter()
+def perturbed(seeds: Sequence[int], scene: str = "beverage-serving", workers: int | str = WORKERS) -> None:
+    """Print perturbed rollouts of a scene's plan, and how many were verified."""
+    one, begin = case(scene, Perturbation()), time.perf_counter()
     done = rollouts(one, seeds, workers, lambda rollout: print(rollout.seed, line(rollout), flush=True))
     good, shares = sum(rollout.ok for rollout in done), [share for rollout in done for share in rollout.poured]
     low, high = wilson(good, len(done))
@@ -180,8 +181,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) == 3:
-        perturbed(range(int(sys.argv[1]), int(sys.argv[2])))
+    if len(sys.argv) >= 3:
+        perturbed(range(int(sys.argv[1]), int(sys.argv[2])), *sys.argv[3:])
     elif len(sys.argv) == 2:
         parts: dict[str, Callable[[], object]] = {"plans": plans, "film": film, "same": same_seed, "speed": speed}
         (parts | {"perception": perception})[sys.argv[1]]()

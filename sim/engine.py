@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,7 @@ class Engine:
         self.errors: dict[str, tuple[int, Array]] = {}  # by body: when it was looked at, how far off it was seen
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
+        self.filled: dict[str, float] = {}
         self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
@@ -310,6 +312,14 @@ class Engine:
         if not self.beads:
             return float(filling in self.contents.get(vessel, ()))
         return self.inside(vessel, filling, sensed=True) / self.embodiment.fillings[filling].serving
+
+    def servings(self, vessel: str) -> Fraction:
+        """Return how many servings a vessel contains, as the robot perceives it; without beads, as it is counted."""
+        if not self.beads:
+            return Fraction(
+                self.filled.get(vessel, self.embodiment.bodies[vessel].servings if self.contents.get(vessel) else 0)
+            )
+        return sum((Fraction(self.amount(vessel, name)) for name in self.embodiment.fillings), Fraction(0))
 
     def stray(self) -> int:
         """Return how many beads are in no vessel."""

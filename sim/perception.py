@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from importlib.metadata import entry_points
 
 import numpy as np
 
+from reasoner.amounts import written
 from reasoner.embodiment.values import PerceiverUse
 from sim.bodies import height_of
 from sim.engine import Engine
@@ -27,6 +29,7 @@ class Draft:
 
     places: dict[str, str] = field(default_factory=dict)
     contents: dict[str, list[str]] = field(default_factory=dict)
+    servings: dict[str, float] = field(default_factory=dict)
     opened: dict[str, bool] = field(default_factory=dict)
 
 
@@ -86,6 +89,19 @@ def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...],
     """Fill the vessel, unless the value is `empty`."""
     if value != use.values["empty"]:
         draft.contents.setdefault(arguments[0], []).append(value)
+
+
+def observe_servings(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return how many servings the vessel contains, to the nearest `grain`."""
+    if arguments[0] not in world.bodies:
+        return None
+    grain = Fraction(str(use.numbers["grain"]))
+    return written(round(world.servings(arguments[0]) / grain) * grain)
+
+
+def arrange_servings(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Have what the vessel is filled with be so much."""
+    draft.servings[arguments[0]] = float(Fraction(value))
 
 
 # ------------------------------------------------------------------------------------------ what a hand does
@@ -171,6 +187,7 @@ def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...]
 BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_place": Perceiver(observe_place, arrange_place, "misplaced", True),
     "perceive_content": Perceiver(observe_content, arrange_content, "under-pour"),
+    "perceive_servings": Perceiver(observe_servings, arrange_servings, "under-pour"),
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
     "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True),

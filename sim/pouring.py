@@ -82,6 +82,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
         _check_pour(source, target, measured, numbers)
     elif filling is not None:
         world.contents.setdefault(target, []).append(filling)
+        world.filled[source] = float(world.servings(source)) - 1
     attempt.check_others(numbers)
     return measured
 

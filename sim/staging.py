@@ -88,6 +88,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
         engine.names[body] = name
         engine.bodies[name] = Thing(body, shape)
     engine.contents = {name: list(fillings) for name, fillings in draft.contents.items()}
+    engine.filled = dict(draft.servings)
     if beads:
         for name, filling in ((name, filling) for name, all_in in draft.contents.items() for filling in all_in):
             pour_in(engine, name, filling, perturb)
@@ -120,7 +121,7 @@ def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | Non
     """Let a vessel's beads go just above its bottom; PyBullet shows them only in a window."""
     kind = engine.embodiment.fillings[filling]
     share = 1.0 if perturb is None else float(engine.rng.uniform(*perturb.fill))
-    count = round(kind.serving * engine.embodiment.bodies[name].servings * share)
+    count = round(kind.serving * engine.filled.get(name, engine.embodiment.bodies[name].servings) * share)
     rotation, base = engine.truth(name)
     collision = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=kind.radius, physicsClientId=engine.client)
     look: dict[str, Any] = {"shapeType": pybullet.GEOM_MESH, "vertices": SPECK, "indices": [0, 1, 2]}

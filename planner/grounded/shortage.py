@@ -127,18 +127,23 @@ def _left(
         ]
         return max(found, default=None)
 
+    def kept(place: int) -> Fraction | None:
+        """Return what no operator takes of an amount, as far as each asks for more than it takes."""
+        least = Fraction(vector[place])
+        for o, its in moves.items():
+            for move in its:
+                if move.place == place:
+                    before = asked(needs[o], place)
+                    if before is None or move.by is None or move.by.terms or move.operation != "decrease":
+                        return None
+                    least = min(least, before - Fraction(move.by.constant))
+        return least
+
     total = Fraction(0)
     for place in places:
-        least = amounts.quantities[place].least
-        if least is None:
-            least = Fraction(vector[place])
-            for o, its in moves.items():
-                for move in its:
-                    if move.place == place:
-                        before = asked(needs[o], place)
-                        if before is None or move.by is None or move.by.terms or move.operation != "decrease":
-                            return None
-                        least = min(least, before - Fraction(move.by.constant))
+        floor = [limit for limit in (amounts.quantities[place].least, kept(place)) if limit is not None]
         wanted = asked(bits_of(task.goal), place)
-        total += least if wanted is None else max(least, wanted)
+        if not floor:
+            return None
+        total += max(floor) if wanted is None else max(*floor, wanted)
     return total

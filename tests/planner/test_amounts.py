@@ -86,6 +86,18 @@ def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted
     assert outcome.reason.text == said
 
 
+def test_what_each_step_leaves_counts_as_missing_too() -> None:
+    problem = confab.load("three-cups").problem
+    assert solve(Request(problem)).status is Status.SOLVED
+    less = {**problem.initial, Symbol("SERVINGS", ("bottle1",)): "3"}  # of which a pour wants two
+    outcome = solve(Request(replace(problem, initial=less)))
+    assert outcome.reason is not None
+    assert (
+        outcome.reason.text
+        == "SERVINGS of bottle1, bottle2: 4 servings are there, 5 are wanted, and nothing gives more"
+    )
+
+
 def test_a_goal_has_bounds_and_other_goals_dont_break_it() -> None:
     problem = pouring("1", 2, Fraction(1))
     problem = replace(problem, goal={**problem.goal, Symbol("TEA", ("jug",)): bounds_written(">=2,<3")})

@@ -66,6 +66,21 @@ def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     assert dict(rollout.state) == dict(one.expected[-1])
 
 
+def test_a_bottle_of_four_servings_fills_three_cups_and_is_seen_to_have_one_left() -> None:
+    one = case("three-cups")
+    assert [str(v) for s, v in one.initial.items() if s.situation == "SERVINGS"] == ["4", "1"]
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected)
+    assert rollout.failure is None
+    assert len(rollout.poured) == 3
+    assert min(rollout.poured) >= 0.8
+    assert {s.arguments[0]: v for s, v in rollout.state.items() if s.situation == "SERVINGS"} == {
+        "bottle1": "1",
+        "bottle2": "1",
+    }
+    without = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
+    assert without.failure is None  # what isn't seen as beads is counted
+
+
 @pytest.mark.slow
 def test_the_plan_after_the_user_moved_a_cup_verifies_with_the_same_result_in_another_process(moved: Case) -> None:
     rollout = verify(moved.embodiment, moved.initial, moved.steps, moved.expected, seed=5)
