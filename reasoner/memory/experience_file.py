@@ -238,7 +238,8 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 if "false" in node.get("enabled", ()):
                     experience.disabled.add(one.name)
             if "episodes" in node:
-                experience.episodes[node["replica"][0]] = _count(node["episodes"][0], "episodes")
+                several = [_count(text, "episodes") for text in node["episodes"]]  # of an older and a newer copy
+                experience.episodes[node["replica"][0]] = max(several)
             if "chosen" in node:  # the paper's links have a probability alone
                 counter, target = (
                     _local(reader.one(subject, OWL + end)) for end in ("annotatedSource", "annotatedTarget")

@@ -1,0 +1,80 @@
+"""What a condition names, needs and holds inside, kind by kind: who searches rests on it."""
+
+from fractions import Fraction
+
+import pytest
+
+from planner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
+from reasoner.amounts import Amount, Calculation, Measure
+from reasoner.symbols import (
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    Witness,
+)
+from worlds.writing import has, lacks
+
+AT, NOT_AT = has("AT", "?c", "?p"), lacks("AT", "?c", "?p")
+NEAR, KIND, SAME = RelationCondition("near", ("?p", "door")), ClassCondition("?c", "Cup"), EqualityCondition("?c", "?d")
+FULL = Comparison(Calculation("+", Amount("FILL", ("?c",)), Fraction(1)), "<", Measure("size", ("?c", "?d")))
+LOOKED_FOR = Witness(
+    "?o", "Cup", (has("AT", "?o", "?p"), has("IN", "?p", "?room"), lacks("AT", "?o", "?q")), negated=True
+)
+EITHER = AnyOf(((has("AT", "?c", "?p"), NEAR), (KIND, SAME)))
+
+
+@pytest.mark.parametrize(
+    ("condition", "named", "mentioned", "needed"),
+    [
+        (AT, ("?c", "?p"), {"?c", "?p"}, {"?c"}),
+        (NOT_AT, ("?c", "?p"), {"?c", "?p"}, {"?c", "?p"}),
+        (has("AT", "cup1", "?p"), ("cup1", "?p"), {"?p"}, set()),
+        (NEAR, ("?p", "door"), {"?p"}, {"?p"}),
+        (KIND, ("?c",), {"?c"}, {"?c"}),
+        (SAME, ("?c", "?d"), {"?c", "?d"}, {"?c", "?d"}),
+        (FULL, ("?c", "?c", "?d"), {"?c", "?d"}, {"?c", "?d"}),
+        # It finds out ?p by itself, and with it ?room; but who isn't at ?q can't be told without ?q.
+        (LOOKED_FOR, (), {"?p", "?room", "?q"}, {"?q"}),
+        (EITHER, (), {"?c", "?p", "?d"}, {"?c", "?d"}),
+        (Witness("?o", "Cup", (NEAR,)), (), {"?p"}, {"?p"}),
+        (AnyOf(((LOOKED_FOR,), (NEAR,))), (), {"?p", "?room", "?q"}, {"?p", "?q"}),
+    ],
+)
+def test_what_a_condition_names_mentions_and_needs(
+    condition: Condition, named: tuple[str, ...], mentioned: set[str], needed: set[str]
+) -> None:
+    assert terms(condition) == named
+    assert mentions(condition) == mentioned
+    assert needs(condition) == needed
+
+
+def test_variables_begin_with_a_question_mark() -> None:
+    assert [is_variable(term) for term in ("?c", "cup1", "c?", "")] == [True, False, False, False]
+
+
+def test_what_is_inside_comes_group_by_group_and_after_what_holds_it() -> None:
+    assert [groups(c) for c in (AT, NEAR, KIND, SAME, FULL)] == [()] * 5
+    assert groups(LOOKED_FOR) == (LOOKED_FOR.conditions,)
+    assert groups(EITHER) == EITHER.alternatives
+    nested = AnyOf(((LOOKED_FOR, KIND), (SAME,)))
+    assert list(walk(nested)) == [nested, LOOKED_FOR, *LOOKED_FOR.conditions, KIND, SAME]
+
+
+def test_relations_that_give_numbers_are_found_wherever_they_are_asked_for() -> None:
+    size, way, load = (Measure(name, ("?c",)) for name in ("size", "way", "load"))
+    one = Behavior("A", 1, (), preconditions=(Witness("?o", "Cup", (Comparison(size, "<", Fraction(1)),)), NEAR))
+    two = Behavior("B", 1, (), amounts=(AmountEffect("FILL", ("?c",), "increase", Calculation("*", way, Fraction(2))),))
+    other_side = Behavior("C", 1, (), preconditions=(AnyOf(((Comparison(Amount("FILL", ("?c",)), "=", load),),)),))
+    assert measures([one, two, other_side]) == {"size", "way", "load"}
+    assert measures([one]) == {"size"}
+    assert measures([]) == frozenset()
+
+
+def test_what_nothing_determines_is_said() -> None:
+    error = nothing_determines("B1_MOVE", [NOT_AT, SAME, AT], {"?c", "?room"})
+    assert str(error) == "B1_MOVE: nothing determines ?d, ?p; add a value condition that does"

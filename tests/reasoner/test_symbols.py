@@ -1,0 +1,297 @@
+"""The values that everybody plans with mean what they say: numbers, levels, rest, and conditions with other terms put in."""
+
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from fractions import Fraction
+
+import pytest
+
+from reasoner import symbols
+from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Fact,
+    GroundBehavior,
+    Parameter,
+    Problem,
+    RelationCondition,
+    Rule,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+    allowed,
+    spread,
+    substituted,
+)
+from worlds.writing import becomes, behavior, has, lacks, world
+
+HALF = Fraction(1, 2)
+
+
+def small() -> Problem:
+    """Two cups, three places one of which only level 2 knows, a door at rest when shut and a lamp that is at rest when off."""
+    return world(
+        [
+            SituationType("AT", ("Cup",), "Place"),
+            SituationType("DOOR", ("Door",), "DOOR", level=2, rest="shut"),
+            SituationType("LIT", ("Lamp",), "Truth", rest=FALSE, boolean=True),
+            SituationType("HOT", ("Cup",), "Truth", rest=FALSE, boolean=True),
+        ],
+        [
+            behavior("PUT", 2, "?c:Cup ?p:Place", [], [becomes("AT", "?c", "?p")]),
+            behavior("BRING", 1, "?c:Cup ?p:Place", [], [becomes("AT", "?c", "?p")]),
+            behavior("LIGHT", 2, "?l:Lamp", [], [becomes("LIT", "?l", TRUE)]),
+            behavior("WAIT", 1, "", [], []),
+        ],
+        {"Cup": ("cup1", "cup2"), "Place": ("shelf", "table", "drawer"), "Door": ("door",), "Lamp": ("lamp1", "lamp2"),
+         "DOOR": ("open", "shut")},
+        {"AT cup1": "shelf", "AT cup2": "shelf", "DOOR door": "shut", "LIT lamp1": TRUE},
+        {"AT cup1": "table"},
+        value_levels={"drawer": 2},
+    )  # fmt: skip
+
+
+def test_values_cannot_be_changed_and_what_is_not_said_of_them_is_plain() -> None:
+    kinds = [kind for kind in vars(symbols).values() if isinstance(kind, type) and is_dataclass(kind)]
+    assert len(kinds) > 15
+    for kind in kinds:
+        one = object.__new__(kind)
+        with pytest.raises(FrozenInstanceError):
+            setattr(one, fields(kind)[0].name, "other")
+    plain = (has("A", "x"), RelationCondition("near", ()), ClassCondition("x", "A"), EqualityCondition("x", "y"),
+             Witness("?x", "A", ()), AnyOf(()), Comparison(HALF, "<", HALF))  # fmt: skip
+    assert not any(condition.negated for condition in plain)
+    assert (SituationType("A", (), "A").level, SituationType("A", (), "A").boolean) == (1, False)
+    assert Behavior("DO", 1, ()).cost == 1.0
+
+
+def test_facts_and_steps_are_said_as_people_write_them() -> None:
+    near = Symbol("NEAR", ("cup1", "shelf"))
+    assert str(near) == "<cup1, shelf, NEAR>"
+    assert str(Fact(near, TRUE)) == "cup1 NEAR shelf true"
+    assert str(GroundBehavior(22, "PUT", ("cup1", "table"))) == "22 PUT cup1 table"
+
+
+def test_ids_count_behaviours_then_parameters_as_they_are_declared_on_each_level_anew() -> None:
+    problem = replace(small(), domain=replace(small().domain, first_ids={2: 7}))
+    ids = {
+        (name, arguments): problem.id_of(name, arguments)
+        for name, arguments in (
+            ("BRING", ("cup1", "shelf")),
+            ("BRING", ("cup1", "drawer")),
+            ("BRING", ("cup2", "shelf")),
+            ("WAIT", ()),
+            ("PUT", ("cup1", "shelf")),
+            ("PUT", ("cup2", "drawer")),
+            ("LIGHT", ("lamp2",)),
+        )
+    }
+    assert list(ids.values()) == [0, 2, 3, 6, 7, 12, 14]
+    with pytest.raises(ValueError, match="argument"):
+        problem.id_of("PUT", ("cup1",))
+
+
+def test_levels_are_those_that_have_behaviours() -> None:
+    domain = small().domain
+    assert domain.levels == (1, 2)
+    assert [b.name for b in domain.at_level(1)] == ["BRING", "WAIT"]
+    assert domain.at_level(3) == ()
+
+
+def test_a_level_sees_what_exists_on_it() -> None:
+    problem = small()
+    at, door, of_drawer = Symbol("AT", ("cup1",)), Symbol("DOOR", ("door",)), Symbol("AT", ("drawer",))
+    assert problem.values(at, 1) == ("shelf", "table")
+    assert problem.values(at, 2) == ("shelf", "table", "drawer")
+    assert [problem.first_level(symbol) for symbol in (at, door, of_drawer)] == [1, 2, 2]
+    assert problem.sees(1, at, "table")
+    assert not problem.sees(1, at, "drawer")
+    assert problem.sees(2, at, "drawer")
+    assert not problem.sees(1, door, "shut")
+    assert problem.sees(2, door, "shut")
+    assert problem.members("Cup") == {"cup1", "cup2"}
+    assert problem.members("Plate") == frozenset()
+
+
+def test_what_a_level_finds_at_rest_is_to_be_so_in_the_end_but_for_what_is_wanted_otherwise() -> None:
+    problem = small()
+    assert problem.at_rest(1) == {}
+    # The second lamp is off though nobody says so, and the level can change that; nothing makes cups hot.
+    assert problem.at_rest(2) == {Symbol("DOOR", ("door",)): "shut", Symbol("LIT", ("lamp2",)): FALSE}
+    wanted = replace(problem, goal={Symbol("DOOR", ("door",)): "open"})
+    assert wanted.goal_on(2) == {Symbol("DOOR", ("door",)): "open", Symbol("LIT", ("lamp2",)): FALSE}
+    stated = replace(problem, initial={**problem.initial, Symbol("LIT", ("lamp2",)): TRUE})
+    assert Symbol("LIT", ("lamp2",)) not in stated.at_rest(2)
+
+
+def test_effects_stand_in_the_order_in_which_they_are_made() -> None:
+    true, false, other = becomes("LIT", "?l", TRUE), becomes("LIT", "?l", FALSE), becomes("AT", "?c", "?p")
+    grow, double, fix = (AmountEffect("FILL", ("?c",), how, HALF) for how in ("increase", "scale", "assign"))
+    made = replace(behavior("DO", 1, "?l:Lamp", [], [true, other, false]), amounts=(grow, double, fix))
+    assert made.effects == (false, true, other)
+    assert made.amounts == (fix, double, grow)
+    assert made.every_effect == (false, true, other, fix, double, grow)
+    assert made.changes == {"LIT", "AT", "FILL"}
+
+
+def test_conditions_of_effects_are_conditions_of_the_behaviour() -> None:
+    asked, when = has("AT", "?c", "shelf"), lacks("LIT", "?l", TRUE)
+    made = behavior("DO", 1, "?c:Cup", [asked], [becomes("AT", "?c", "table", when=(when,))], "?l:Lamp")
+    assert made.conditions == (asked, when)
+    assert made.kinds == {"?c": "Cup", "?l": "Lamp"}
+
+
+def test_a_rule_is_a_behaviour_that_makes_its_situation_type_true() -> None:
+    condition = has("AT", "?c", "?p")
+    rule = Rule("STANDS", (Parameter("?c", "Cup"),), (Parameter("?p", "Place"),), (condition,))
+    made = rule.behavior
+    assert (made.name, made.level, made.cost) == ("STANDS", 1, 0.0)
+    assert (made.parameters, made.variables, made.preconditions) == (rule.parameters, rule.variables, (condition,))
+    assert made.effects == (ValueEffect("STANDS", ("?c",), TRUE),)
+
+
+def test_what_a_price_asks_is_told_from_what_the_behaviour_asks() -> None:
+    free = behavior("DO", 1, "?c:Cup", [has("AT", "?c", "shelf")], [])
+    assert free.priced is None
+    assert free.asked == free.preconditions
+    priced = replace(free, price=Amount("FILL", ("?c",)))
+    assert priced.priced == Comparison(Amount("FILL", ("?c",)), ">=", Fraction(0))
+    asks = replace(priced, preconditions=(*free.preconditions, priced.priced))
+    assert asks.asked == free.preconditions
+
+
+# --------------------------------------------------------------------------------------------------------- substituted
+
+
+@pytest.mark.parametrize("negated", [False, True])
+def test_terms_are_put_in_everywhere_and_nothing_else_changes(negated: bool) -> None:
+    put = {"?a": "cup1", "?b": "shelf"}
+    fill, way = Amount("FILL", ("?a",)), Measure("way", ("?a", "?b"))
+    pairs: list[tuple[Condition, Condition]] = [
+        (ValueCondition("AT", ("?a", "?x"), "?b", negated), ValueCondition("AT", ("cup1", "?x"), "shelf", negated)),
+        (RelationCondition("near", ("?x", "?a"), negated), RelationCondition("near", ("?x", "cup1"), negated)),
+        (ClassCondition("?b", "Place", negated), ClassCondition("shelf", "Place", negated)),
+        (EqualityCondition("?a", "?b", negated), EqualityCondition("cup1", "shelf", negated)),
+        (EqualityCondition("?x", "?y", negated), EqualityCondition("?x", "?y", negated)),
+        (
+            Comparison(Calculation("+", fill, HALF), "<", way, negated),
+            Comparison(
+                Calculation("+", Amount("FILL", ("cup1",)), HALF), "<", Measure("way", ("cup1", "shelf")), negated
+            ),
+        ),
+        (
+            AnyOf(((has("AT", "?a", "?b"),), (ClassCondition("?a", "Cup"), lacks("LIT", "?x", TRUE))), negated),
+            AnyOf(((has("AT", "cup1", "shelf"),), (ClassCondition("cup1", "Cup"), lacks("LIT", "?x", TRUE))), negated),
+        ),
+        (
+            Witness("?o", "Cup", (has("AT", "?o", "?b"), lacks("AT", "?a", "?b")), negated),
+            Witness("?o", "Cup", (has("AT", "?o", "shelf"), lacks("AT", "cup1", "shelf")), negated),
+        ),
+    ]
+    for before, after in pairs:
+        assert substituted(before, put) == after
+
+
+def test_who_is_looked_for_is_neither_replaced_nor_confused_with_what_is_put_in() -> None:
+    free = Witness("?o", "Cup", (has("AT", "?o", "?p"),), negated=True)
+    assert substituted(free, {"?o": "cup1"}) == free
+    captured = substituted(free, {"?p": "?o"})
+    assert isinstance(captured, Witness)
+    assert captured.variable != "?o"
+    assert captured.conditions == (has("AT", captured.variable, "?o"),)
+
+
+# -------------------------------------------------------------------------------------------------- spread and allowed
+
+
+def test_an_effect_on_each_of_a_class_is_one_effect_for_every_individual() -> None:
+    each = Parameter("?x", "Cup")
+    moved = ValueEffect("AT", ("?x",), "?p", (has("AT", "?x", "tray"),), each)
+    same = ValueEffect("TOLD", ("tray",), "?x", (), each)
+    emptied = AmountEffect("FILL", ("?x",), "increase", Measure("size", ("?x",)), (ClassCondition("?x", "Cup"),), each)
+    lifted = replace(
+        behavior("CARRY", 1, "?p:Place", [], [moved, same, becomes("LIT", "lamp", TRUE)]), amounts=(emptied,)
+    )
+    found = spread(lifted, {"Cup": ("cup1", "cup2")})
+    assert set(found.effects) == {
+        ValueEffect("AT", ("cup1",), "?p", (has("AT", "cup1", "tray"),)),
+        ValueEffect("AT", ("cup2",), "?p", (has("AT", "cup2", "tray"),)),
+        ValueEffect("TOLD", ("tray",), "cup1"),
+        ValueEffect("TOLD", ("tray",), "cup2"),
+        becomes("LIT", "lamp", TRUE),
+    }
+    assert set(found.amounts) == {
+        AmountEffect("FILL", (c,), "increase", Measure("size", (c,)), (ClassCondition(c, "Cup"),))
+        for c in ("cup1", "cup2")
+    }
+    assert found.spread == {"cup1", "cup2"}
+    assert spread(found, {"Cup": ("cup1", "cup2")}) is found
+    assert spread(lifted, {}).effects == (becomes("LIT", "lamp", TRUE),)
+
+
+@pytest.mark.parametrize(
+    ("preconditions", "effects"),
+    [([has("AT", "cup1", "shelf")], []), ([], [becomes("AT", "cup1", "shelf")]), ([], [becomes("ON", "tray", "cup1")])],
+)
+def test_who_is_named_besides_is_not_only_one_of_a_class(
+    preconditions: list[Condition], effects: list[ValueEffect]
+) -> None:
+    moved = ValueEffect("AT", ("?x",), "?p", (), Parameter("?x", "Cup"))
+    found = spread(behavior("CARRY", 1, "?p:Place", preconditions, [moved, *effects]), {"Cup": ("cup1", "cup2")})
+    assert found.spread == {"cup2"}
+
+
+FILL, SIZE = Amount("FILL", ("?c",)), Measure("size", ("?c",))
+
+
+@pytest.mark.parametrize(
+    ("operation", "by", "after"),
+    [
+        ("increase", HALF, Calculation("+", FILL, HALF)),
+        ("decrease", SIZE, Calculation("-", FILL, SIZE)),
+        ("scale", HALF, Calculation("*", FILL, HALF)),
+    ],
+)
+def test_what_changes_an_amount_asks_that_it_stays_within_its_bounds(
+    operation: str, by: Expression, after: Expression
+) -> None:
+    def asked(least: Fraction | None, most: Fraction | None, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
+        kinds = {"FILL": SituationType("FILL", ("Cup",), "FILL", quantity=Quantity("", least=least, most=most))}
+        effect = AmountEffect("FILL", ("?c",), operation, by, when)
+        return allowed(Behavior("POUR", 1, (Parameter("?c", "Cup"),), amounts=(effect,)), kinds)
+
+    least, most = Comparison(after, "<", Fraction(0), negated=True), Comparison(after, ">", Fraction(9), negated=True)
+    assert asked(None, None) == ()
+    assert asked(Fraction(0), None) == (least,)
+    assert asked(None, Fraction(9)) == (most,)
+    assert asked(Fraction(0), Fraction(9)) == (least, most)
+    when = (ClassCondition("?c", "Cup"),)
+    assert asked(Fraction(0), None, when=when) == (AnyOf(((*when, replace(least, negated=False)),), negated=True),)
+
+
+def test_an_assigned_amount_is_held_within_bounds_where_there_is_one() -> None:
+    kinds = {"FILL": SituationType("FILL", ("Cup",), "FILL", quantity=Quantity("", least=Fraction(0)))}
+    (asked,) = allowed(Behavior("FIX", 1, (), amounts=(AmountEffect("FILL", ("?c",), "assign", SIZE),)), kinds)
+    there = Comparison(FILL, "=", FILL)
+    assert asked == AnyOf(((there, Comparison(SIZE, "<", Fraction(0))),), negated=True)
+
+
+def test_bounds_that_conditions_cannot_say_are_left_to_who_applies_the_effects() -> None:
+    kinds = {
+        name: SituationType(name, ("Cup",), name, quantity=Quantity("", least=Fraction(0))) for name in ("FILL", "HEAT")
+    }
+    twice = tuple(AmountEffect("FILL", (c,), "decrease", HALF) for c in ("?c", "?d"))
+    assert allowed(Behavior("POUR", 1, (), amounts=twice), kinds) == ()
+    by_another = AmountEffect("FILL", ("?c",), "scale", Amount("HEAT", ("?c",)))
+    assert allowed(Behavior("BOIL", 1, (), amounts=(by_another,)), kinds) == ()
+    one_of_each = (twice[0], AmountEffect("HEAT", ("?c",), "decrease", HALF))
+    assert len(allowed(Behavior("POUR", 1, (), amounts=one_of_each), kinds)) == 2
