@@ -31,7 +31,7 @@ from sim.perception import tilt_of
 from sim.robot import Manipulator
 from sim.stages import MARGIN, Numbers, Stage
 from sim.urdf import Array
-from sim.verdict import SkillError
+from sim.verdict import SkillError, named
 
 CLOSE = 0.002
 """Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
@@ -337,8 +337,3 @@ def _gaps(
             spare = MARGIN - CLOSE if stage.near else 0.0
             nearest[name] = np.minimum(gap + spare, nearest.get(name, np.inf))
     return nearest
-
-
-def named(*objects: str) -> tuple[str, ...]:
-    """Return each object once, in order."""
-    return tuple(dict.fromkeys(objects))

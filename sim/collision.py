@@ -57,8 +57,13 @@ class Surroundings:
     owners: tuple[str, ...] = ()
 
     def without(self, *names: str) -> Surroundings:
-        """Return the surroundings less the solids, or parts, of these names."""
-        return replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
+        """Return the surroundings less the solids, parts or robots of these names."""
+        left = replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
+        if names and (gone := {*names} & {*self.owners}):
+            kept = np.array([owner not in gone for owner in self.owners])
+            owners = tuple(owner for owner in self.owners if owner not in gone)
+            left = replace(left, centers=self.centers[kept], radii=self.radii[kept], owners=owners)
+        return left
 
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
         """Return the surroundings with more spheres."""
@@ -94,22 +99,26 @@ class Mover:
 
     def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
         """Return, for everything that is near, its distance (n,) from the arm at each posture."""
-        centers, radii = self.at(q), self.spheres.radii
-        low, high = (centers - radii[:, None]).min((0, 1)) - 0.05, (centers + radii[:, None]).max((0, 1)) + 0.05
-        found: dict[str, Array] = {}
-        for solid in around.solids:
-            bottom, top = solid.bounds()
-            if np.all(bottom <= high) and np.all(top >= low):
-                gap = (solid.distance(centers) - radii).min(1)
-                found[solid.name] = np.minimum(gap, found.get(solid.name, np.inf))
-        near = np.all(
-            (around.centers + around.radii[:, None] >= low) & (around.centers - around.radii[:, None] <= high), -1
-        )
-        for owner in dict.fromkeys(name for name, close in zip(around.owners, near, strict=True) if close):
-            own = near & np.array([name == owner for name in around.owners])
-            gaps = np.linalg.norm(centers[:, :, None] - around.centers[own], axis=-1)
-            found[owner] = (gaps - radii[:, None] - around.radii[own]).min((1, 2))
-        return found
+        return clearances(self.at(q), self.spheres.radii, around)
+
+
+def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, Array]:
+    """Return, for everything that is near, its distance (n,) from spheres (m,) that are at centres (n, m, 3)."""
+    low, high = (centers - radii[:, None]).min((0, 1)) - 0.05, (centers + radii[:, None]).max((0, 1)) + 0.05
+    found: dict[str, Array] = {}
+    for solid in around.solids:
+        bottom, top = solid.bounds()
+        if np.all(bottom <= high) and np.all(top >= low):
+            gap = (solid.distance(centers) - radii).min(1)
+            found[solid.name] = np.minimum(gap, found.get(solid.name, np.inf))
+    near = np.all(
+        (around.centers + around.radii[:, None] >= low) & (around.centers - around.radii[:, None] <= high), -1
+    )
+    for owner in dict.fromkeys(name for name, close in zip(around.owners, near, strict=True) if close):
+        own = near & np.array([name == owner for name in around.owners])
+        gaps = np.linalg.norm(centers[:, :, None] - around.centers[own], axis=-1)
+        found[owner] = (gaps - radii[:, None] - around.radii[own]).min((1, 2))
+    return found
 
 
 def box(fixture: Fixture) -> Solid:

@@ -17,6 +17,7 @@ import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Embodiment, Shape
+from sim.base import Base
 from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
 from sim.collision import Solid, Surroundings, box, column
 from sim.mechanisms import Mechanic
@@ -92,6 +93,7 @@ class Engine:
         self.names: dict[int, str] = {}
         self.bodies: dict[str, Thing] = {}
         self.hands: dict[str, Manipulator] = {}
+        self.bases: dict[str, Base] = {}
         self.standing: dict[str, Spheres] = {}
         self.mechanics: list[Mechanic] = []
         self.links: dict[str, Mechanic] = {}  # by the names of their links
@@ -283,6 +285,11 @@ class Engine:
             gaps, key=lambda name: (below[name] < -BESIDE, round(gaps[name], 2), max(below[name], 0.0), gaps[name])
         )
         return best, gaps[best]
+
+    def acting(self, roles: Mapping[str, str]) -> str:
+        """Return the hand of a skill's roles, of a robot that acts as a whole the first; empty if there is none."""
+        own = (name for name, hand in self.hands.items() if hand.robot.name == roles.get("robot"))
+        return roles.get("hand") or next(own, "")
 
     def held(self, hand: str, force: float = 1.0) -> str | None:
         """Return the body that both fingers of a hand press with at least `force` newtons."""

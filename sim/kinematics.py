@@ -2,7 +2,8 @@
 
 An arm here has three axes through the shoulder, one at the elbow and three at the wrist. A hand pose then leaves one freedom,
 the *swivel*. There are two kinds. Where all three axes of the wrist meet, as a human's do (KUKA's iiwa), the swivel is that of
-the elbow around the line from shoulder to wrist (0: the elbow hangs down; positive turns it about that line). Where the last
+the elbow around the line from shoulder to wrist (0: the elbow hangs down, or is up if the arm rises from its shoulder at zero,
+as one does that is mounted on a table; positive turns it about that line). Where the last
 axis passes the point in which the two before it meet (Franka's Panda), it is the angle of the last joint from the middle of its
 limits, less the hand's roll, which that joint makes: with it given, the other six have a closed form as well. Everything is
 computed for many postures at once.
@@ -61,6 +62,11 @@ class Arm:
     def spherical(self) -> bool:
         """Whether the last axis, too, goes through the wrist."""
         return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
+
+    @cached_property
+    def hang(self) -> Array:
+        """Where the elbow is at swivel 0: below, but above in an arm whose upper arm stands up at the zero posture."""
+        return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
 
     @cached_property
     def middle(self) -> Array:
@@ -194,7 +200,8 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
         Meaningless where not valid.
     valid : array (n,) of bool
         The point is in reach and every joint within its limits. Of the two postures of a sphere only the one that has the
-        middle joint within ±90° (or between 0° and 180°) is considered, so neighbouring poses give neighbouring postures.
+        middle joint within ±90° is considered, about parallel axes the one that is farther from the limits, so neighbouring
+        poses give neighbouring postures.
     """
     most = min(STRETCHED, float(np.cos(fold)))
     q, valid = (_by_elbow if arm.spherical else _by_last_joint)(arm, r, p, swivel, most)
@@ -212,7 +219,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
     cosine = (a * a + distance**2 - b * b) / (2 * a * distance)
     valid = np.abs(cosine) < most
     cosine = np.clip(cosine, -STRETCHED, STRETCHED)
-    hang = DOWN - (n @ DOWN)[:, None] * n
+    hang = arm.hang - (n @ arm.hang)[:, None] * n
     hang = hang / np.maximum(np.linalg.norm(hang, axis=-1), 1e-9)[:, None]
     out = np.cos(swivel)[:, None] * hang + np.sin(swivel)[:, None] * cross(n, hang)
     u = cosine[:, None] * n + np.sqrt(1 - cosine**2)[:, None] * out
@@ -226,8 +233,19 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
     upper = np.stack([u, normal, cross(u, normal)], -1) @ zero.T
     elbow = side * np.arccos(np.clip(np.einsum("ni,ni->n", u, f), -1, 1)) - bent
     hand = np.swapaxes(upper @ turn(hinge, elbow), -1, -2) @ last
-    q = np.concatenate([three_angles(upper, arm.axes[:3]), elbow[:, None], three_angles(hand, arm.axes[4:])], -1)
+    q = np.concatenate([_gentler(arm, upper, 0), elbow[:, None], _gentler(arm, hand, 4)], -1)
     return q, valid
+
+
+def _gentler(arm: Arm, r: Array, first: int) -> Array:
+    """Return the angles (n, 3) of the sphere that begins with a joint; about parallel axes those farther from its limits."""
+    axes, part = arm.axes[first : first + 3], slice(first, first + 3)
+    three = three_angles(r, axes)
+    if abs(axes[0] @ axes[2]) < 0.5:
+        return three
+    both = np.stack([_wrapped(way - arm.middle[part]) for way in (three, _flipped(three, axes))])
+    strain = np.abs(both / (arm.upper[part] - arm.lower[part])).max(-1)
+    return np.asarray(arm.middle[part] + both[np.argmin(strain, axis=0), np.arange(len(three))])
 
 
 def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
@@ -336,6 +354,6 @@ def swivel_of(arm: Arm, q: Array) -> Array:
     elbow = np.einsum("nij,j->ni", r[:, 2], arm.elbow) + t[:, 2] - arm.shoulder
     wrist = np.einsum("nij,j->ni", r[:, 3], arm.wrist) + t[:, 3] - arm.shoulder
     n = wrist / np.linalg.norm(wrist, axis=-1, keepdims=True)
-    hang = DOWN - (n @ DOWN)[:, None] * n
+    hang = arm.hang - (n @ arm.hang)[:, None] * n
     swivel: Array = np.arctan2(np.einsum("ni,ni->n", elbow, cross(n, hang)), np.einsum("ni,ni->n", elbow, hang))
     return swivel

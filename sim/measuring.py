@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reasoner.embodiment.values import Guard, Phase
+from sim.base import astray
 from sim.perception import tilt_of
 from sim.running import Run
 from sim.verdict import SkillError
@@ -69,6 +70,10 @@ def _value(run: Run) -> float:
     return mechanic.values()[link]
 
 
+def _astray(run: Run) -> float:
+    return max(astray(run.world.bases[run.roles["robot"]], run.world.embodiment.stands[run.roles["target"]]))
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Something that can be measured: how, under which name it is told, and how a skill has failed if it is out of bounds."""
@@ -87,6 +92,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "push": Quantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
     "grip": Quantity(_grip, "grip_n", "slip or drop"),
     "bearing": Quantity(_bearing, "bearing_n", "misplaced"),
+    "astray": Quantity(_astray, "off_stand_m", "misplaced"),
     "leaning": Quantity(lambda run: tilt_of(run.world.truth(run.who("target")[0])[0]), "tilt_rad", "toppled"),
 }
 
@@ -106,7 +112,11 @@ def check(run: Run, phase: Phase, guard: Guard) -> None:
     if not holds:
         load = _load(run)
         things = (
-            run.things() if guard.quantity in ("off", "height", "joint", "push") else (load,) if load else run.things()
+            run.things()
+            if guard.quantity in ("off", "height", "joint", "push", "astray")
+            else (load,)
+            if load
+            else run.things()
         )
         raise SkillError(guard.code or quantity.code, things, **run.measured)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -48,6 +49,26 @@ class Blocked:
     clearance: float = 0.0
 
 
+class Traveller(Protocol):
+    """What goes along poses: an arm with its hand, or a base that drives. `spread` is how far a search looks beyond both ends."""
+
+    @property
+    def spread(self) -> Array:
+        """How far beyond start and goal poses are tried (6,)."""
+
+    def solve(self, poses: Array) -> tuple[Array, Array]:
+        """Return the joints' values at poses, and which are within reach."""
+
+    def free(self, q: Array) -> Array:
+        """Return which of them touch nothing."""
+
+    def follow(self, poses: Array) -> Array | None:
+        """Return the joints' values along poses, or None if these can't be followed."""
+
+    def detours(self, start: Array, goal: Array) -> Iterator[Array]:
+        """Yield poses (n, 6) to pass through, to be tried before a search."""
+
+
 @dataclass(frozen=True)
 class Reacher:
     """An arm among its surroundings: answers which paths are possible. `margin` metres keep it off everything.
@@ -65,6 +86,11 @@ class Reacher:
     def arm(self) -> Arm:
         """The arm that moves."""
         return self.mover.arm
+
+    @property
+    def spread(self) -> Array:
+        """How far beyond start and goal a path is searched."""
+        return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8])
 
     def solve(self, poses: Array) -> tuple[Array, Array]:
         """Return postures of the poses and which are within reach and limits."""
@@ -89,6 +115,15 @@ class Reacher:
         good = np.all([valid, self.free(q), smooth], axis=0)
         end = len(q) if good.all() else int(np.argmin(good))
         return q[:end] if end else None
+
+    def detours(self, start: Array, goal: Array) -> Iterator[Array]:
+        """Yield poses to pass through: over things, and closer to the body."""
+        for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
+            middle = (start + goal) / 2
+            heading = np.array([np.cos(middle[3]), np.sin(middle[3])])
+            middle[:2] -= back * heading
+            middle[2] = max(start[2], goal[2]) + up
+            yield middle[None]
 
     def blame(self, poses: Array) -> Blocked:
         """Return why `follow` refuses the poses."""
@@ -150,7 +185,9 @@ def polyline(corners: Array) -> Array:
 # ----------------------------------------------------------------------------------------------------- search
 
 
-def connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generator, attempts: int = 400) -> Array | None:
+def connect(
+    reacher: Traveller, start: Array, goal: Array, rng: np.random.Generator, attempts: int = 400
+) -> Array | None:
     """Return corner poses of a free path from `start` to `goal`: a line if it's free, else by RRT-Connect; or None.
 
     Parameters
@@ -160,8 +197,8 @@ def connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generato
     """
     if reacher.follow(line(start, goal)) is not None:
         return np.stack([start, goal])
-    for middle in _detours(start, goal):
-        corners = np.stack([start, middle, goal])
+    for middle in reacher.detours(start, goal):
+        corners = np.stack([start, *middle, goal])
         if reacher.follow(polyline(corners)) is not None:
             return corners
     found = _rrt_connect(reacher, start, goal, rng, attempts)
@@ -184,21 +221,12 @@ def leave(reacher: Reacher, start: Array) -> Array | None:
     return None
 
 
-def _detours(start: Array, goal: Array) -> Iterator[Array]:
-    """Yield poses to pass through: over things, and closer to the body."""
-    for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
-        middle = (start + goal) / 2
-        heading = np.array([np.cos(middle[3]), np.sin(middle[3])])
-        middle[:2] -= back * heading
-        middle[2] = max(start[2], goal[2]) + up
-        yield middle
-
-
-def _rrt_connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Generator, attempts: int) -> Array | None:
+def _rrt_connect(
+    reacher: Traveller, start: Array, goal: Array, rng: np.random.Generator, attempts: int
+) -> Array | None:
     """Grow two trees of poses towards each other (Kuffner and LaValle 2000)."""
     low, high = np.minimum(start, goal), np.maximum(start, goal)
-    spread = np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8])
-    low, high = low - spread, high + spread
+    low, high = low - reacher.spread, high + reacher.spread
     trees: list[tuple[list[Array], list[int]]] = [([start], [-1]), ([goal], [-1])]
     for turn_of in range(attempts):
         (here, back), (there, _) = trees[turn_of % 2], trees[1 - turn_of % 2]
@@ -214,7 +242,9 @@ def _rrt_connect(reacher: Reacher, start: Array, goal: Array, rng: np.random.Gen
     return None
 
 
-def _extend(reacher: Reacher, nodes: list[Array], back: list[int], target: Array, greedy: bool = False) -> Array | None:
+def _extend(
+    reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
+) -> Array | None:
     """Add to a tree the free part of the way to `target`: a stretch of it, or all of it if `greedy`."""
     nearest = int(np.argmin([np.max(np.abs(node - target) / STEP) for node in nodes]))
     way = line(nodes[nearest], target)[1:]
@@ -241,7 +271,7 @@ def _branch(nodes: list[Array], back: list[int]) -> Array:
     return np.array(way[::-1])
 
 
-def _shortcut(reacher: Reacher, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
+def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
     """Replace stretches between any two points of the way by straight lines where these are free."""
     for _ in range(attempts):
         if len(corners) < 3:
@@ -297,10 +327,16 @@ def timed(arm: Arm, q: Array, limits: Limits, rate: float) -> tuple[Array, Array
         spread = np.linspace(0, len(q) - 1, FEWEST)
         q = np.stack([np.interp(spread, np.arange(len(q)), joint) for joint in q.T], -1)
     rows = np.concatenate([q, hand_frames(arm, q)[1]], -1)
+    top = np.concatenate([limits.velocity, np.full(3, limits.hand_velocity)])
+    push = np.concatenate([np.full(7, limits.acceleration), np.full(3, limits.hand_acceleration)])
+    return scheduled(q, rows, top, push, rate)
+
+
+def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
+    """Return positions and velocities at `rate` hertz along samples `q`; `rows` keep to speeds `top` and accelerations `most`."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
-    top = np.concatenate([limits.velocity, np.full(3, limits.hand_velocity)])
-    push = np.concatenate([np.full(7, limits.acceleration), np.full(3, limits.hand_acceleration)]) / 2
+    push = most / 2
     square = np.min((top / np.maximum(np.abs(first), 1e-9)) ** 2, -1)
     square = np.minimum(square, np.min(push / np.maximum(np.abs(second), 1e-9), -1))
     gain = np.min(push / np.maximum(np.abs(first), 1e-9), -1)

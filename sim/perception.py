@@ -18,6 +18,7 @@ import numpy as np
 
 from reasoner.amounts import written
 from reasoner.embodiment.values import PerceiverUse
+from sim.base import astray
 from sim.bodies import height_of
 from sim.engine import Engine
 from sim.urdf import Array
@@ -25,12 +26,13 @@ from sim.urdf import Array
 
 @dataclass
 class Draft:
-    """A world to be built: where bodies stand (place names) what vessels are filled with, which links are open."""
+    """A world to be built: where bodies and robots stand, what vessels are filled with, which links are open."""
 
     places: dict[str, str] = field(default_factory=dict)
     contents: dict[str, list[str]] = field(default_factory=dict)
     servings: dict[str, float] = field(default_factory=dict)
     opened: dict[str, bool] = field(default_factory=dict)
+    stands: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,25 @@ def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
     draft.opened[arguments[0]] = value == use.values.get("opened", "true")
 
 
+# ------------------------------------------------------------------------------------------ where a robot stands
+
+
+def observe_stand(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return the stand at which the robot's base is, turned as it should be there."""
+    if arguments[0] not in world.bases:
+        return None
+    for name, stand in world.embodiment.stands.items():
+        away, turned = astray(world.bases[arguments[0]], stand)
+        if away < use.numbers["nearness"] and turned < use.numbers["angle_tolerance"]:
+            return name
+    return None
+
+
+def arrange_stand(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Let the robot begin at the stand."""
+    draft.stands[arguments[0]] = value
+
+
 # ------------------------------------------------------------------------------------------ at rest
 
 
@@ -191,6 +212,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
     "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True),
+    "perceive_stand": Perceiver(observe_stand, arrange_stand, "misplaced", True),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),
 }
 

@@ -13,6 +13,7 @@ yielding     straight, giving way to the side to what a finger meets
 joint        as the thing's joint moves it, with what is felt corrected on the way
 rise         straight up to `above` the place below, the elbow turning as it must
 home         to the posture of rest
+drive        with the whole robot to a stand, the hands as they are
 over         with a vessel over another one, to where it can be tilted (`sim.pouring`)
 ============ ======================================================================================================
 """
@@ -29,6 +30,7 @@ import numpy as np
 from reasoner.embodiment.skill_checks import endless, unplayed, unset
 from reasoner.embodiment.values import Phase, SkillUse
 from sim.attempt import Attempt
+from sim.driving import drive
 from sim.engine import Engine
 from sim.features import Ways, ways
 from sim.measuring import check, finger_force, until
@@ -68,7 +70,7 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
             "ill-defined", (), f"phase {phase.name} of the skill {use.skill}: '{word}' isn't told (confab validate)"
         )
     world.look()
-    run = Run(Attempt.begin(world, roles["hand"]), roles, use.numbers)
+    run = Run(Attempt.begin(world, world.acting(roles)), roles, use.numbers)
     phases = [phase for phase in use.phases if all(CONDITIONS[word](run) for word in phase.when)]
     for i, phase in enumerate(phases):
         if not phase.foreseen:
@@ -79,8 +81,10 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
 
 
 def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
-    """Return what the hand has taken or let go: it may have moved."""
-    return tuple(run.roles["object"] for phase in phases if phase.fingers and "object" in run.roles)
+    """Return what a hand has taken or let go, or a robot carries: it may have moved."""
+    carried = [run.world.held(hand) for hand in run.world.hands] if "robot" in run.roles else []
+    taken = [run.roles["object"] for phase in phases if phase.fingers and "object" in run.roles]
+    return tuple(name for name in (*taken, *carried) if name)
 
 
 def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
@@ -301,6 +305,7 @@ MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "rise": _rise,
     "home": _home,
     "over": _over,
+    "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
 """How a hand goes; ``free`` is done by `_choose` and `_go`."""
 

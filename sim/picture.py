@@ -18,10 +18,11 @@ import pybullet
 from numpy.typing import NDArray
 
 from reasoner.embodiment.values import Embodiment, Shape
+from sim.assembly import read_robot
 from sim.bodies import outline, wall
 from sim.engine import Engine
 from sim.linkage import with_open_mechanisms
-from sim.urdf import Array, read_urdf
+from sim.urdf import Array
 from sim.urdf import rotation as rotated
 
 NEAR, FAR = 0.1, 8.0
@@ -150,7 +151,7 @@ def _seen(embodiment: Embodiment) -> Array:
         x, y, z = place.position
         points.append(np.array([(x, y, z), (x, y, z + TALL)]))
     for robot in embodiment.robots:
-        model = read_urdf(robot.urdf, robot.position, robot.yaw)
+        model = read_robot(robot)
         moved = {joint for hand in robot.hands for joint in (*hand.arm, *hand.fingers)}
         for link, cover in model.spheres.items():
             if len(cover.radii) and not moved & {joint.name for joint in model.chains.get(link, ())}:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.attempt import CLOSE, Attempt, named
+from sim.attempt import CLOSE, Attempt
 from sim.bodies import height_of
 from sim.engine import Engine
 from sim.motion import poses_at, rotations
@@ -20,7 +20,7 @@ from sim.perception import tilt_of
 from sim.robot import Manipulator
 from sim.stages import Numbers, Stage, fan
 from sim.urdf import Array
-from sim.verdict import SkillError
+from sim.verdict import SkillError, named
 
 SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""

@@ -7,19 +7,21 @@ from before and go up, within all joints' limits and without touching furniture 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
+from sim.assembly import read_robot
 from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
 from sim.kinematics import read_arm
 from sim.linkage import with_open_mechanisms
 from sim.motion import Reacher
 from sim.stages import MARGIN, Numbers, grip_stages
-from sim.urdf import Model, read_urdf
+from sim.urdf import Model
 
 VERSION = "1"
 """Counts changes of the method, so that results of an older one aren't taken for current."""
@@ -49,29 +51,47 @@ def reach(embodiment: Embodiment) -> Reach:
     pairs = set()
     places, solids = with_open_mechanisms(embodiment)
     for robot in embodiment.robots:
-        model = read_urdf(robot.urdf, robot.position, robot.yaw)
-        for hand in robot.hands:
-            reacher = _reacher(embodiment, robot, hand, model, solids)
-            found = [place for place in places.values() if all(_reaches(reacher, place, h, numbers) for h in heights)]
-            pairs |= {(hand.name, place.name) for place in found}
+        for stand, model in _standing(robot, embodiment):
+            near = [p for p in places.values() if not stand or embodiment.places[p.name].stand in ("", stand)]
+            for hand in robot.hands:
+                reacher = _reacher(embodiment, robot, hand, model, solids)
+                found = [place for place in near if all(_reaches(reacher, place, h, numbers) for h in heights)]
+                pairs |= {(hand.name, place.name) for place in found}
     return Reach(frozenset(pairs), fingerprint(embodiment))
+
+
+def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, Model]]:
+    """Yield the robot at every stand that it can drive to, or where it stands fast."""
+    if not robot.driving:
+        yield "", read_robot(robot)
+        return
+    for stand in embodiment.stands.values():
+        yield stand.name, read_robot(robot, np.array([*stand.position[:2], stand.yaw]))
 
 
 def fingerprint(embodiment: Embodiment) -> str:
     """Return a SHA-256 hash of what reach depends on: files by content, numbers by value."""
     parts = [VERSION]
     for robot in embodiment.robots:
-        values = asdict(robot)
+        values = _told(asdict(robot), ("driving", "turning") if not robot.driving else ())
+        bare = ("gripper", "flange", "mounting")
+        values["hands"] = tuple(_told(hand, () if hand["gripper"] else bare) for hand in values["hands"])
         values["urdf"] = hashlib.sha256(Path(robot.urdf).read_bytes()).hexdigest()
         parts.append(repr(values))
     parts += [repr(fixture) for fixture in embodiment.fixtures]
     parts += [f"Place(name={p.name!r}, position={p.position!r})" for _, p in sorted(embodiment.places.items())]
+    parts += [repr(stand) for _, stand in sorted(embodiment.stands.items())]
+    parts += [repr(place.stand) for _, place in sorted(embodiment.places.items()) if place.stand]
     parts += [repr(place.carrier) for _, place in sorted(embodiment.places.items()) if place.carrier]
     parts += [repr(mechanism) for mechanism in embodiment.mechanisms]
     parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
     reaching = [use.numbers for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
     parts += [repr(sorted((name, value) for name, value in uses.items() if name != "time_limit")) for uses in reaching]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name not in without}
 
 
 def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, solids: Sequence[Solid]) -> Reacher:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Hand, Robot
+from sim.assembly import assembled, plain, read_robot
 from sim.collision import Mover, fixed_spheres, read_mover
 from sim.kinematics import Arm, hand_frames, read_arm
 from sim.motion import Limits, pose_of
-from sim.urdf import Array, Model, Spheres, read_urdf
+from sim.urdf import Array, Model, Spheres
 
 CENTERING = 400.0
 """Newtons per metre by which a finger that is ahead of the other one yields, as the gear of a parallel gripper does."""
@@ -168,16 +171,8 @@ class Manipulator:
 
 def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
     """Load a robot with its arms at home; return the body, its hands and the spheres of what no arm moves."""
-    flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
-    body = pybullet.loadURDF(
-        robot.urdf,
-        robot.position,
-        pybullet.getQuaternionFromEuler([0, 0, robot.yaw]),
-        useFixedBase=True,
-        flags=flags | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
-        physicsClientId=client,
-    )
-    model = read_urdf(robot.urdf, robot.position, robot.yaw)
+    body = _load(client, robot)
+    model = read_robot(robot)
     numbers, links, efforts = {}, {-1: robot.name}, {}
     for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
         info = pybullet.getJointInfo(body, i, physicsClientId=client)
@@ -186,6 +181,24 @@ def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
     for hand in hands:
         _go_home(hand)
     return body, hands, fixed_spheres(model, [hand.arm for hand in hands])
+
+
+def _load(client: int, robot: Robot) -> int:
+    """Put a robot's body into a physics world."""
+    flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
+    place = {
+        "basePosition": robot.position,
+        "baseOrientation": pybullet.getQuaternionFromEuler([0, 0, robot.yaw]),
+        "useFixedBase": True,
+        "flags": flags | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
+        "physicsClientId": client,
+    }
+    if plain(robot):
+        return int(pybullet.loadURDF(robot.urdf, **place))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "robot.urdf"
+        file.write_text(assembled(robot), encoding="utf-8")
+        return int(pybullet.loadURDF(str(file), **place))
 
 
 def _manipulator(

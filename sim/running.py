@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 from reasoner.embodiment.skills import TERM
 from reasoner.embodiment.values import Phase
-from sim.attempt import Attempt, named
+from sim.attempt import Attempt
 from sim.engine import Engine
 from sim.features import Frame, Ways, locate, touched
 from sim.linkage import wide
 from sim.mechanisms import Mechanic
 from sim.stages import Numbers
 from sim.urdf import Array
-from sim.verdict import SkillError
+from sim.verdict import SkillError, named
 
 TOLD = ("object", "source", "target", "place")
 """The order in which a failure names who takes part."""

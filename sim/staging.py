@@ -9,7 +9,9 @@ import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Fixture, Mechanism, Shape
+from sim.base import read_base
 from sim.bodies import KINDS, packed
+from sim.driving import take_up
 from sim.engine import Bead, Engine, Thing
 from sim.mechanisms import load_mechanism
 from sim.perception import Draft
@@ -27,7 +29,8 @@ SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
 class Perturbation:
     """How a rollout may differ from the nominal world: each range is drawn from evenly, per body.
 
-    Mechanisms are shifted as bodies are, turned by `turn`, and their joints' friction and damping vary by `resistance`.
+    Mechanisms are shifted as bodies are, turned by `turn`, and their joints' friction and damping vary by `resistance`. A base
+    that drives stops by up to `stop` metres and radians beside where it should.
     """
 
     position: float = 0.010
@@ -37,6 +40,7 @@ class Perturbation:
     fill: tuple[float, float] = (0.95, 1.1)
     turn: float = 0.17
     resistance: tuple[float, float] = (0.5, 2.0)
+    stop: float = 0.01
 
 
 def furnish(engine: Engine, perturb: Perturbation | None) -> None:
@@ -52,6 +56,8 @@ def furnish(engine: Engine, perturb: Perturbation | None) -> None:
         number, hands, still = load(engine.client, robot)
         engine.names[number], engine.standing[robot.name] = robot.name, still
         engine.hands |= {hand.hand.name: hand for hand in hands}
+        if robot.driving:
+            engine.bases[robot.name] = read_base(engine.client, number, robot, perturb.stop if perturb else 0.0)
 
 
 def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None) -> Mechanism:
@@ -75,6 +81,14 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
         if name not in engine.links:
             raise ValueError(f"'{name}' is open or shut, but is no e:Link of a mechanism")
         engine.links[name].set(name, opened)
+    for robot, stand in draft.stands.items():
+        if robot not in engine.bases or stand not in engine.embodiment.stands:
+            raise ValueError(
+                f"'{robot}' is said to stand at '{stand}', but doesn't drive (e:drivingSpeed), or that is no e:Stand"
+            )
+        there = engine.embodiment.stands[stand]
+        engine.bases[robot].set(np.array([*there.position[:2], there.yaw]))
+        take_up(engine, engine.bases[robot])
     for name, place in draft.places.items():
         if place not in engine.embodiment.places:
             raise ValueError(

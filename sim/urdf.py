@@ -242,12 +242,17 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
 
 def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, float]]:
     """Return where a mesh's file is, beside the URDF, above it or among PyBullet's data, and its scale."""
-    name = shape.get("filename", "").removeprefix("package://")
     x, y, z = _numbers(shape.get("scale"), "1 1 1")
+    return mesh_file(shape.get("filename", ""), folder), (float(x), float(y), float(z))
+
+
+def mesh_file(name: str, folder: Path) -> Path:
+    """Return where the file of a mesh is that a URDF in a folder names: beside it, above it, or among PyBullet's data."""
+    name = name.removeprefix("package://")
     places = [place for place in (folder, folder.parent, pybullet_data()) if place and (place / name).is_file()]
     if not name or not places:
         raise ValueError(f"the mesh '{name}' is neither beside the URDF nor among PyBullet's data")
-    return places[0] / name, (float(x), float(y), float(z))
+    return places[0] / name
 
 
 def _primitive(shape: ET.Element) -> tuple[Array, float]:

@@ -77,3 +77,8 @@ class SkillError(Exception):
     def __init__(self, code: str, objects: tuple[str, ...] = (), message: str = "", /, **measured: float) -> None:
         super().__init__(message or CODES[code])
         self.verdict = Verdict(False, code, objects, measured, message or CODES[code])
+
+
+def named(*objects: str) -> tuple[str, ...]:
+    """Return each object once, in order."""
+    return tuple(dict.fromkeys(objects))

@@ -128,7 +128,7 @@ class World(Engine):
         bound = {name.lstrip("?"): value for name, value in step.bindings.items()}
         roles |= {role: bound[name] for name, role in use.variables.items() if name in bound}
         self.current += 1
-        hand = self.hands.get(roles.get("hand", ""))
+        hand = self.hands.get(self.acting(roles))
         if hand is not None:
             hand.limit = use.numbers.get("time_limit", math.inf)
             hand.deadline = self.steps + hand.limit * RATE

@@ -31,10 +31,11 @@ ATTRIBUTES = (
 )
 LINKS = """
 SELECT DISTINCT ?node ?property ?value WHERE {
-  { VALUES ?property { :shape :profilePoint :skill :role :perceiver :adjusts :phase :part
-      :feature :partOf :carriedBy :touchesPart c:handOf c:parameter c:termType c:hasSituationType } }
-  UNION { ?property rdfs:subPropertyOf :specialValue }
-  ?node ?property ?value
+  { VALUES ?property { :reachedFrom } ?own rdfs:subPropertyOf ?property . ?node ?own ?value }
+  UNION { VALUES ?property { :shape :profilePoint :skill :role :perceiver :adjusts :phase :part
+      :feature :partOf :carriedBy :reachedFrom :touchesPart c:handOf c:parameter c:termType c:hasSituationType }
+    ?node ?property ?value }
+  UNION { ?property rdfs:subPropertyOf :specialValue . ?node ?property ?value }
 } ORDER BY ?node ?property ?value"""
 TYPES = """
 SELECT DISTINCT ?node ?class WHERE {
@@ -99,6 +100,10 @@ class Facts:
         x, y, z = (self.numbers(node, name, default)[0] for name in ("x", "y", "z"))
         return (x, y, z)
 
+    def turned(self, node: str) -> Vector:
+        """Return a node's roll, pitch and yaw, 0 if nothing is said."""
+        return (self.number(node, "roll", 0.0), self.number(node, "pitch", 0.0), self.number(node, "yaw", 0.0))
+
     def color(self, node: str, default: str = GREY) -> Color:
         """Return a node's colour."""
         numbers = self.numbers(node, "color", default)
@@ -147,8 +152,12 @@ class Facts:
         return sorted(nodes, key=lambda node: (self.indices.get(node, 10**9), node))
 
     def members(self, class_name: str) -> list[str]:
-        """Return the individuals of a class of the vocabulary."""
-        return self.ordered(n for n, kinds in self.classes.items() if PREFIXES[""] + class_name in kinds)
+        """Return the individuals of a class of the vocabulary, or of one below it."""
+        known, layer = {PREFIXES[""] + class_name}, {PREFIXES[""] + class_name}
+        while layer:
+            layer = {sub for sub, ups in self.supers.items() if layer & {*ups}} - known
+            known |= layer
+        return self.ordered(node for node, kinds in self.classes.items() if known & {*kinds})
 
     def nearest_first(self, node: str) -> list[str]:
         """Return a node, its classes and their superclasses, from the nearest to the most general."""

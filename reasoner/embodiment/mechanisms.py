@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from reasoner.embodiment.facts import EmbodimentError, Facts
-from reasoner.embodiment.values import Feature, Link, Mechanism, Part, Vector
+from reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
 """The attributes that give a part's extent; a radius counts twice."""
@@ -43,10 +43,6 @@ def _links(facts: Facts, mechanism: str) -> list[str]:
     return ordered
 
 
-def _turned(facts: Facts, node: str) -> Vector:
-    return (facts.number(node, "roll", 0.0), facts.number(node, "pitch", 0.0), facts.number(node, "yaw", 0.0))
-
-
 def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
     kind, parent = facts.text(node, "joint", "fixed"), facts.linked(node, "part_of")[0]
     if kind not in JOINTS:
@@ -62,7 +58,7 @@ def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], 
         {feature.name: feature for feature in (_feature(facts, one, names) for one in facts.linked(node, "feature"))},
         "" if parent == mechanism else names(parent),
         facts.position(node, "0"),
-        _turned(facts, node),
+        facts.turned(node),
         (axis[0], axis[1], axis[2]),
         facts.number(node, "lower", 0.0),
         upper,
@@ -88,7 +84,7 @@ def _part(facts: Facts, node: str, names: Callable[[str], str], folders: Sequenc
     x, y, z = (facts.number(node, name) * (2 if name == "radius" else 1) for name in KINDS.get(kind, KINDS["box"]))
     file = facts.file(node, "mesh", folders) if kind == "mesh" else ""
     place = facts.position(node, "0")
-    return Part(names(node), kind, (x, y, z), place, _turned(facts, node), facts.color(node), file)
+    return Part(names(node), kind, (x, y, z), place, facts.turned(node), facts.color(node), file)
 
 
 def _feature(facts: Facts, node: str, names: Callable[[str], str]) -> Feature:
@@ -96,7 +92,7 @@ def _feature(facts: Facts, node: str, names: Callable[[str], str]) -> Feature:
     return Feature(
         names(node).rsplit(".", 1)[-1],
         facts.position(node, "0"),
-        _turned(facts, node),
+        facts.turned(node),
         facts.number(node, "lower", 0.0),
         facts.number(node, "upper", 0.0),
         tuple(names(part) for part in facts.linked(node, "touches_part")),

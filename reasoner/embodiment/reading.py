@@ -26,6 +26,7 @@ from reasoner.embodiment.values import (
     Place,
     Robot,
     Shape,
+    Stand,
 )
 from reasoner.names import local_name
 
@@ -69,6 +70,7 @@ def read_embodiment(
         skills=skill_uses(facts, names, store),
         perceivers=_perceivers(facts, names),
         mechanisms=mechanisms(facts, names, folders),
+        stands={names(node): _stand(facts, node, names) for node in facts.members("Stand")},
     )
 
 
@@ -83,14 +85,25 @@ def _fixture(facts: Facts, node: str, names: Callable[[str], str]) -> Fixture:
 
 def _places(facts: Facts) -> list[str]:
     """Return what has coordinates and is neither robot nor furniture, nor anything of a mechanism."""
-    other = {node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature") for node in facts.members(kind)}
+    other = {
+        node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
+    }
     other |= {node for node, links in facts.links.items() if "part_of" in links} | {*facts.having("urdf")}
     return facts.ordered(node for node in facts.having("x") if node not in other)
 
 
 def _place(facts: Facts, node: str, names: Callable[[str], str]) -> Place:
-    carriers = facts.linked(node, "carried_by")
-    return Place(names(node), facts.position(node, "0" if carriers else None), names(carriers[0]) if carriers else "")
+    carriers, stands = facts.linked(node, "carried_by"), facts.linked(node, "reached_from")
+    return Place(
+        names(node),
+        facts.position(node, "0" if carriers else None),
+        names(carriers[0]) if carriers else "",
+        names(stands[0]) if stands else "",
+    )
+
+
+def _stand(facts: Facts, node: str, names: Callable[[str], str]) -> Stand:
+    return Stand(names(node), facts.position(node, "0"), facts.number(node, "yaw", 0.0))
 
 
 def _shaped(facts: Facts) -> list[tuple[str, str]]:
@@ -160,26 +173,35 @@ def _robot(facts: Facts, node: str, names: Callable[[str], str], folders: Sequen
     return Robot(
         names(node),
         facts.file(node, "urdf", folders),
-        tuple(_hand(facts, hand, names) for hand in hands),
+        tuple(_hand(facts, hand, names, folders) for hand in hands),
         facts.position(node),
         facts.number(node, "yaw", 0.0),
         facts.number(node, "acceleration"),
+        facts.number(node, "driving_speed", 0.0),
+        facts.number(node, "turning_speed", 1.0),
     )
 
 
-def _hand(facts: Facts, node: str, names: Callable[[str], str]) -> Hand:
+def _hand(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Hand:
     arm, home = tuple(facts.text(node, "arm_joints").split()), facts.numbers(node, "home_posture")
     if len(arm) != len(home):
         raise EmbodimentError(f"{node} has {len(arm)} :armJoints and {len(home)} angles in :homePosture")
+    flange, mounting = facts.text(node, "flange", ""), facts.numbers(node, "mounting", "0 0 0 0 0 0")
+    if len(mounting) != 6:
+        raise EmbodimentError(f"{node} has {len(mounting)} numbers in :mounting; wanted x y z roll pitch yaw")
+    prefix = f"{names(node)}." if flange else ""
     return Hand(
         names(node),
-        facts.text(node, "tip"),
+        prefix + facts.text(node, "tip"),
         arm,
-        tuple(facts.text(node, "finger_joints").split()),
+        tuple(prefix + name for name in facts.text(node, "finger_joints").split()),
         home,
         facts.number(node, "opening"),
         facts.number(node, "grip"),
-        (facts.number(node, "roll", 0.0), facts.number(node, "pitch", 0.0), facts.number(node, "yaw", 0.0)),
+        facts.turned(node),
+        facts.file(node, "gripper", folders) if flange else "",
+        flange,
+        mounting,
     )
 
 

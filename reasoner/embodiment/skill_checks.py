@@ -47,7 +47,7 @@ def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
     """Yield phases of which nobody says where they end, with what is missing."""
     for phase in use.phases:
-        if phase.motion in ("free", "line", "yielding", "joint", "over") and not phase.to:
+        if phase.motion in ("free", "line", "yielding", "joint", "over", "drive") and not phase.to:
             yield phase, "to"
         if phase.motion == "joint" and not phase.value:
             yield phase, "value"

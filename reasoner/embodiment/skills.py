@@ -16,10 +16,10 @@ SELECT DISTINCT ?behavior ?term WHERE {
   ?behavior (c:precondition|c:postcondition)/(c:condition|c:alternative|c:when)*/(c:about|c:value|c:argument2|c:witness) ?term .
   ?term a c:Variable ; :role ?role
 } ORDER BY ?behavior ?term"""
-MOTIONS = ("", "free", "line", "yielding", "joint", "rise", "home", "over")
+MOTIONS = ("", "free", "line", "yielding", "joint", "rise", "home", "over", "drive")
 FINGERS = ("", "open", "shut", "grasp")
 CONDITIONS = ("empty", "holding", "place", "thing")
-QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning")
+QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
 """What phases may say: `sim.phases` has a table for each."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")

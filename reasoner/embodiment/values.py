@@ -22,7 +22,8 @@ class Hand:
     `tip` is the URDF link whose frame, `turned` by roll, pitch and yaw, is the hand's: x points where the fingers point, y from
     finger to finger, z up when the hand is upright. `arm` and `fingers` are joint names; a finger joint grows as the hand
     opens. `home` is the arm's rest posture, one angle per arm joint. `opening` is the finger joints' open position and `grip`
-    the force of each finger.
+    the force of each finger. A `gripper` is a URDF file that is mounted on the link `flange` of the arm, at `mounting` there
+    (x, y, z, roll, pitch, yaw); its names begin with the hand's.
     """
 
     name: str
@@ -33,11 +34,17 @@ class Hand:
     opening: float = 0.05
     grip: float = 25.0
     turned: Vector = (0.0, 0.0, 0.0)
+    gripper: str = ""
+    flange: str = ""
+    mounting: tuple[float, ...] = (0.0,) * 6
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot: its URDF file, where its base stands, how fast it accelerates (rad/s²), and its hands in declared order."""
+    """A robot: its URDF file, where its base stands, how fast it accelerates (rad/s²), and its hands in declared order.
+
+    A base that drives does so at `driving` metres and `turning` radians per second.
+    """
 
     name: str
     urdf: str
@@ -45,6 +52,17 @@ class Robot:
     position: Vector = (0.0, 0.0, 0.0)
     yaw: float = 0.0
     acceleration: float = 8.0
+    driving: float = 0.0
+    turning: float = 1.0
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Where the base of a robot that drives can stand, to reach the places that are reached from there; `yaw` is its heading."""
+
+    name: str
+    position: Vector
+    yaw: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -63,12 +81,13 @@ class Fixture:
 class Place:
     """A location where things stand: the point on the supporting surface, in the frame of the `carrier` if it has one.
 
-    The carrier is a link or an object: a place in a drawer moves with the drawer.
+    The carrier is a link or an object: a place in a drawer moves with the drawer. A robot that drives reaches it from the `stand`.
     """
 
     name: str
     position: Vector
     carrier: str = ""
+    stand: str = ""
 
 
 @dataclass(frozen=True)
@@ -277,6 +296,7 @@ class Embodiment:
     skills: Mapping[str, SkillUse]
     perceivers: Mapping[str, PerceiverUse]
     mechanisms: tuple[Mechanism, ...] = ()
+    stands: Mapping[str, Stand] = field(default_factory=dict)
 
     def hand(self, name: str) -> tuple[Robot, Hand]:
         """Return the hand of that name with its robot; raise `KeyError` that lists the hands there are."""

@@ -6,7 +6,8 @@ import pytest
 
 import ontology
 from confab import load
-from sim.kinematics import Arm, hand_frames, inverse, read_arm, swivel_of, three_angles, turn
+from sim.assembly import read_robot
+from sim.kinematics import Arm, hand_frames, inverse, link_transforms, read_arm, swivel_of, three_angles, turn
 from sim.urdf import Array, read_urdf
 
 URDF = str(ontology.ROOT / "robots" / "two-arms.urdf")
@@ -142,3 +143,17 @@ def test_a_robot_that_cannot_be_is_refused_in_words(tmp_path: Path, old: str, ne
     file.write_text(text.replace(old, new))
     with pytest.raises(ValueError, match=re.escape(said)):
         read_arm(read_urdf(str(file)), [f"left_{joint}" for joint in JOINTS], "left_tool")
+
+
+def test_an_arm_that_rises_from_its_base_has_its_elbow_above_and_its_wrist_far_from_its_limits() -> None:
+    (robot,) = load("iiwa-serving").embodiment.robots
+    (hand,) = robot.hands
+    arm = read_arm(read_robot(robot), hand.arm, hand.tip, hand.turned)
+    zero = np.zeros(1)
+    level = np.eye(3)[None]
+    q, valid = inverse(arm, level, np.array([[0.46, 0.0, 0.81]]), zero)
+    assert valid.all()
+    assert np.allclose(hand_frames(arm, q)[1], [[0.46, 0.0, 0.81]])
+    r, t = link_transforms(arm, q)
+    assert (r[0, 2] @ arm.elbow + t[0, 2])[2] > arm.shoulder[2]
+    assert np.abs(q[0, 4:]).max() < 1.2

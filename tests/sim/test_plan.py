@@ -57,6 +57,15 @@ def test_two_pandas_hand_a_glass_over_and_fill_another_one_together() -> None:
     assert taken == ["left_gripper", "right_gripper"]
 
 
+def test_an_iiwa_serves_with_a_gripper_that_turtle_mounts_on_its_flange() -> None:
+    one = case("iiwa-serving")
+    (robot,) = one.embodiment.robots
+    assert robot.hands[0].fingers == ("iiwa_hand.finger_a_joint", "iiwa_hand.finger_b_joint")
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
+    assert rollout.failure is None
+    assert rollout.clock.planning <= 3  # with its wrist the other way round, paths were searched for twenty seconds
+
+
 def test_a_bottle_of_three_servings_fills_two_cups() -> None:
     one = case("two-cups")
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected)

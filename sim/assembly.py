@@ -1,0 +1,110 @@
+"""Robots as they are put together: somebody's URDF, grippers on its flanges, joints on which its base drives.
+
+What is put together is a URDF again, so that physics and kinematics read the same text.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from reasoner.embodiment.values import Hand, Robot
+from sim.urdf import Array, Model, mesh_file, read_model, read_urdf
+
+DRIVE = (("drive_x", "prismatic", "1 0 0"), ("drive_y", "prismatic", "0 1 0"), ("drive_yaw", "continuous", "0 0 1"))
+"""Joints below the base of a robot that drives: along, across, about."""
+
+FARTHEST = 100.0
+"""Metres that it may drive."""
+
+
+def read_robot(robot: Robot, base: Array | None = None) -> Model:
+    """Return a robot at its zero posture; its base is where the robot is said to stand, or at `base` (x, y, yaw).
+
+    Raises
+    ------
+    ValueError
+        A file isn't a URDF robot, or a gripper's flange isn't there; the message names file and reason.
+    """
+    x, y, z = robot.position
+    place, yaw = (x, y, z), robot.yaw
+    if base is not None:
+        place, yaw = (float(base[0]), float(base[1]), z), float(base[2])
+    if plain(robot):
+        return read_urdf(robot.urdf, place, yaw)
+    return read_model(assembled(robot), robot.urdf, place, yaw)
+
+
+def plain(robot: Robot) -> bool:
+    """Whether a robot is just what its URDF says."""
+    return not robot.driving and not any(hand.gripper for hand in robot.hands)
+
+
+def assembled(robot: Robot) -> str:
+    """Return a robot as one URDF text, with its grippers, and the joints on which it drives; meshes by their whole paths."""
+    root = _parsed(robot.urdf)
+    for hand in robot.hands:
+        if hand.gripper:
+            _mount(root, hand)
+    if robot.driving:
+        _drive(root, robot)
+    ET.indent(root)  # PyBullet's parser wants short lines
+    return ET.tostring(root, encoding="unicode")
+
+
+def _parsed(path: str) -> ET.Element:
+    try:
+        root = ET.fromstring(Path(path).read_text(encoding="utf-8"))
+        for mesh in root.iter("mesh"):
+            mesh.set("filename", str(mesh_file(mesh.get("filename", ""), Path(path).parent)))
+    except (OSError, ET.ParseError, ValueError) as problem:
+        raise ValueError(f"cannot read the URDF {path}: {problem}") from problem
+    return root
+
+
+def _base(root: ET.Element) -> str:
+    """Return the link that hangs on no joint."""
+    hanging = {child.get("link") for child in root.iter("child")}
+    return next(name for link in root.findall("link") if (name := link.get("name", "")) not in hanging)
+
+
+def _mount(root: ET.Element, hand: Hand) -> None:
+    """Add a hand's gripper, whose names get the hand's before them."""
+    if all(link.get("name") != hand.flange for link in root.findall("link")):
+        raise ValueError(f"the robot's URDF has no link '{hand.flange}', the flange of '{hand.name}'; mend the name")
+    gripper = _parsed(hand.gripper)
+    base = _base(gripper)
+    for element in (*gripper.findall("link"), *gripper.findall("joint"), *gripper.iter("material")):
+        if element.get("name"):
+            element.set("name", f"{hand.name}.{element.get('name')}")
+    for end in (*gripper.iter("parent"), *gripper.iter("child")):
+        end.set("link", f"{hand.name}.{end.get('link')}")
+    root.extend(list(gripper))
+    x, y, z, roll, pitch, yaw = hand.mounting
+    joint = ET.SubElement(root, "joint", name=f"{hand.name}.mounting", type="fixed")
+    ET.SubElement(joint, "parent", link=hand.flange)
+    ET.SubElement(joint, "child", link=f"{hand.name}.{base}")
+    ET.SubElement(joint, "origin", xyz=f"{x} {y} {z}", rpy=f"{roll} {pitch} {yaw}")
+
+
+def _drive(root: ET.Element, robot: Robot) -> None:
+    """Put the base on joints along, across and about, which are in the robot's own frame."""
+    base, parent = _base(root), "ground"
+    _weigh(ET.SubElement(root, "link", name=parent), "0")
+    for i, (name, kind, axis) in enumerate(DRIVE):
+        child = base if i == len(DRIVE) - 1 else f"{name}_link"
+        if child != base:
+            _weigh(ET.SubElement(root, "link", name=child), "5")
+        joint = ET.SubElement(root, "joint", name=name, type=kind)
+        ET.SubElement(joint, "parent", link=parent)
+        ET.SubElement(joint, "child", link=child)
+        ET.SubElement(joint, "axis", xyz=axis)
+        far = str(FARTHEST)
+        ET.SubElement(joint, "limit", lower=f"-{far}", upper=far, velocity=str(robot.driving), effort="5000")
+        parent = child
+
+
+def _weigh(link: ET.Element, mass: str) -> None:
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value=mass)
+    ET.SubElement(inertial, "inertia", ixx="1", iyy="1", izz="1", ixy="0", ixz="0", iyz="0")

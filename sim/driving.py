@@ -1,0 +1,165 @@
+"""A base that drives: ways for it, the arms as they are, between things that stand about.
+
+A way is planned as a hand's is (`sim.motion.connect`): the base's pose is (x, y, 0, yaw, 0, 0), which touches nothing if no sphere
+of robot and load does. Afterwards the arms' kinematics begin at the base where it has come to.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.assembly import read_robot
+from sim.base import Base
+from sim.collision import Surroundings, clearances, fixed_spheres
+from sim.engine import Engine
+from sim.kinematics import read_arm
+from sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
+from sim.urdf import Array, Spheres
+from sim.verdict import SkillError, named
+
+BASE = np.array([0, 1, 3])
+"""Where x, y and yaw are in a pose."""
+
+MARGIN = 0.02
+"""Metres that a robot keeps off things while it drives."""
+
+GENTLY = 0.8
+"""Seconds in which a base comes to its speed: what a hand carries must not slip, and a full cup not spill."""
+
+ASTRAY = 0.03
+"""Metres or radians by which a base may be behind its command before it counts as stopped."""
+
+BACKING = (0.15, 0.3, 0.5, 0.8)
+"""Metres by which a robot draws back from a table before it turns, and comes up to another one."""
+
+SAMPLES = 600
+"""How many samples a search for a way takes at most."""
+
+
+@dataclass(frozen=True)
+class Roller:
+    """A robot that may drive among its surroundings: its spheres (m, 3), arms and loads as they are, in the frame of its base."""
+
+    centers: Array
+    radii: Array
+    around: Surroundings
+    margin: float
+
+    @property
+    def spread(self) -> Array:
+        """How far beyond start and goal a way is searched."""
+        return np.array([1.0, 1.0, 0.0, np.pi, 0.0, 0.0])
+
+    def gaps(self, q: Array) -> dict[str, Array]:
+        """Return, for all that is near, its distance (n,) from the robot with its base at x, y, yaw (n, 3)."""
+        cos, sin, zero = np.cos(q[:, 2]), np.sin(q[:, 2]), np.zeros(len(q))
+        turned = np.stack([cos, -sin, zero, sin, cos, zero, zero, zero, zero + 1], -1).reshape(-1, 3, 3)
+        shift = np.stack([q[:, 0], q[:, 1], zero], -1)
+        return clearances(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None], self.radii, self.around)
+
+    def solve(self, poses: Array) -> tuple[Array, Array]:
+        """Return where the base is at poses: it gets everywhere."""
+        return poses[:, BASE], np.ones(len(poses), dtype=bool)
+
+    def free(self, q: Array) -> Array:
+        """Return where the robot touches nothing."""
+        found = self.gaps(q).values()
+        return np.all([gap > self.margin for gap in found], axis=0) if found else np.ones(len(q), dtype=bool)
+
+    def follow(self, poses: Array) -> Array | None:
+        """Return where the base is along poses, or None if the robot would touch something."""
+        q = poses[:, BASE]
+        return q if self.free(q).all() else None
+
+    def detours(self, start: Array, goal: Array) -> Iterator[Array]:
+        """Yield ways that draw back, turn, and come up to the goal from before it."""
+        for back in BACKING:
+            ends = []
+            for pose in (start, goal):
+                before = pose.copy()
+                before[:2] -= back * np.array([np.cos(pose[3]), np.sin(pose[3])])
+                ends.append(before)
+            turned = ends[0].copy()
+            turned[3] = goal[3]
+            yield np.stack(ends)
+            yield np.stack([ends[0], turned, ends[1]])
+
+    def blame(self, poses: Array) -> Blocked:
+        """Return what is in the way along poses."""
+        gaps = {name: float(gap.min()) for name, gap in self.gaps(poses[:, BASE]).items()}
+        touching = tuple(sorted((name for name, gap in gaps.items() if gap <= self.margin), key=gaps.__getitem__))
+        return Blocked("no path", touching, min(gaps.values(), default=0.0))
+
+
+def drive(engine: Engine, robot: str, stand: str) -> None:
+    """Let a robot drive to a stand, with what its hands hold, or raise `SkillError`."""
+    if robot not in engine.bases or stand not in engine.embodiment.stands:
+        raise SkillError("ill-defined", (robot, stand), f"{robot} doesn't drive, or {stand} is no stand")
+    base, there = engine.bases[robot], engine.embodiment.stands[stand]
+    loads = {hand.hand.name: engine.held(hand.hand.name) for hand in engine.hands.values() if hand.robot == base.robot}
+    goal = np.array([*there.position[:2], there.yaw])
+    if base.miss:
+        goal += engine.rng.uniform(-base.miss, base.miss, 3)
+    for pose in _planned(engine, base, goal, loads, (robot, stand)):
+        base.command(pose)
+        engine.run(1)
+        if engine.steps % 6 == 0:
+            _check(engine, base, pose, tuple(loads))
+    engine.run(round(GENTLY * engine.rate / 4))
+    take_up(engine, base)
+    for hand, load in loads.items():
+        if load is not None and engine.held(hand) != load:
+            raise SkillError("slip or drop", (load,), f"{load} was lost on the way")
+
+
+def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | None], things: tuple[str, ...]) -> Array:
+    """Return where the base is at each step of the simulation; raise if there is no way."""
+    begin = time.process_time()
+    x, y, yaw = base.pose()
+    spheres = [engine.standing[base.robot.name]]
+    for name, load in loads.items():
+        hand = engine.hands[name]
+        mover = hand.mover() if load is None else hand.mover().holding(engine.load_spheres(hand, load, whole=True))
+        spheres.append(Spheres(mover.at(hand.posture[None])[0], mover.spheres.radii))
+    centers = np.concatenate([one.centers for one in spheres]) - np.array([x, y, 0.0])
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    centers = centers @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    held = [load for load in loads.values() if load is not None]
+    around = engine.surroundings("").without(base.robot.name, *loads, *held)
+    start = np.array([x, y, 0.0, yaw, 0.0, 0.0])
+    end = turned_near(start, np.array([goal[0], goal[1], 0.0, goal[2], 0.0, 0.0]))
+    roller = Roller(centers, np.concatenate([one.radii for one in spheres]), around, MARGIN)
+    corners = connect(roller, start, end, engine.rng, SAMPLES)
+    if corners is None:
+        blame = roller.blame(line(start, end))
+        raise SkillError("no path", named(*things, *blame.objects), clearance_m=blame.clearance)
+    q = polyline(corners)[:, BASE]
+    top = np.array([base.robot.driving, base.robot.driving, base.robot.turning])
+    found = scheduled(q, q, top, top / GENTLY, engine.rate)[0]
+    engine.clock.planning += time.process_time() - begin
+    return found
+
+
+def _check(engine: Engine, base: Base, wanted: Array, hands: tuple[str, ...]) -> None:
+    """Raise if the base is behind its command, naming what the robot touches, or if the time is over."""
+    hand = engine.hands[hands[0]]
+    if engine.steps > hand.deadline:
+        raise SkillError("too slow", (base.robot.name,), seconds=hand.limit)
+    lag = float(np.abs(base.pose() - wanted).max())
+    if lag > ASTRAY:
+        take_up(engine, base)
+        raise SkillError("tracking error", engine.touching(hand) or (base.robot.name,), base_lag_m=lag)
+
+
+def take_up(engine: Engine, base: Base) -> None:
+    """Let the kinematics of a robot's arms begin where its base is now."""
+    robot = base.robot
+    model = read_robot(robot, base.pose())
+    hands = [hand for hand in engine.hands.values() if hand.robot == robot]
+    for hand in hands:
+        hand.model, hand.arm = model, read_arm(model, hand.hand.arm, hand.hand.tip, hand.hand.turned)
+    engine.standing[robot.name] = fixed_spheres(model, [hand.arm for hand in hands])
