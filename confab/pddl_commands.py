@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from pathlib import Path
 from typing import TypeAlias
 
@@ -117,18 +116,9 @@ def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) 
     task = ground(problem, level)
     if not isinstance(task, Task):
         return plan
-    wanted, operators = set(plan), defaultdict(list)
-    for operator in range(len(task)):
-        step = task.describe(operator)[:2]
-        if step in wanted:
-            operators[step].append(operator)
-    state, chosen = task.initial, []
-    for step in plan:
-        after = next(((o, s) for o in operators[step] if (s := task.applied(state, o)) is not None), None)
-        if after is None:
-            return plan
-        chosen.append(after[0])
-        state = after[1]
-    if shorten and state & task.goal == task.goal:
+    chosen = task.operators_of(plan)
+    if chosen is None:
+        return plan
+    if shorten and task.carried_out(task.initial, chosen)[0] & task.goal == task.goal:
         chosen = shortened(task, chosen)
     return [task.describe(operator)[:2] for operator in regrouped(task, chosen)]

@@ -1,14 +1,17 @@
 """Shorter plans: a window of steps is replaced where a bounded search finds fewer that do what the rest of the plan needs.
 
-window      consecutive steps, from the state before them to the bits that the steps behind it (and the goal) need
+window      consecutive steps, from the state before them to the bits that the steps behind it (and the goal) need; amounts are
+            as these want them if the steps behind still lead to the goal
 operators   those nearest to the window: reachable early from its start and wanted early by its end
 search      A* with h_FF on these operators alone; what can't become shorter by h is cut off
+restarts    the whole plan is searched anew with all operators, h counting for less each time, for the work that is left
 order       windows are tried on the plan as it is and regrouped, so that a step stands behind one that it depends on
 
 Work is counted in operators looked at and never in seconds, so the same plan is improved alike on any machine.
 
 Action elimination (`shortened`): Nakhost and Müller, "Action elimination and plan neighborhood graph search", ICAPS
-2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015).
+2010. Windows of plans: Siddiqui and Haslum, "Continuing plan quality optimisation", JAIR 54 (2015). Restarts: Richter,
+Thayer and Ruml, "The joy of forgetting: faster anytime search via restarting", ICAPS 2010.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from planner.grounded.shortest import shortest, ways
 from planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12  # looked at for a cheapest plan, where the plan has no more steps
+WEIGHTS = (5, 3, 2)  # of h, in searches of the whole plan anew
 WAYS = 20  # of what follows from others, gone through in the time in which an operator is looked at
 SIZES = (8, 16)  # steps of a window
 OPERATORS = 150  # of a window's search
@@ -53,14 +57,11 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
     if task.prices and task.cost_of(best) > task.cost_of(plan):
         best = list(plan)
     if len(best) <= STEPS:
-        cost = task.cost_of(best)
-        looked = (1 + len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
-        states = min(STATES, work // looked)
-        exact = shortest(task, ways(task), cost, states, deadline)
-        if exact.plan is not None or exact.bound >= cost:
-            return best if exact.plan is None else list(exact.plan)
-    if task.amounts is not None:
-        return best  # what a window leaves of an amount isn't told by bits
+        best, proved = cheapest(task, best, work, deadline)
+        if proved:
+            return best
+    if task.prices:
+        return best  # fewer steps may cost more, depending on where they are done
     windows = _Windows(task, work, deadline)
     while True:
         before = len(best)
@@ -69,7 +70,15 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
             best = windows.pass_over(regrouped(task, best), size)
         best = shortened(task, best, deadline)
         if len(best) == before or windows.over:
-            return best
+            return windows.restarted(best)
+
+
+def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
+    """Return a cheapest plan or, if few states don't tell one, the given one; and whether no plan is cheaper."""
+    looked = (1 + len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
+    cost = task.cost_of(plan)
+    found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
+    return plan if found.plan is None else list(found.plan), found.plan is not None or found.bound >= cost
 
 
 def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
@@ -178,7 +187,12 @@ class _Windows:
     @property
     def over(self) -> bool:
         """Whether no more work may be done."""
-        return self.work <= 0 or (self.deadline is not None and perf_counter() > self.deadline)
+        return self.work <= 0 or self.late
+
+    @property
+    def late(self) -> bool:
+        """Whether the deadline has passed."""
+        return self.deadline is not None and perf_counter() > self.deadline
 
     def pass_over(self, plan: list[int], size: int) -> list[int]:
         """Return the plan after one pass of windows, half overlapping."""
@@ -219,26 +233,38 @@ class _Windows:
             return None
         operators = self.near(steps, state, wanted)
         task = self.part(operators, state, wanted)
-        found = self.search(task, len(steps))
+        found = self.search(task, len(steps), EVALUATIONS)
         if found is None:
             self.failed.add((state, wanted, len(steps)))
             return None
         return [operators[operator] for operator in found]
 
-    def search(self, task: Task, limit: int) -> list[int] | None:
-        """Search a plan with fewer steps than a limit: A*, cut off where g + h reaches the limit."""
-        evaluate, wanted = heuristic(task), task.goal
+    def restarted(self, plan: list[int]) -> list[int]:
+        """Return a plan with fewer steps that cost no more, searched as a whole with ever less greed for what work is left."""
+        task = self.task
+        for weight in WEIGHTS:
+            found = self.search(task, len(plan), self.work // max(len(task.owners), 1), weight)
+            if found is not None and task.cost_of(found) <= task.cost_of(plan):
+                plan = found
+        return shortened(task, plan, self.deadline)
+
+    def search(self, task: Task, limit: int, evaluations: int, weight: int = 1) -> list[int] | None:
+        """Search a plan with fewer steps than a limit: A* by g + weight h, cut off where g + h reaches the limit."""
+        low, wanted = (1 << task.size) - 1, task.goal
+        plain = task if task.amounts is None else replace(task, amounts=None, initial=task.initial & low)
+        evaluate = heuristic(plain)
         entries: list[tuple[int, int, int, int, list[int]]] = []
         came_from: dict[int, tuple[int, int]] = {}
         g_of = {task.initial: 0}
         waiting = [task.initial]
         number = 0
-        while number < EVALUATIONS:
+        while number < evaluations and not self.late:
             for state in waiting:
                 number += 1
-                evaluation = evaluate(state)
+                evaluation = evaluate(state & low)
                 if evaluation is not None and g_of[state] + evaluation[0] < limit:
-                    heapq.heappush(entries, (g_of[state] + evaluation[0], evaluation[0], number, state, evaluation[2]))
+                    rank = g_of[state] + weight * evaluation[0]
+                    heapq.heappush(entries, (rank, evaluation[0], number, state, evaluation[2]))
             if not entries:
                 break
             _, _, _, before, applicable = heapq.heappop(entries)
@@ -281,7 +307,7 @@ class _Windows:
         task, far = self.task, 1000
         owners, _, _ = self.arrays
         self.work -= len(owners) // LOOK
-        at_first = self.flags(state)
+        at_first = self.flags(state & (1 << task.size) - 1)
         forward = np.full(len(owners), far)
         known = at_first.copy()
         for depth in range(len(steps)):
@@ -326,6 +352,23 @@ class _Windows:
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*operators, *(r for r in self.beside if task.owners[r] < 0 or task.owners[r] in place)]
         needs = [task.needs[r] for r in rows]
+        owners = [place.get(task.owners[r], -1) for r in rows]
+        costs = [task.costs[operator] for operator in operators]
+        if task.amounts is not None:  # which are told by the bits of the whole task
+            of = task.amounts.moves
+            return replace(
+                task,
+                initial=state,
+                goal=wanted,
+                costs=costs,
+                owners=owners,
+                needs=_grouped(needs),
+                adds=_grouped([task.adds[r] for r in rows]),
+                change=lambda operator: task.known(operators[operator]),
+                describe=lambda operator: task.describe(operators[operator]),
+                amounts=replace(task.amounts, moves=lambda operator: of(operators[operator]), _moves={}),
+                _changes={},
+            )
         bits = sorted({bit for found in needs for bit in found}.union(bits_of(wanted | task.derived.mask)))
         new = {bit: i for i, bit in enumerate(bits)}
         mask = sum(1 << bit for bit in bits)
@@ -342,8 +385,8 @@ class _Windows:
             size=len(bits),
             initial=small(state),
             goal=small(wanted),
-            costs=[task.costs[operator] for operator in operators],
-            owners=[place.get(task.owners[r], -1) for r in rows],
+            costs=costs,
+            owners=owners,
             needs=_grouped([[new[bit] for bit in found] for found in needs]),
             adds=_grouped([[new[bit] for bit in task.adds[r] if bit in new] for r in rows]),
             derived=task.derived.renamed(small),

@@ -15,6 +15,7 @@ conditional effect              a step of an operator, and a relaxed operator of
 from __future__ import annotations
 
 import itertools
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -179,6 +180,22 @@ class Task:
         if known is None:
             known = self._changes[operator] = self.change(operator)
         return known
+
+    def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
+        """Return the operators that do behaviours with their arguments one after the other; None if one can't be done."""
+        wanted, named = set(steps), defaultdict(list)
+        for operator in range(len(self)):
+            step = self.describe(operator)[:2]
+            if step in wanted:
+                named[step].append(operator)
+        state, found = self.initial, []
+        for step in steps:
+            done = next(((o, after) for o in named[step] if (after := self.applied(state, o)) is not None), None)
+            if done is None:
+                return None
+            found.append(done[0])
+            state = done[1]
+        return found
 
     def values(self, state: int) -> dict[Symbol, str]:
         """Return a state as values of symbols; a boolean symbol that could never be true is left out."""

@@ -111,7 +111,7 @@ def _plan(
             if improve:
                 with suppress(LimitError):  # then the first plan is what there is
                     shorten(call, improve, leave_levels, advised)
-            return outcome(Status.SOLVED, call.tree())
+            return outcome(Status.SOLVED, levelled(call) if improve else call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
@@ -150,8 +150,22 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
         call.steps = before
 
 
+def levelled(call: Call) -> Plan:
+    """Return the plan of a call that left a level, or has only one, made shorter on the lowest one where that is small."""
+    from planner.hierarchical.flattened import shortened
+
+    levels, plan = call.program.levels, call.tree()
+    if len(levels) > 1 and not call.given_up:
+        return plan
+    with suppress(LimitError):
+        plan = shortened(call.problem, plan, call.segments.deadline)
+    if all(step.level == levels[0] for step in plan.steps):
+        call.given_up.clear()  # there are steps of it after all
+    return plan
+
+
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
-    """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
+    """Return the shortest of a call's steps, those with the goals reversed, those to all goals at once, and with windows anew.
 
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
     tried uses the most abstract level alone.
@@ -161,20 +175,38 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     )
     if len(call.steps) < DETOURS * unmet:
         return call.steps
-    best = call.steps
     first = call.program.levels[0]
-    reversed_goal = dict(reversed(list(call.problem.goal.items())))
-    left = max(call.segments.worked, MUCH)  # for both together
-    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
-        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
+    reversed_goal = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
+    best = call.steps
+    left = max(call.segments.worked, MUCH)  # for all together
+
+    def at_once(recovery: Recovery) -> bool:
+        return recovery.together(first) and (
+            all(map(recovery.call.met, recovery.call.goal)) or recovery.finish()  # what the first level doesn't see
+        )
+
+    def in_series(recovery: Recovery) -> bool:
+        return recovery.call.serialise(recovery.harder)
+
+    def by_windows(recovery: Recovery) -> bool:
+        from planner.hierarchical.flattened import fewer
+
+        steps = [recovery.call.refiner.do(first, *step) for step in fewer(call.problem, best, call.segments.deadline)]
+        recovery.call.steps = [step for step in steps if step is not None]
+        return bool(steps) and None not in steps
+
+    ways = [
+        (reversed_goal, in_series),
+        *([] if call.at_once else [(call.problem, at_once)]),
+        (call.problem, by_windows),
+    ]
+    for problem, way in ways:
+        other = Call(problem, call.using, call.segments.deadline, call.segments.most)
         other.segments.most_work = left
         advised(other)
-        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
-            done = recovery.together(first) if at_once else other.serialise(recovery.harder)
-            if at_once and done and not all(map(other.met, other.goal)):  # what the first level doesn't see
-                done = recovery.finish() and all(map(other.met, other.goal))
-            if done and length(other.steps) < length(best):
+            done = way(Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True))
+            if done and all(map(other.met, other.goal)) and length(other.steps) < length(best):
                 best = other.steps
         left = max(left - other.segments.worked, 0)
     return best

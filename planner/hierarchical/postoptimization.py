@@ -52,7 +52,12 @@ def worth_it(old: Sequence[RefinedStep], new: Sequence[RefinedStep]) -> bool:
     """Whether new steps are shorter by enough for the steps of the most abstract level that they give up."""
     first = min(step.level for step in old) if old else 0
     given_up = [sum(step.level == first for step in steps) for steps in (old, new)]
-    return length(old) - length(new) > max(given_up[0] - given_up[1], 0) / PER_PRIMITIVE
+    return worth(length(old) - length(new), given_up[0] - given_up[1])
+
+
+def worth(saved: int, given_up: int) -> bool:
+    """Whether primitives that are saved are worth the steps of the most abstract level that are given up for them."""
+    return saved > max(given_up, 0) / PER_PRIMITIVE
 
 
 def undone_by(changes: Sequence[Changes]) -> dict[int, int]:

@@ -1,76 +1,97 @@
-"""A plan of one level put under behaviours of the levels above, wherever a run of its steps does what one of them says."""
+"""A plan of one level put under behaviours of the levels above, wherever a run of its steps does what one of these says."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.plan import OutOfTimeError, Plan, Step, TooLargeError, renumbered
 from planner.validation import successor
-from reasoner.symbols import FALSE, Problem, State
+from reasoner.symbols import FALSE, Problem, State, Symbol
 
 LONGEST = 60
 """Steps that may stand under one of the level above."""
 
 
 def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan of one level with its steps under those of the levels above, as far up as every step finds a place."""
+    """Return a plan of one level with its steps under those of the levels above, wherever a run does what one of these says.
+
+    As few as can be stay by themselves. Nothing is asked of the plan here: what the checker refuses is no plan.
+    """
     steps = list(plan.steps)
     for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
         grouped = _grouped(problem, steps, level)
-        if grouped is None:
+        if grouped == steps:
             break
         steps = grouped
     return Plan(renumbered(steps))
 
 
-def _grouped(problem: Problem, steps: Sequence[Step], level: int) -> list[Step] | None:
-    """Return as few steps of a level as have all these steps under them, each run doing what its step says; None if none have."""
+def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
+    """Return steps with as many of them as can be under as few steps of a level as can be, each run doing what its step says.
+
+    Where a run begins and ends, all is at rest that the level doesn't see and that was touched.
+    """
     try:
-        task = ground(problem, level)
+        task = ground(problem, level, goal={})  # which may be none that it sees
     except (TooLargeError, OutOfTimeError):
-        return None
-    if not isinstance(task, Task):
-        return None
-    values: list[State] = [dict(problem.initial)]
-    for step in steps:
-        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, values[-1])
-        if after is None:
-            return None
-        values.append(after)
+        return steps
+    values = _course(problem, steps)
+    if not isinstance(task, Task) or values is None:
+        return steps
     states = [_state(task, value) for value in values]
-    situations = problem.domain.situations
-    best: list[tuple[int, int, int] | None] = [(0, 0, -1), *[None] * len(steps)]  # number of steps, begin, operator
+    at_rest = list(_at_rest(problem, values, level))
+    best: list[tuple[int, int, int, int]] = [(0, 0, -1, -1)]  # steps by themselves, steps of the level, begin, operator
+    best += [(i, 0, i - 1, -1) for i in range(1, len(states))]
     for i, state in enumerate(states[:-1]):
-        here = best[i]
-        if here is None:
+        alone, many = best[i][:2]
+        best[i + 1] = min(best[i + 1], (alone + 1, many, i, -1))
+        if not at_rest[i]:
             continue
         ways = {task.applied(state, operator): operator for operator in task.applicable(state)[0]}
-        touched: set[object] = set()
         for j in range(i + 1, min(i + LONGEST, len(steps)) + 1):
-            touched |= {s for s, value in values[j].items() if values[j - 1].get(s, FALSE) != value}
-            there = best[j]
-            if states[j] == state or states[j] not in ways or (there is not None and there[0] <= here[0] + 1):
-                continue
-            at_rest = all(
-                value == situations[s.situation].rest
-                for s, value in values[j].items()
-                if s in touched and situations[s.situation].level > level and situations[s.situation].rest is not None
-            )
-            if at_rest:
-                best[j] = (here[0] + 1, i, ways[states[j]])
+            if at_rest[j] and states[j] != state and states[j] in ways:
+                best[j] = min(best[j], (alone, many + 1, i, ways[states[j]]))
     found: list[Step] = []
     end = len(steps)
     while end:
-        entry = best[end]
-        if entry is None:
-            return None
-        _, begin, operator = entry
-        found.append(replace(task.steps([operator])[0], steps=tuple(steps[begin:end])))
+        _, _, begin, operator = best[end]
+        run = tuple(steps[begin:end])
+        found += run if operator < 0 else [replace(task.steps([operator])[0], steps=run)]
         end = begin
     return found[::-1]
+
+
+def _course(problem: Problem, steps: Sequence[Step]) -> list[State] | None:
+    """Return what holds before the first of some steps and after each; None if one can't be done."""
+    found: list[State] = [dict(problem.initial)]
+    for step in steps:
+        values = found[-1]
+        for one in Plan((step,)).primitives:
+            after = successor(problem, problem.domain.behaviors[one.behavior], one.arguments, values)
+            if after is None:
+                return None
+            values = after
+        found.append(values)
+    return found
+
+
+def _at_rest(problem: Problem, course: Sequence[State], level: int) -> Iterator[bool]:
+    """Yield of each state whether everything is at rest that a level doesn't see and that was touched on the way."""
+    rests = {
+        name: kind.rest
+        for name, kind in problem.domain.situations.items()
+        if kind.rest is not None and kind.level > level
+    }
+    restless: set[Symbol] = set()
+    for before, after in pairwise([course[0], *course]):
+        for symbol, value in after.items():
+            if symbol.situation in rests and before.get(symbol, FALSE) != value:
+                (restless.discard if value == rests[symbol.situation] else restless.add)(symbol)
+        yield not restless
 
 
 def _state(task: Task, values: State) -> int:

@@ -1,0 +1,91 @@
+"""A plan that leaves a level, made shorter as one of the lowest level alone and put under the levels above again.
+
+Where a level is left, goals came one after the other on a level below, and nothing above says what their steps share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from planner.grounded.grounding import ground
+from planner.grounded.plan_windows import shorter
+from planner.grounded.task import Task
+from planner.hierarchical.postoptimization import worth
+from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.regrouping import under_the_levels_above
+from planner.levels import levels_left
+from planner.plan import Plan, TooLargeError
+from planner.validation import validate
+from reasoner.symbols import Problem
+
+MOST_ROWS = 20_000
+"""The largest level that is searched as a whole, in rows of a join on the way to its operators."""
+
+WORK = 1_000_000
+"""Operators that are looked at to make a plan shorter."""
+
+
+def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Plan:
+    """Return a plan that is shorter and breaks no more that a level above asks; the same if none is found.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+        One that leaves a level.
+    deadline : float, optional
+        On the clock of `time.perf_counter`.
+    """
+    task = small(problem, problem.domain.levels[-1], deadline)
+    old = plan.primitives
+    operators = task.operators_of([(s.behavior, s.arguments) for s in old]) if task is not None else None
+    if task is None or operators is None:
+        return plan
+    new = shorter(task, operators, WORK, deadline)
+    if len(new) >= len(old):
+        return plan
+    flat = Plan(task.steps(new))
+    for found in (under_the_levels_above(problem, flat), flat):
+        first = problem.domain.levels[0]
+        lost = sum(s.level == first for s in plan.steps) - sum(s.level == first for s in found.steps)
+        if (
+            worth(len(old) - len(new), lost)
+            and not validate(problem, found)
+            and broken(problem, found) <= broken(problem, plan)
+        ):
+            return found
+    return plan
+
+
+def fewer(
+    problem: Problem, steps: Sequence[RefinedStep], deadline: float | None = None
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Return fewer steps of the most abstract level in the place of some, not refined; none if none are found.
+
+    Raises
+    ------
+    OutOfTimeError
+        The deadline came before grounding was done.
+    """
+    level = problem.domain.levels[0]
+    task = small(problem, level, deadline) if all(step.level == level for step in steps) else None
+    operators = task.operators_of([(s.behavior, s.arguments) for s in steps]) if task is not None else None
+    if task is None or operators is None:
+        return []
+    found = shorter(task, operators, WORK, deadline)
+    return [task.describe(operator)[:2] for operator in found] if len(found) < len(operators) else []
+
+
+def small(problem: Problem, level: int, deadline: float | None) -> Task | None:
+    """Return the task of a level, with what it sees of the goal and of what is at rest; None if it is large."""
+    goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
+    try:
+        task = ground(problem, level, goal=goal, most=MOST_ROWS, deadline=deadline)
+    except TooLargeError:
+        return None
+    return task if isinstance(task, Task) else None
+
+
+def broken(problem: Problem, plan: Plan) -> int:
+    """Return how many changes of a plan break what a level above asks."""
+    return sum(len(left.broken) for left in levels_left(problem, plan))

@@ -1,0 +1,64 @@
+"""Plans that leave a level, and plans of one level, are made shorter on that level and put under the levels above again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from planner.hierarchical.planner import plan as default_plan
+from planner.hierarchical.regrouping import under_the_levels_above
+from planner.paper.hierarchy import plan as paper_plan
+from planner.plan import Limits, Plan
+from planner.validation import validate
+from reasoner.symbols import Problem
+from worlds.agreement import cheapest
+from worlds.hierarchies import hierarchy
+
+LEFT = (700316, 700359, 700680, 701211, 701609)
+"""Worlds whose plans leave level 1."""
+LIMITS = Limits(expansions=20_000)
+
+
+def lowest(problem: Problem) -> Problem:
+    """Return a problem with the behaviours of the lowest level alone."""
+    level = problem.domain.levels[-1]
+    behaviors = {name: replace(b, level=1) for name, b in problem.domain.behaviors.items() if b.level == level}
+    situations = {name: replace(s, level=1) for name, s in problem.domain.situations.items()}
+    return replace(problem, domain=replace(problem.domain, behaviors=behaviors, situations=situations))
+
+
+@pytest.mark.parametrize("seed", LEFT)
+def test_a_plan_that_leaves_a_level_has_no_more_steps_than_needed(seed: int) -> None:
+    problem = hierarchy(seed)
+    ours, paper = default_plan(problem, limits=LIMITS), paper_plan(problem, limits=LIMITS)
+    assert ours.plan is not None
+    assert paper.plan is not None
+    assert len(ours.plan.primitives) <= 1.2 * len(paper.plan.primitives)
+
+
+def test_a_small_world_of_one_level_is_planned_nearly_as_short_as_can_be() -> None:
+    known = []
+    for seed in range(700_000, 700_040):
+        problem = lowest(hierarchy(seed))
+        least, found = cheapest(problem, most=3_000), default_plan(problem, limits=LIMITS)
+        if least is not None and found.plan is not None:
+            known.append(len(found.plan.primitives) / max(least, 1))
+    assert len(known) > 15
+    assert max(known) <= 1.2
+
+
+def test_primitives_stand_under_the_levels_above_wherever_these_say_what_a_run_of_them_does() -> None:
+    kept = 0
+    for seed in range(700_000, 700_060):
+        problem = hierarchy(seed)
+        found = default_plan(problem, limits=LIMITS)
+        if found.plan is None or not found.plan.steps or found.given_up:
+            continue
+        flat = Plan(tuple(replace(s, path=(i,), bindings={}) for i, s in enumerate(found.plan.primitives)))
+        grouped = under_the_levels_above(problem, flat)
+        assert not validate(problem, grouped)
+        by_themselves = sum(not step.steps for step in grouped.steps)
+        assert by_themselves <= sum(not step.steps for step in found.plan.steps)
+        kept += 1
+    assert kept > 15
