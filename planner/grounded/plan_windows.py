@@ -70,7 +70,8 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
             best = windows.pass_over(regrouped(task, best), size)
         best = shortened(task, best, deadline)
         if len(best) == before or windows.over:
-            return windows.restarted(best)
+            best = windows.restarted(best)
+            return best if task.cost_of(best) <= task.cost_of(plan) else list(plan)  # fewer steps may cost more
 
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
