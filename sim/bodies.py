@@ -7,15 +7,23 @@ Metres and kilograms; a body's frame has its origin in the middle of the base, z
 
 from __future__ import annotations
 
+import hashlib
 import math
+import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from threading import Lock
+from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import pybullet
+from numpy.typing import ArrayLike
 
 from reasoner.embodiment.values import Shape
 from sim.urdf import Array
@@ -64,27 +72,54 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
     planks = [*_planks(shape)]
     base = shape.profile[0][1] + wall(shape)
     inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
-    with tempfile.TemporaryDirectory() as folder:
-        mesh = Path(folder) / "vessel.obj"
-        mesh.write_text(_revolved(shape))
-        urdf = Path(folder) / "vessel.urdf"
-        urdf.write_text(
-            VESSEL.format(
-                height=center_height(shape),
-                mass=shape.mass,
-                inertia=inertia,
-                mesh=mesh.name,
-                color=" ".join(str(part) for part in shape.color),
-                radius=base,
-                bottom=wall(shape),
-                middle=wall(shape) / 2,
-                planks="\n".join(planks),
-            )
-        )
-        body = pybullet.loadURDF(
-            str(urdf), position.tolist(), orientation.tolist(), useMaximalCoordinates=True, physicsClientId=client
-        )
+    mesh = _revolved(shape)
+    text = VESSEL.format(
+        height=center_height(shape),
+        mass=shape.mass,
+        inertia=inertia,
+        mesh=file_name(mesh, "obj"),
+        color=" ".join(str(part) for part in shape.color),
+        radius=base,
+        bottom=wall(shape),
+        middle=wall(shape) / 2,
+        planks="\n".join(planks),
+    )
+    body = load_written(text, position, orientation, mesh, useMaximalCoordinates=True, physicsClientId=client)
     return _rub(client, shape, body)
+
+
+def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
+    """Load a URDF that is written for it, and the mesh that it calls by its `file_name`; nothing of that stays on disk.
+
+    PyBullet never forgets a file, and knows it by its name: under new names each vessel would take 50 KB more.
+    """
+    with _LOADING:
+        folder = Path(tempfile.gettempdir()) / _folder(os.getpid())
+        folder.mkdir(mode=0o700)
+        try:
+            if mesh:
+                (folder / file_name(mesh, "obj")).write_text(mesh, encoding="utf-8")
+            urdf = folder / file_name(text, "urdf")
+            urdf.write_text(text, encoding="utf-8")
+            return int(
+                pybullet.loadURDF(str(urdf), np.asarray(position).tolist(), np.asarray(orientation).tolist(), **options)
+            )
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def file_name(text: str, kind: str) -> str:
+    """Return the name under which a text is loaded, a name of its own."""
+    return f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.{kind}"
+
+
+@cache
+def _folder(process: int) -> str:
+    """Return the name of a process's own folder, which nobody can guess."""
+    return f"confab-bodies-{process}-{uuid4().hex}"
+
+
+_LOADING = Lock()
 
 
 VESSEL = """<robot name="vessel"><link name="vessel">
@@ -156,12 +191,7 @@ def make_turned(client: int, shape: Shape, position: Array, orientation: Array) 
     radius, height = max(r for _, r in shape.profile), shape.profile[-1][0]
     inertia = shape.mass * (radius**2 / 4 + height**2 / 12)
     text = TURNED.format(center=center_height(shape), mass=shape.mass, inertia=inertia, solids="\n".join(lines))
-    with tempfile.TemporaryDirectory() as folder:
-        urdf = Path(folder) / "turned.urdf"
-        urdf.write_text(text)
-        body = pybullet.loadURDF(
-            str(urdf), position.tolist(), orientation.tolist(), useMaximalCoordinates=True, physicsClientId=client
-        )
+    body = load_written(text, position, orientation, useMaximalCoordinates=True, physicsClientId=client)
     return _rub(client, shape, body)
 
 

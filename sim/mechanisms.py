@@ -5,14 +5,13 @@ Joints resist by friction and damping; springs push back and latches hold.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import pybullet
 
 from reasoner.embodiment.values import Link, Mechanism
+from sim.bodies import load_written
 from sim.collision import Solid
 from sim.linkage import moved, read_mechanism, solids, urdf_name, wide, written
 from sim.urdf import Array, Model
@@ -89,19 +88,11 @@ class Mechanic:
 
 def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
     """Put a mechanism into a physics world, every joint at 0."""
-    place = {
-        "basePosition": mechanism.position,
-        "baseOrientation": pybullet.getQuaternionFromEuler([0, 0, mechanism.yaw]),
-        "useFixedBase": True,
-        "physicsClientId": client,
-    }
+    position, orientation = mechanism.position, pybullet.getQuaternionFromEuler([0, 0, mechanism.yaw])
     if mechanism.urdf:
-        body = pybullet.loadURDF(mechanism.urdf, **place)
+        body = pybullet.loadURDF(mechanism.urdf, position, orientation, useFixedBase=True, physicsClientId=client)
     else:
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "mechanism.urdf"
-            file.write_text(written(mechanism), encoding="utf-8")
-            body = pybullet.loadURDF(str(file), **place)
+        body = load_written(written(mechanism), position, orientation, useFixedBase=True, physicsClientId=client)
     numbers = {}
     for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
         numbers[pybullet.getJointInfo(body, i, physicsClientId=client)[12].decode()] = i

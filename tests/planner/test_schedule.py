@@ -3,12 +3,13 @@
 from functools import cache
 
 import networkx
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.acting.schedule import Order, makespan, partial_order, schedule
+from planner.acting.schedule import Order, makespan, partial_order, ready, schedule, urgency_of, worker_of
 from planner.hierarchical.planner import plan
-from planner.plan import Plan
+from planner.plan import Plan, Step
 from planner.validation import validate
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
@@ -67,3 +68,56 @@ def test_a_pour_waits_for_the_cup_and_the_cup_for_nobody() -> None:
     put_down = next(i for i, step in enumerate(primitives) if step.id == 30)
     assert networkx.has_path(order, put_down, reach_cup1)
     assert not list(order.predecessors(position["8 B3_REACH_HAND_OBJECT right_hand bottle1"]))
+
+
+# ------------------------------------------------------------------------------------------------- small ones, by hand
+
+
+def step(name: str, *arguments: str) -> Step:
+    return Step((0,), 0, 1, name, arguments)
+
+
+FORK: Order = networkx.DiGraph([(0, 1), (1, 2), (0, 3)])
+
+
+def test_how_urgent_a_step_is_is_how_long_the_longest_chain_behind_it_takes() -> None:
+    assert urgency_of(FORK) == {0: 3.0, 1: 2.0, 2: 1.0, 3: 1.0}
+
+
+def begin(begun: set[int], running: list[int], urgency: dict[int, float], room: bool = True) -> list[int]:
+    steps = [step("A", "left"), step("B", "left"), step("C", "right"), step("D", "right")]
+    return ready(FORK, steps, ["left", "right"], begun, running, urgency, lambda one, other: room)
+
+
+def test_a_step_begins_when_all_before_it_has_ended_the_most_urgent_first() -> None:
+    urgency = urgency_of(FORK)
+    assert begin(set(), [], urgency) == [0]
+    assert begin({0}, [0], urgency) == []
+    assert begin({0}, [], urgency) == [1, 3]
+    assert begin({0}, [], {**urgency, 3: 9.0}) == [3, 1]
+    assert begin({0}, [], urgency, room=False) == [1]
+    assert begin({0, 1}, [1], urgency) == [3]
+    assert begin({0, 1, 3}, [3], urgency) == []
+
+
+def test_who_does_a_step_is_the_first_worker_that_it_names() -> None:
+    assert worker_of(step("GIVE", "cup1", "right", "left"), ["left", "right"]) == "right"
+    assert worker_of(step("WAIT", "cup1"), frozenset(["left"])) == ""
+
+
+def test_steps_take_the_seconds_that_are_said_and_the_longest_chain_goes_first() -> None:
+    primitives = planned().primitives
+    slow = {i: 1.0 + i % 3 for i in range(len(primitives))}
+    slots = schedule(serving(), primitives, slow)
+    assert all(slot.end - slot.begin == slow[slot.position] for slot in slots)
+    assert makespan(slots) == max(slot.end for slot in slots)
+    assert [slot.begin for slot in slots] == sorted(slot.begin for slot in slots)
+    assert makespan([]) == 0.0
+    assert schedule(serving(), ()) == []
+
+
+def test_the_order_names_its_steps_and_refuses_what_cannot_be_done() -> None:
+    primitives = planned().primitives
+    assert {i: data["label"] for i, data in needed().nodes(data=True)} == dict(enumerate(map(str, primitives)))
+    with pytest.raises(ValueError, match="isn't applicable where it is done"):
+        partial_order(serving(), primitives[1:])
