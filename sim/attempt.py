@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.collision import Mover
+from sim.collision import Mover, Surroundings, free
 from sim.engine import Engine
 from sim.motion import (
     SWIVELS,
@@ -42,8 +41,8 @@ ROUNDED = 3
 THIN = 0.01
 """Metres by which fingers are open around a handle."""
 
-EFFORTS = ((0, None), (150, None), (600, 4))
-"""Samples of a search for a path, and to how many goals: first without any, then briefly, then longer to the best goals."""
+SAMPLES = 1500
+"""Samples of a search for a path to any of the goals."""
 
 FINER = 4
 """By how much denser than others a line is sampled that is followed as far as it is free."""
@@ -177,26 +176,21 @@ class Attempt:
     def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None) -> int:
         """Move to the first goal pose that a free path leads to, maybe with fingers that go to an `opening`; return which it is."""
         with self.planning():
-            found, reacher = None, self.reacher(*ignored, opening=opening, whole=True)
+            reacher = self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
             free = reacher.follow(start[None]) is not None
             left = start if free else leave(reacher, start)
-            for attempts, most in EFFORTS:
-                for i, goal in enumerate(targets[:most]):
-                    turns = None if left is None else connect(reacher, left, goal, self.world.rng, attempts)
-                    if turns is not None:
-                        found = i, reacher.solve(polyline(turns if free else np.concatenate([start[None], turns])))[0]
-                        break
-                if found is not None:
-                    break
-            if found is None:
+            reached = None if left is None else connect(reacher, left, targets, self.world.rng, SAMPLES)
+            if reached is None:
                 blame = reacher.blame(line(start, targets[0]))
                 raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
+            turns = reached[1] if free else np.concatenate([start[None], reached[1]])
+            q = reacher.solve(polyline(turns))[0]
             near = replace(reacher, margin=min(MARGIN, CLOSE + 2 * self.world.noise))
-            rounded = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(found[1], n)).all()), 0)
-        self.follow(found[1], corners=rounded)
-        return found[0]
+            rounded = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(q, n)).all()), 0)
+        self.follow(q, corners=rounded)
+        return reached[0]
 
     def straight(
         self,
@@ -304,36 +298,38 @@ def _free(
 ) -> list[int]:
     """Return the first few candidates, in `order`, that touch nothing at any stage; raise if none does."""
     chosen: list[int] = []
-    blocked: Counter[str] = Counter()
-    best: dict[str, float] = {}
-    widest = -np.inf
+    scenes = [_scene(reacher, closed, bare, stage) for stage in stages]
     for start in range(0, len(order), BATCH):
-        batch = order[start : start + BATCH]
-        clear = np.full(len(batch), np.inf)
-        for name, gap in _gaps(reacher, closed, bare, stages, [q[batch] for q in postures]).items():
-            clear = np.minimum(clear, gap)
-            blocked[name] += int(np.sum(gap <= reacher.margin))
-            best[name] = max(best.get(name, -np.inf), float(gap.max()))
-        widest = max(widest, float(clear.max()))
-        chosen += [int(i) for i in batch[clear > reacher.margin]]
+        left = order[start : start + BATCH]
+        for (mover, around, spare), q in zip(scenes, postures, strict=True):
+            left = left[free(mover.at(q[left]), mover.spheres.radii, around, reacher.margin - spare)]
+        chosen += [int(i) for i in left]
         if len(chosen) >= ENOUGH:
             break
     if not chosen:
-        most = blocked.most_common(1)[0][1]
-        blocking = sorted((name for name, count in blocked.items() if count == most), key=best.__getitem__)
-        raise SkillError("goal in collision", named(*objects, *blocking), clearance_m=widest)
+        raise _blocked(reacher.margin, scenes, [q[order] for q in postures], objects)
     return chosen
 
 
-def _gaps(
-    reacher: Reacher, closed: Mover, bare: Mover, stages: Sequence[Stage], postures: Sequence[Array]
-) -> dict[str, Array]:
-    """Return how near to each thing the candidates come, at the stage where they come nearest."""
+Scene = tuple[Mover, Surroundings, float]
+
+
+def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage) -> Scene:
+    """Return an arm as it is at a stage, what is around it then, and by how much less it has to keep off that."""
+    around = reacher.around if stage.around is None else stage.around
+    mover = closed if stage.closed else bare if stage.released else reacher.mover
+    return mover, around.without(*stage.ignored), MARGIN - CLOSE if stage.near else 0.0
+
+
+def _blocked(margin: float, scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
+    """Return what to raise where no candidate is free: it names what blocks most of them."""
     nearest: dict[str, Array] = {}
-    for stage, q in zip(stages, postures, strict=True):
-        around = reacher.around if stage.around is None else stage.around
-        mover = closed if stage.closed else bare if stage.released else reacher.mover
-        for name, gap in mover.clearances(q, around.without(*stage.ignored)).items():
-            spare = MARGIN - CLOSE if stage.near else 0.0
+    for (mover, around, spare), q in zip(scenes, postures, strict=True):
+        for name, gap in mover.clearances(q, around).items():
             nearest[name] = np.minimum(gap + spare, nearest.get(name, np.inf))
-    return nearest
+    count = {name: int(np.sum(gap <= margin)) for name, gap in nearest.items()}
+    blocking = sorted(
+        (name for name in nearest if count[name] == max(count.values())), key=lambda name: float(nearest[name].max())
+    )
+    widest = float(np.min(list(nearest.values()), axis=0).max())
+    return SkillError("goal in collision", named(*objects, *blocking), clearance_m=widest)

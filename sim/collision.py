@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from reasoner.embodiment.values import Fixture
-from sim.kinematics import Arm, link_transforms, turn
+from sim.kinematics import Arm, Flags, link_transforms, turn
 from sim.urdf import Array, Model, Spheres
+
+POINTS = 1000
+"""Points whose distances from everything are worked out at once: more at a time would have to wait for memory."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,24 @@ class Surroundings:
             left = replace(left, centers=self.centers[kept], radii=self.radii[kept], owners=owners)
         return left
 
+    @cached_property
+    def packed(self) -> tuple[Array, Array, Array, Array, Array]:
+        """The solids as arrays: turned axes (s, 3, 3), centres in them (s, 3), half extents (s, 3), and bounds (s, 3) twice.
+
+        Boxes come before cylinders.
+        """
+        solids = sorted(self.solids, key=lambda solid: solid.kind == "cylinder")
+        turned = np.array([solid.rotation for solid in solids]).reshape(-1, 3, 3)
+        centers = np.array([solid.center for solid in solids]).reshape(-1, 3)
+        half = np.array([solid.half for solid in solids]).reshape(-1, 3)
+        extent = np.einsum("sij,sj->si", np.abs(turned), half)
+        return turned, np.einsum("sij,si->sj", turned, centers), half, centers - extent, centers + extent
+
+    @cached_property
+    def boxes(self) -> int:
+        """How many of the solids are boxes."""
+        return sum(solid.kind != "cylinder" for solid in self.solids)
+
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
         """Return the surroundings with more spheres."""
         return replace(
@@ -100,6 +122,45 @@ class Mover:
     def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
         """Return, for everything that is near, its distance (n,) from the arm at each posture."""
         return clearances(self.at(q), self.spheres.radii, around)
+
+
+def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
+    """Return where (n,) spheres (m,) at centres (n, m, 3) keep a margin off everything: `clearances` without the distances."""
+    some = max(POINTS // max(len(radii), 1), 1)
+    return np.concatenate(
+        [_free(centers[i : i + some], radii, around, margin) for i in range(0, max(len(centers), 1), some)]
+    )
+
+
+def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
+    count, points = len(centers), centers.reshape(-1, 3)
+    if not count:
+        return np.ones(0, dtype=bool)
+    keep = np.maximum(radii + margin, 0.0)
+    low, high = (points - np.tile(keep, count)[:, None]).min(0), (points + np.tile(keep, count)[:, None]).max(0)
+    squares = np.tile(keep**2, count)
+    touched: Flags = np.zeros(len(points), dtype=bool)
+    turned, middles, half, bottom, top = around.packed
+    near = np.flatnonzero(np.all((bottom <= high) & (top >= low), -1))
+    if len(near):
+        axes = np.moveaxis(turned[near], 0, 1).reshape(3, -1)
+        local = np.abs((points @ axes).reshape(len(points), -1, 3) - middles[near])
+        split = int(np.searchsorted(near, around.boxes))
+        excess = np.maximum(local[:, :split] - half[near[:split]], 0.0)
+        outside = [np.einsum("psi,psi->ps", excess, excess)]
+        across = np.hypot(local[:, split:, 0], local[:, split:, 1]) - half[near[split:], 0]
+        along = local[:, split:, 2] - half[near[split:], 2]
+        outside.append(np.maximum(across, 0.0) ** 2 + np.maximum(along, 0.0) ** 2)
+        touched = np.asarray((np.concatenate(outside, 1) <= squares[:, None]).any(1))
+    if len(around.radii):
+        reach = around.radii[:, None]
+        close = np.all((around.centers + reach >= low) & (around.centers - reach <= high), -1)
+        if close.any():
+            others = around.centers[close]
+            gaps = (points**2).sum(1)[:, None] + (others**2).sum(1) - 2 * points @ others.T
+            touched |= np.asarray((gaps <= (np.tile(keep, count)[:, None] + around.radii[close]) ** 2).any(1))
+    found: Flags = np.asarray(~touched.reshape(count, -1).any(1))
+    return found
 
 
 def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, Array]:

@@ -14,9 +14,9 @@ import numpy as np
 
 from sim.assembly import read_robot
 from sim.base import Base
-from sim.collision import Surroundings, clearances, fixed_spheres
+from sim.collision import Surroundings, clearances, fixed_spheres, free
 from sim.engine import Engine
-from sim.kinematics import read_arm
+from sim.kinematics import Flags, read_arm
 from sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
 from sim.urdf import Array, Spheres
 from sim.verdict import SkillError, named
@@ -54,21 +54,20 @@ class Roller:
         """How far beyond start and goal a way is searched."""
         return np.array([1.0, 1.0, 0.0, np.pi, 0.0, 0.0])
 
-    def gaps(self, q: Array) -> dict[str, Array]:
-        """Return, for all that is near, its distance (n,) from the robot with its base at x, y, yaw (n, 3)."""
+    def at(self, q: Array) -> Array:
+        """Return the spheres' centres (n, m, 3) with the base at x, y, yaw (n, 3)."""
         cos, sin, zero = np.cos(q[:, 2]), np.sin(q[:, 2]), np.zeros(len(q))
         turned = np.stack([cos, -sin, zero, sin, cos, zero, zero, zero, zero + 1], -1).reshape(-1, 3, 3)
         shift = np.stack([q[:, 0], q[:, 1], zero], -1)
-        return clearances(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None], self.radii, self.around)
+        return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
     def solve(self, poses: Array) -> tuple[Array, Array]:
         """Return where the base is at poses: it gets everywhere."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
-    def free(self, q: Array) -> Array:
+    def free(self, q: Array) -> Flags:
         """Return where the robot touches nothing."""
-        found = self.gaps(q).values()
-        return np.all([gap > self.margin for gap in found], axis=0) if found else np.ones(len(q), dtype=bool)
+        return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
         """Return where the base is along poses, or None if the robot would touch something."""
@@ -90,7 +89,9 @@ class Roller:
 
     def blame(self, poses: Array) -> Blocked:
         """Return what is in the way along poses."""
-        gaps = {name: float(gap.min()) for name, gap in self.gaps(poses[:, BASE]).items()}
+        gaps = {
+            name: float(gap.min()) for name, gap in clearances(self.at(poses[:, BASE]), self.radii, self.around).items()
+        }
         touching = tuple(sorted((name for name, gap in gaps.items() if gap <= self.margin), key=gaps.__getitem__))
         return Blocked("no path", touching, min(gaps.values(), default=0.0))
 
@@ -133,11 +134,11 @@ def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | Non
     start = np.array([x, y, 0.0, yaw, 0.0, 0.0])
     end = turned_near(start, np.array([goal[0], goal[1], 0.0, goal[2], 0.0, 0.0]))
     roller = Roller(centers, np.concatenate([one.radii for one in spheres]), around, MARGIN)
-    corners = connect(roller, start, end, engine.rng, SAMPLES)
-    if corners is None:
+    reached = connect(roller, start, [end], engine.rng, SAMPLES)
+    if reached is None:
         blame = roller.blame(line(start, end))
         raise SkillError("no path", named(*things, *blame.objects), clearance_m=blame.clearance)
-    q = polyline(corners)[:, BASE]
+    q = polyline(reached[1])[:, BASE]
     top = np.array([base.robot.driving, base.robot.driving, base.robot.turning])
     found = scheduled(q, q, top, top / GENTLY, engine.rate)[0]
     engine.clock.planning += time.process_time() - begin

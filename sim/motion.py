@@ -10,19 +10,22 @@ RRT-Connect over the same six numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
-from sim.collision import Mover, Surroundings
-from sim.kinematics import Arm, hand_frames, inverse, swivel_of, turn
+from sim.collision import Mover, Surroundings, free
+from sim.kinematics import Arm, Flags, hand_frames, inverse, swivel_of, turn
 from sim.urdf import Array
 
 STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 """How far apart checked poses of a path are (metres, radians)."""
+
+COARSE = 6
+"""One in so many samples of a path is looked at before all are: most that aren't free are found out so."""
 
 JUMP = 0.35
 """Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
@@ -59,7 +62,7 @@ class Traveller(Protocol):
     def solve(self, poses: Array) -> tuple[Array, Array]:
         """Return the joints' values at poses, and which are within reach."""
 
-    def free(self, q: Array) -> Array:
+    def free(self, q: Array) -> Flags:
         """Return which of them touch nothing."""
 
     def follow(self, poses: Array) -> Array | None:
@@ -96,17 +99,16 @@ class Reacher:
         """Return postures of the poses and which are within reach and limits."""
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
-    def free(self, q: Array) -> Array:
+    def free(self, q: Array) -> Flags:
         """Return which postures touch nothing."""
-        gaps = self.mover.clearances(q, self.around)
-        return np.all([gap > self.margin for gap in gaps.values()], axis=0) if gaps else np.ones(len(q), dtype=bool)
+        return free(self.mover.at(q), self.mover.spheres.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
         """Return the postures along sampled poses, or None if one is out of reach, in collision or past a singularity."""
         q, valid = self.solve(poses)
-        if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP) or not self.free(q).all():
+        if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP):
             return None
-        return q
+        return q if self.free(q[COARSE // 2 :: COARSE]).all() and self.free(q).all() else None
 
     def begin(self, poses: Array) -> Array | None:
         """Return the postures along sampled poses up to where `follow` would refuse them, or None if it refuses the first."""
@@ -186,23 +188,29 @@ def polyline(corners: Array) -> Array:
 
 
 def connect(
-    reacher: Traveller, start: Array, goal: Array, rng: np.random.Generator, attempts: int = 400
-) -> Array | None:
-    """Return corner poses of a free path from `start` to `goal`: a line if it's free, else by RRT-Connect; or None.
+    reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int = 400
+) -> tuple[int, Array] | None:
+    """Return to which of some goals a free path leads, and its corner poses: a line, else a detour, else by RRT-Connect; or None.
 
     Parameters
     ----------
+    goals : sequence of array (6,)
+        The most wanted first; a search grows from all of them at once.
     attempts : int
         Bound on the number of samples.
     """
-    if reacher.follow(line(start, goal)) is not None:
-        return np.stack([start, goal])
-    for middle in reacher.detours(start, goal):
-        corners = np.stack([start, *middle, goal])
-        if reacher.follow(polyline(corners)) is not None:
-            return corners
-    found = _rrt_connect(reacher, start, goal, rng, attempts)
-    return None if found is None else _shortcut(reacher, found, rng)
+    for i, goal in enumerate(goals):
+        if reacher.follow(line(start, goal)) is not None:
+            return i, np.stack([start, goal])
+        for middle in reacher.detours(start, goal):
+            corners = np.stack([start, *middle, goal])
+            if reacher.follow(polyline(corners)) is not None:
+                return i, corners
+    found = _rrt_connect(reacher, start, goals, rng, attempts)
+    if found is None:
+        return None
+    reached = next(i for i, goal in enumerate(goals) if np.array_equal(goal, found[-1]))
+    return reached, _shortcut(reacher, found, rng)
 
 
 def leave(reacher: Reacher, start: Array) -> Array | None:
@@ -222,12 +230,12 @@ def leave(reacher: Reacher, start: Array) -> Array | None:
 
 
 def _rrt_connect(
-    reacher: Traveller, start: Array, goal: Array, rng: np.random.Generator, attempts: int
+    reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int
 ) -> Array | None:
-    """Grow two trees of poses towards each other (Kuffner and LaValle 2000)."""
-    low, high = np.minimum(start, goal), np.maximum(start, goal)
-    low, high = low - reacher.spread, high + reacher.spread
-    trees: list[tuple[list[Array], list[int]]] = [([start], [-1]), ([goal], [-1])]
+    """Grow a tree of poses from the start and one from every goal towards each other (Kuffner and LaValle 2000)."""
+    ends = np.stack([start, *goals])
+    low, high = ends.min(0) - reacher.spread, ends.max(0) + reacher.spread
+    trees: list[tuple[list[Array], list[int]]] = [([start], [-1]), (list(goals), [-1] * len(goals))]
     for turn_of in range(attempts):
         (here, back), (there, _) = trees[turn_of % 2], trees[1 - turn_of % 2]
         target = there[rng.integers(len(there))] if rng.random() < 0.2 else rng.uniform(low, high)
@@ -237,7 +245,7 @@ def _rrt_connect(
         other, other_back = trees[1 - turn_of % 2]
         meeting = _extend(reacher, other, other_back, new, greedy=True)
         if meeting is not None and np.allclose(meeting, new):
-            ways = [_branch(*trees[i]) for i in range(2)]
+            ways = [_branch(*tree, met=new) for tree in trees]
             return np.concatenate([ways[0], ways[1][::-1][1:]])
     return None
 
@@ -246,7 +254,7 @@ def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
     """Add to a tree the free part of the way to `target`: a stretch of it, or all of it if `greedy`."""
-    nearest = int(np.argmin([np.max(np.abs(node - target) / STEP) for node in nodes]))
+    nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:
         way = way[:14]
@@ -262,9 +270,9 @@ def _extend(
     return new
 
 
-def _branch(nodes: list[Array], back: list[int]) -> Array:
-    """Return the poses from a tree's root to its last node."""
-    way, i = [], len(nodes) - 1
+def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
+    """Return the poses from a tree's root to its last node, at which both trees have `met`."""
+    way, i = [met], back[-1]
     while i >= 0:
         way.append(nodes[i])
         i = back[i]

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from reasoner.embodiment.values import Embodiment
-from sim.collision import Solid, Surroundings, box, read_mover
+from sim.collision import Solid, Surroundings, box, free, read_mover
 from sim.kinematics import read_arm
 from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from sim.stages import MARGIN
-from sim.urdf import read_urdf
+from sim.urdf import Spheres, read_urdf
 
 from .conftest import Case
 
@@ -27,18 +27,18 @@ def pillar() -> Solid:
 
 
 def test_a_free_line_is_taken_as_it_is(serving: Case) -> None:
-    corners = connect(reacher(serving.embodiment), START, GOAL, np.random.default_rng(0))
-    assert corners is not None
-    np.testing.assert_array_equal(corners, [START, GOAL])
+    found = connect(reacher(serving.embodiment), START, [GOAL], np.random.default_rng(0))
+    assert found is not None
+    np.testing.assert_array_equal(found[1], [START, GOAL])
 
 
 def test_a_path_leads_round_what_is_in_the_way(serving: Case) -> None:
     blocked = reacher(serving.embodiment, pillar())
     assert blocked.follow(line(START, GOAL)) is None
     assert blocked.blame(line(START, GOAL)).objects == ("pillar",)
-    corners = connect(blocked, START, GOAL, np.random.default_rng(0))
-    assert corners is not None
-    q = blocked.follow(polyline(corners))
+    found = connect(blocked, START, [GOAL], np.random.default_rng(0))
+    assert found is not None
+    q = blocked.follow(polyline(found[1]))
     assert q is not None
     gap = blocked.mover.clearances(q, blocked.around).get("pillar", np.array([1.0]))
     assert gap.min() > MARGIN
@@ -46,10 +46,10 @@ def test_a_path_leads_round_what_is_in_the_way(serving: Case) -> None:
 
 def test_the_same_seed_gives_the_same_path(serving: Case) -> None:
     blocked = reacher(serving.embodiment, pillar())
-    first, second = (connect(blocked, START, GOAL, np.random.default_rng(3)) for _ in range(2))
+    first, second = (connect(blocked, START, [GOAL], np.random.default_rng(3)) for _ in range(2))
     assert first is not None
     assert second is not None
-    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(first[1], second[1])
 
 
 def test_a_pose_can_be_read_back_from_its_posture(serving: Case) -> None:
@@ -102,3 +102,24 @@ def test_a_line_begins_as_far_as_it_is_free(serving: Case) -> None:
     assert begun is not None
     assert one.follow(down[: len(begun)]) is not None
     assert one.follow(down[: len(begun) + 1]) is None
+
+
+def test_a_search_grows_from_all_goals_at_once_and_says_which_one_it_came_to(serving: Case) -> None:
+    blocked = reacher(serving.embodiment, pillar())
+    far = GOAL + np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])  # no hand gets there
+    found = connect(blocked, START, [far, GOAL], np.random.default_rng(3))
+    assert found is not None
+    assert found[0] == 1
+    np.testing.assert_array_equal(found[1][-1], GOAL)
+
+
+def test_postures_that_touch_nothing_are_those_whose_distances_say_so(serving: Case) -> None:
+    here = reacher(serving.embodiment, pillar())
+    ball = Spheres(np.array([[0.3, 0.1, 0.9], [0.5, -0.2, 0.8]]), np.array([0.05, 0.08]))
+    around = here.around.plus("ball", ball)
+    q = np.random.default_rng(1).uniform(here.arm.lower, here.arm.upper, (400, 7))
+    for margin in (0.0, 0.008, -0.003):
+        gaps = np.min(list(here.mover.clearances(q, around).values()), axis=0)
+        found = free(here.mover.at(q), here.mover.spheres.radii, around, margin)
+        np.testing.assert_array_equal(found, gaps > margin)
+        assert 0 < found.sum() < len(q)
