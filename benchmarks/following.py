@@ -114,5 +114,6 @@ def main() -> None:
                     length[defined] = len(found.plan.steps) if found.plan else found.outcome.status.value
         one, other = (median(seconds[defined]) for defined in (True, False))
         print(
-            f"| {3 * cups + 2:,} | {one:.2f} | {other:.2f} | {one / other:.2f} | {length[True]} | {length[False]} |", flush=True
+            f"| {3 * cups + 2:,} | {one:.2f} | {other:.2f} | {one / other:.2f} | {length[True]} | {length[False]} |",
+            flush=True,
         )

@@ -32,7 +32,9 @@ def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, 
         for behavior, arguments in steps:
             changes = rules.changes(behavior, arguments, facts)
             if changes is not None:
-                yield behavior.cost, {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
+                price = rules.price(behavior, arguments, facts)
+                cost = behavior.cost if price is None else float(price)
+                yield cost, {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
 
     return successors
 
