@@ -7,29 +7,38 @@ CONFAB_PROBLEMS=100 …        how many random problems, half of jugs, half of a
 from __future__ import annotations
 
 import os
+import warnings
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 
+from benchmarks.pddl import accepted
+from planner.language import DomainError
 from planner.plan import Limits, Status
 from planner.plan_costs import cost_of
 from planner.solve import Request, solve
 from planner.validation import validate
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import PddlError, parse
 from worlds.numbers import jugs, rounds
 
+MODES = ("guarded", "optimal", "paper")
 LIMITS = Limits(2_000_000, 60.0)
 
 
 def main() -> None:
     """Print how many problems agree."""
     half = int(os.environ.get("CONFAB_PROBLEMS", "100")) // 2
-    counts, wrong = Counter[str](), list[str]()
+    counts, wrong = Counter[tuple[str, str, str]](), list[str]()
     for name, make in (("jugs", jugs), ("van", rounds)):
         for seed in range(half):
             problem, least = make(Random(seed))
-            counts[f"{name}: solvable"] += least is not None
-            for mode in ("guarded", "optimal", "paper"):
+            for mode in MODES:
                 found = solve(Request(problem, mode, LIMITS))
-                counts[f"{name}: {mode}: {found.status.value}"] += 1
+                counts[name, mode, found.status.value] += 1
                 if found.status is Status.GAVE_UP:
                     continue
                 if (found.plan is not None) is not (least is not None):
@@ -38,8 +47,76 @@ def main() -> None:
                     cost = cost_of(problem, found.plan)
                     if validate(problem, found.plan) or cost < least or (mode == "optimal" and cost != least):
                         wrong.append(f"{name} {seed} {mode}: costs {cost}, the cheapest plan {least}")
-                    counts[f"{name}: {mode}: cheapest"] += cost == least
-    print(f"| of each world's {half} | |\n|---|---|")
-    for what, many in sorted(counts.items()):
-        print(f"| {what} | {many} |")
+                    counts[name, mode, "cheapest"] += cost == least
+    print(f"| of {half} each | mode | solved | cheapest | unsolvable | given up |\n|---|---|---|---|---|---|")
+    for name in ("jugs", "van"):
+        for mode in MODES:
+            row = [counts[name, mode, what] for what in ("solved", "cheapest", "unsolvable", "gave-up")]
+            print(f"| {name} | {mode} | {' | '.join(map(str, row))} |")
     print(f"\nDisagreements: {len(wrong)}", *wrong, sep="\n")
+    others()
+
+
+def others() -> None:
+    """Print what becomes of the problems that unified-planning ships."""
+    print(
+        "\n| problems of unified-planning's tests | read | solved | accepted by its validator | refused |\n|---|---|---|---|---|"
+    )
+    tally, refused = Counter[tuple[str, str]](), Counter[str]()
+    for where, name, domain, text in published():
+        outcome, accepts = tried(domain, text)
+        tally[where, "read"] += not outcome.startswith("refused")
+        tally[where, "solved"] += outcome == "solved"
+        tally[where, "accepted"] += accepts
+        if outcome != "solved":
+            refused[f"{name}: {outcome}"] += 1
+    for where in dict.fromkeys(where for where, _ in tally):
+        read, done, good = (tally[where, what] for what in ("read", "solved", "accepted"))
+        missing = sum(one.startswith(where) for one in refused)
+        print(f"| {where} | {read} | {done} | {good} | {missing} |")
+    print("", *(f"- {one}" for one in sorted(refused)), sep="\n")
+
+
+def published() -> Iterator[tuple[str, str, str, str]]:
+    """Yield the numeric problems that unified-planning's wheel has: where from, a name, domain and problem as PDDL."""
+    import unified_planning
+    from unified_planning.io import PDDLWriter
+    from unified_planning.test.examples import get_example_problems
+
+    for name, example in get_example_problems().items():
+        kind = getattr(example.problem, "kind", None)
+        if (
+            kind is not None
+            and (kind.has_int_fluents() or kind.has_real_fluents())
+            and hasattr(example.problem, "actions")
+        ):
+            writer = PDDLWriter(example.problem)
+            with suppress(AttributeError):  # what its own writer can't write
+                yield "examples", f"examples: {name}", writer.get_domain(), writer.get_problem()
+    tests = Path(unified_planning.__file__).parent / "test" / "pddl"
+    for domain in sorted([*tests.glob("*/domain.pddl"), *tests.glob("*/d.pddl")]):
+        if ":functions" in domain.read_text():
+            for problem in sorted([*domain.parent.glob("problem*.pddl"), *domain.parent.glob("p.pddl")]):
+                name = f"files: {domain.parent.name}/{problem.name}"
+                yield "files", name, domain.read_text(), problem.read_text()
+
+
+def tried(domain: str, problem: str) -> tuple[str, bool]:
+    """Return what became of a problem, and whether unified-planning accepts the plan."""
+    try:
+        found = imported(parse(domain, problem))
+    except PddlError as error:
+        return f"refused: {error}", False
+    try:
+        outcome = solve(Request(found.problem, limits=LIMITS))
+    except DomainError as error:
+        return f"read, but {str(error)[:80]}", False
+    if outcome.plan is None:
+        return f"{outcome.status.value}: {outcome.reason.text if outcome.reason else ''}", False
+    lines = [line for step in outcome.plan.primitives if (line := found.line(step.behavior, step.arguments))]
+    with TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        files = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
+        for file, text in zip(files, (domain, problem), strict=True):
+            file.write_text(text)
+        return "solved", accepted(*files, lines)

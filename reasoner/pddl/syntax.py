@@ -18,7 +18,8 @@ from fractions import Fraction
 from pathlib import Path
 
 MOST_BYTES = 32 * 2**20
-TOKEN = re.compile(r"[()]|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")  # a variable begins at its '?', as in (aircraft?a)
+TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
+"""A variable begins at its '?', as in (aircraft?a), a type at its name, as in (?b -boat)."""
 COMPARISONS = ("<", "<=", "=", ">=", ">")
 CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
 SECTIONS = {

@@ -355,3 +355,15 @@ def test_a_derived_predicate_is_followed_and_what_changes_it_directly_is_refused
         PddlError, match=r"'loose' is derived from \(not \(reachable …\)\), which is derived from it in turn"
     ):
         imported(parse(circular, problem))
+
+
+def test_a_type_may_follow_its_dash_without_a_space() -> None:
+    loose, plain = (
+        parse(
+            f"(define (domain d) (:types boat) (:predicates (out ?b {dash}boat)) (:functions (knots ?b {dash}boat))"
+            f" (:action sail :parameters (?b {dash}boat) :precondition (> (knots ?b) -2) :effect (out ?b)))",
+            f"(define (problem p) (:domain d) (:objects a-b {dash}boat) (:init (= (knots a-b) -1)) (:goal (out a-b)))",
+        )
+        for dash in ("-", "- ")
+    )
+    assert imported(loose).problem == imported(plain).problem
