@@ -5,7 +5,7 @@
     python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
 
 A line per rollout goes to confab-out/bodies.jsonl, with what tells its code from another; a run that was stopped goes on where
-it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 30000 are for reporting only.
+it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 40000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
 
 KEPT = Path("confab-out/bodies.jsonl")
-DEVELOPMENT, REPORTING, COUNT = 7000, 30000, 100
+DEVELOPMENT, REPORTING, COUNT = 7000, 40000, 100
 NOISE = (0, 4, 8)
 """Millimetres of standard deviation on every perceived position."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")

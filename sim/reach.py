@@ -55,7 +55,11 @@ def reach(embodiment: Embodiment) -> Reach:
             near = [p for p in places.values() if not stand or embodiment.places[p.name].stand in ("", stand)]
             for hand in robot.hands:
                 reacher = _reacher(embodiment, robot, hand, model, solids)
-                found = [place for place in near if all(_reaches(reacher, place, h, numbers) for h in heights)]
+                found = [
+                    place
+                    for place in near
+                    if all(_reaches(reacher, place, h, numbers) for h in _heights(embodiment, place, heights))
+                ]
                 pairs |= {(hand.name, place.name) for place in found}
     return Reach(frozenset(pairs), fingerprint(embodiment))
 
@@ -82,12 +86,19 @@ def fingerprint(embodiment: Embodiment) -> str:
     parts += [f"Place(name={p.name!r}, position={p.position!r})" for _, p in sorted(embodiment.places.items())]
     parts += [repr(stand) for _, stand in sorted(embodiment.stands.items())]
     parts += [repr(place.stand) for _, place in sorted(embodiment.places.items()) if place.stand]
+    parts += [repr(place.height) for _, place in sorted(embodiment.places.items()) if place.height is not None]
     parts += [repr(place.carrier) for _, place in sorted(embodiment.places.items()) if place.carrier]
     parts += [repr(mechanism) for mechanism in embodiment.mechanisms]
     parts += sorted({repr(body.shape.grasp_height) for body in embodiment.bodies.values()})
     reaching = [use.numbers for _, use in sorted(embodiment.skills.items()) if use.skill == "reach"]
     parts += [repr(sorted((name, value) for name, value in uses.items() if name != "time_limit")) for uses in reaching]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _heights(embodiment: Embodiment, place: Place, heights: Sequence[float]) -> Sequence[float]:
+    """Return the heights above a place at which hands take what stands there."""
+    said = embodiment.places[place.name].height
+    return heights if said is None else (said,)
 
 
 def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:

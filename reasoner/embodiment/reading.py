@@ -99,6 +99,7 @@ def _place(facts: Facts, node: str, names: Callable[[str], str]) -> Place:
         facts.position(node, "0" if carriers else None),
         names(carriers[0]) if carriers else "",
         names(stands[0]) if stands else "",
+        facts.number(node, "grasped_at") if "grasped_at" in facts.attributes.get(node, {}) else None,
     )
 
 

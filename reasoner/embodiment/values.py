@@ -82,12 +82,14 @@ class Place:
     """A location where things stand: the point on the supporting surface, in the frame of the `carrier` if it has one.
 
     The carrier is a link or an object: a place in a drawer moves with the drawer. A robot that drives reaches it from the `stand`.
+    What stands there is grasped at a height, if one is said.
     """
 
     name: str
     position: Vector
     carrier: str = ""
     stand: str = ""
+    height: float | None = None
 
 
 @dataclass(frozen=True)

@@ -68,3 +68,16 @@ def test_what_slipped_is_held_the_way_it_is(live: LiveWorld) -> None:
     hand.grasp = rotation, base + 0.05
     assert not live.execute(nothing).ok
     assert abs(hand.grasp[1] - base).max() < 0.005
+
+
+def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
+    """The hand is on its way to the jar in it: it stops, the drawer is seen to be shut, and the plan is made anew."""
+    scene = confab.load("kitchen-corner")
+    goals = ("jar LOCATION left_spot", "cup LOCATION shelf", "lid LOCATION right_spot")
+    run = scene.execute(interventions="at=7 drawer OPENED false", world="pybullet", goals=goals)
+    assert run.reached
+    done = [event.step.behavior for event in run.episode.events]
+    assert done.count("F3_OPEN") == 2
+    assert done.count("F3_SHUT") == 1
+    (failure,) = run.episode.failures
+    assert failure.step.arguments == ("right_hand", "jar")
