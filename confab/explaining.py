@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from confab.lifted import Sayings
 from confab.report.markup import styled, tag
 from planner.experience.advice import Memory as Advisor
+from planner.experience.chaining import Candidate
 from planner.experience.evidence import View
-from planner.experience.leading import Candidate, Guide
+from planner.experience.leading import Guide
 from planner.hierarchical.serialization import Call, compiled
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.experience import ITSELF, Fact, Ground, Tally

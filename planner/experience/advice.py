@@ -17,14 +17,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from planner.experience.chaining import Candidate
 from planner.experience.evidence import Judge, View
-from planner.experience.leading import Candidate, Guide, rules_in, usable
-from planner.experience.matching import Find
+from planner.experience.leading import Guide, rules_in, usable
+from planner.experience.matching import Bind
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import Limits, Outcome
-from planner.transitions import Table
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
@@ -74,7 +74,7 @@ class Memory:
         record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
         return record.chosen + 1 >= record.failed
 
-    def guide(self, call: Call, mode: str, joins: dict[str, Callable[[Table], Find] | None] | None = None) -> Guide:
+    def guide(self, call: Call, mode: str, joins: dict[str, Bind | None] | None = None) -> Guide:
         """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
         view = View(call.program, call.table, call.goal)
 
@@ -143,7 +143,7 @@ def plan(
     using = using or fast.compiled(problem)
     if memory is None or not memory.knows(problem):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
-    joins: dict[str, Callable[[Table], Find] | None] = {}
+    joins: dict[str, Bind | None] = {}
 
     def advised(call: Call) -> None:
         call.advise(memory.guide(call, mode if memory.trusted else "strict", joins))

@@ -1,8 +1,8 @@
-"""Rules that act, on every level: what promises the fewest steps is done for real, refined, until what was wanted is so.
+"""Rules that act, on every level: chains of them are done for real, refined, until what was wanted is so.
 
 off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
-rank      the steps that a rule promises; of equal ones, the candidate that loses least and has the greatest cogency comes first
-promise   after a rule's step, rules for the same symbol must promise fewer; what came to be right must not go wrong again
+rank      how many rules must follow each other (`planner.experience.chaining`); what is nearest is brought about first
+promise   what came to be right must not go wrong again
 wasted    steps that were undone because a promise was broken; nothing is tried while more than a tenth of all effort was
 
 The goals of a task, one by one in series, and the changes that a refinement must bring about are the same to rules: `Guide.follow`
@@ -13,54 +13,33 @@ finds becomes rules at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import replace
+from math import inf
 from typing import TypeAlias
 
+from planner.experience.chaining import Budget, Candidate, Chains, fact
 from planner.experience.evidence import told_apart
-from planner.experience.matching import Find, finder, known
+from planner.experience.matching import Bind, known
 from planner.experience.regression import Course, ordered
 from planner.hierarchical.operators import Program
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.subplans import Keep
-from planner.transitions import Cell, Table, arguments_of
+from planner.transitions import Cell, arguments_of
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Experience, Ground, Order, Rule, Tally
-from reasoner.symbols import FALSE, TRUE, Fact, Symbol
+from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol
 
-CANDIDATES = 20
-"""So many ways to fill a rule's roles are compared."""
-TRIES = 3
-"""So many of them are tried."""
 CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
 WASTE = 10
 """Of so many expansions one may have been for steps of rules that were undone."""
 SHARE, LONG = 20, 12
 """In strict mode: one of so many, with promises of so many steps counted as wasted before they are tried."""
-FAR = 1000
-"""More steps than any rule promises."""
-
-NOTHING: Mapping[Cell, str] = {}
-
-Roles: TypeAlias = "tuple[str, ...]"
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A way to follow a rule now: the symbol that it is for, and the individuals in its roles."""
-
-    rule: Rule
-    goal: Cell
-    roles: Roles
-
-    @property
-    def ground(self) -> Ground:
-        """The step to do."""
-        filled = dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
-        return self.rule.does[0], tuple([filled.get(term, term) for term in self.rule.does[1]])
-
+PATIENCE = 30
+"""So many steps are done for one thing that is wanted."""
+VAIN = 2
+"""So often rules may lead nowhere for one kind of targets, until there are new ones."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
 
@@ -85,21 +64,24 @@ class Guide:
         rules: Iterable[Rule],
         orders: Sequence[Order] = (),
         score: Score | None = None,
-        joins: dict[str, Callable[[Table], Find] | None] | None = None,
+        joins: dict[str, Bind | None] | None = None,
         strict: bool = False,
     ) -> None:
         self.call, self.score, self.strict = call, score, strict
-        self.joins = {} if joins is None else joins
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
-        self.finds: dict[str, Find | None] = {}
         self.names: set[str] = set()
-        self.broken: dict[str, int] = {}
+        self.off: dict[Cell, str] = {}
         self.wasted = 0
+        self.vain: dict[object, int] = {}
+        """Of each kind of targets how often rules led nowhere."""
         self.taught: dict[object, tuple[int, int]] = {}
         """Of each kind of targets how many lessons in a row rules led nowhere after, and how many more are left out."""
         self.classes: dict[str, frozenset[str]] = {}
+        self.orders = frozenset(orders)
+        self.constants = frozenset(call.program.named) | {TRUE, FALSE}
         self.before = _before(call.goal, orders, call.program)
+        self.chains = Chains(call, self.by_goal, {} if joins is None else joins, self.least, self.sooner)
         self.add(rules)
         first = call.program.levels[0]
         self.expects = not strict and all((first, situation) in self.by_goal for situation, _ in self.open())
@@ -114,17 +96,17 @@ class Guide:
                     of.append(rule)
                     of.sort(key=lambda rule: (rule.steps, rule.name))
 
-    def ways(self, rule: Rule, cell: Cell, value: str, most: int = CANDIDATES) -> list[Candidate]:
-        """Return ways to follow a rule for a value now; it is compiled when it is first asked."""
-        if rule.name not in self.finds:
-            if rule.name not in self.joins:
-                self.joins[rule.name] = finder(rule, self.call.program.writer)
-            bind = self.joins[rule.name]
-            self.finds[rule.name] = bind(self.call.table) if bind is not None else None
-        find = self.finds[rule.name]
-        if find is None:
-            return []
-        return [Candidate(rule, cell, roles) for roles in islice(find(*arguments_of(cell[1]), value), most)]
+    def least(self, c: Candidate) -> tuple[bool, float]:
+        """Return what is least for the candidate to try first: last come those that give what somebody else is to have."""
+        wanted = {value: arguments_of(key) for (_, key), value in self.off.items() if value not in (TRUE, FALSE)}
+        given = c.ground[1]
+        away = len(wanted) > 1 and any(not set(wanted[a]) & set(given) for a in given if a in wanted)
+        return away, -self.score(c) if self.score is not None else 0.0
+
+    def sooner(self, first: Condition, then: Condition, env: Mapping[str, str]) -> bool:
+        """Whether one condition is known to be brought about before another one."""
+        one, other = fact(first, env), fact(then, env)
+        return one is not None and other is not None and ordered(one, other, self.constants) in self.orders
 
     def open(self) -> dict[Cell, str]:
         """Return the goals of the call that don't hold now."""
@@ -132,39 +114,18 @@ class Guide:
 
     def every(self, cells: Mapping[Cell, str]) -> Iterator[Candidate]:
         """Yield every way to follow a rule of the most abstract level for some values."""
-        for cell, value in cells.items():
-            for rule in self.by_goal.get((self.call.program.levels[0], cell[0]), ()):
-                yield from self.ways(rule, cell, value)
+        for goal in cells.items():
+            yield from (way for way in self.chains.ways(self.call.program.levels[0], goal) if not way.unmet)
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal comes first."""
         return not self.strict and any(not self.call.met(other) for other in self.before.get(cell, ()))
 
-    def candidates(
-        self, level: int, cells: Mapping[Cell, str], below: int = FAR, off: Mapping[Cell, str] = NOTHING
-    ) -> list[Candidate]:
-        """Return the candidates of the least rank below a bound for some values, in the order in which to try them.
-
-        Last come those that give something to somebody though somebody else, who is off, is to have it.
-        """
-        rank, found = below - 1, list[Candidate]()
-        for cell, value in cells.items():
-            for rule in self.by_goal.get((level, cell[0]), ()):
-                if rule.steps > rank or (rule.steps == rank and len(found) >= CANDIDATES):
-                    break
-                if self.broken.get(rule.name, 0) > 1:
-                    continue
-                ways = self.ways(rule, cell, value)
-                if ways and rule.steps < rank:
-                    rank, found = rule.steps, []
-                found += ways
-        score = self.score
-        if score is not None and len(found) > 1:
-            found.sort(key=score, reverse=True)
-        if len(off) > 1:
-            wanted = {value: arguments_of(key) for (_, key), value in off.items() if value not in (TRUE, FALSE)}
-            found.sort(key=lambda c: any(not set(wanted[a]) & set(c.ground[1]) for a in c.ground[1] if a in wanted))
-        return found
+    def candidates(self, cells: Mapping[Cell, str]) -> list[Candidate]:
+        """Return the ways to follow a rule of the most abstract level for some values that lack nothing and promise most."""
+        found = list(self.every(cells))
+        least = min((way.rule.steps for way in found), default=0)
+        return [way for way in found if way.rule.steps == least]
 
     def ready(self) -> bool:
         """Whether no more than a share of the effort was wasted so far; if strict, would be after one promise more."""
@@ -174,11 +135,10 @@ class Guide:
 
     def rank(self, cell: Cell) -> int:
         """Return how many steps rules promise for a goal; 0 if they promise nothing."""
-        rules = self.by_goal.get((self.call.program.levels[0], cell[0]), ()) if self.ready() else ()
-        return next(
-            (r.steps for r in rules if self.broken.get(r.name, 0) < 2 and self.ways(r, cell, self.call.goal[cell], 1)),
-            0,
-        )
+        if not self.ready():
+            return 0
+        found = self.chains.far(self.call.program.levels[0], (cell, self.call.goal[cell]))
+        return int(found) if found < inf else 0
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
@@ -186,62 +146,52 @@ class Guide:
 
     def tried(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do the same, however much was wasted."""
-        call = self.call
+        call, kind = self.call, self.kind(level, targets)
+        if self.vain.get(kind, 0) >= VAIN:
+            return None
         table, segments = call.table, call.segments
         start = mark = len(table.trail)
         began = segments.expanded
         origin: dict[Cell, str] = {}
-        off = {c: v for c, v in targets.items() if not meets(table.now[c[0]].get(c[1], FALSE), v)}
+        outer, self.off = self.off, {}
+        off = self.off
+        for cell, value in targets.items():
+            self._look(cell, value)
         closed: set[Cell] = set()
         steps: list[RefinedStep] = []
-        used: dict[str, None] = {}
-        goal: Cell | None = None
-        rank = FAR
         while off:
-            among = {goal: off[goal]} if goal in off else {c: v for c, v in off.items() if c not in closed}
+            among = sorted((self.chains.far(level, g), i, g) for i, g in enumerate(off.items()) if g[0] not in closed)
             done = None
-            found = self.candidates(level, among, rank, off)
-            possible = (c for c in found if segments.forward[c.ground[0]](*c.ground[1]) is not None)
-            for candidate in islice(possible, TRIES):
-                used[candidate.rule.name] = None
-                done = self.do(level, candidate)
+            for far, _, goal in among:
+                done = self.chains.attain(level, goal, Budget(PATIENCE)) if far < inf else None
                 if done is not None:
-                    goal, rank = candidate.goal, candidate.rule.steps
-                    steps.append(done)
+                    steps += done
+                    closed.add(goal[0])
                     break
             if done is None:
                 break
             for situation, key, old in table.trail[mark:]:
                 first = origin.setdefault((situation, key), old)
-                self._look((situation, key), targets.get((situation, key)) or keep((situation, key), first), off)
+                self._look((situation, key), targets.get((situation, key)) or keep((situation, key), first))
             for cell in segments.defined:
-                self._look(cell, targets.get(cell) or keep(cell, ""), off)
+                self._look(cell, targets.get(cell) or keep(cell, ""))
             mark = len(table.trail)
-            if goal is not None and goal not in off:
-                closed.add(goal)
-                rank = FAR
-        if not off and call.refiner.left_as_it_must(start, targets, keep) is None:
-            self.taught.pop(self.kind(level, targets), None)
+        failed, self.off = bool(off), outer
+        if not failed and call.refiner.left_as_it_must(start, targets, keep) is None:
+            self.taught.pop(kind, None)
+            self.vain.pop(kind, None)
             return steps
-        for name in used:
-            self.broken[name] = self.broken.get(name, 0) + 1
+        if segments.expanded > began:
+            self.vain[kind] = self.vain.get(kind, 0) + 1
         self.wasted += segments.expanded - began
         table.undo(start)
         return None
 
-    def _look(self, cell: Cell, wanted: str | None, off: dict[Cell, str]) -> None:
+    def _look(self, cell: Cell, wanted: str | None) -> None:
         if wanted is None or meets(self.call.table.now[cell[0]].get(cell[1], FALSE), wanted):
-            off.pop(cell, None)
+            self.off.pop(cell, None)
         else:
-            off[cell] = wanted
-
-    def do(self, level: int, candidate: Candidate) -> RefinedStep | None:
-        """Do a candidate's step, refined, unless it changes nothing; None, and the table as it was, if it can't be done."""
-        call, mark = self.call, len(self.call.table.trail)
-        name, arguments = candidate.ground
-        call.segments.expand(level)
-        done = call.refiner.do(level, name, arguments)
-        return done if len(call.table.trail) > mark else None
+            self.off[cell] = wanted
 
     def kind(self, level: int, targets: Mapping[Cell, str]) -> object:
         """Return of what kind targets are: the situation types, and the classes of those whom they are about."""
@@ -268,6 +218,7 @@ class Guide:
             return False
         self.taught[kind] = lessons + 1, 2**lessons
         known = len(self.names)
+        self.vain.pop(kind, None)
         done = [(step.behavior, step.arguments) for step in steps]
         self.add(course(self.call, mark, targets, keep, done).rules_of())
         return len(self.names) > known

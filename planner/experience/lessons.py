@@ -13,8 +13,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
+from planner.experience.chaining import Candidate
 from planner.experience.evidence import View
-from planner.experience.leading import Candidate, Guide, by_rules, course, rules_in, usable
+from planner.experience.leading import Guide, by_rules, course, rules_in, usable
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner
@@ -196,9 +197,8 @@ def chosen(
     lesson = Lesson()
     for number, ground in enumerate(later):
         open_ = guide.open()
-        first = using.program.levels[0]
         ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
-        tried_ = guide.candidates(first, ready) or guide.candidates(first, open_)
+        tried_ = guide.candidates(ready) or guide.candidates(open_)
         done = [c for c in tried_ if c.ground == ground]
         if done:
             rest = set(later[number + 1 :])

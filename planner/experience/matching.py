@@ -1,37 +1,53 @@
-"""A rule as a join over the table: generated Python that yields the ways to fill its roles now.
+"""A rule as a join over the table: generated Python that yields the ways to fill its roles now, each with what it still lacks.
 
-The goal fills its own roles; each condition is tested as soon as its roles are filled. What fills another role is, in this order
-of preference: the value that a symbol has; who has a value; a static relation; a class. Different roles are different individuals.
+What is static must hold. Of a rule for the last step the rest may be *unmet*: it can be brought about first. A longer rule is
+followed only where all that it asks holds. What fills a role is, in this order of preference: the value that a symbol has, or who
+has a value; a static relation; a class. If nobody of the first kind fits, or everybody is asked for, the others are taken, one of
+each sort. Different roles are different individuals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from planner.generated import identifier, tuple_written, written
-from planner.language import mentions, walk
+from planner.language import is_variable, mentions, walk
 from planner.transitions import Table, Writer
 from reasoner.memory.experience import Rule
-from reasoner.symbols import Condition, Problem, RelationCondition, ValueCondition
+from reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 
-Find: TypeAlias = "Callable[..., Iterator[tuple[str, ...]]]"
-"""Given the arguments and the value of a goal, yields individuals for the roles of a rule, in its order."""
+Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
+"""Given a goal's arguments and value, and whether everybody is asked for, yields individuals for the roles, and what is unmet."""
+
+Pick: TypeAlias = "Callable[[tuple[str, ...]], Sequence[str]]"
+"""Returns one of each sort, of many individuals."""
+Bind: TypeAlias = "Callable[[Table, Pick], Find]"
 
 DEEPEST = 18
 """So many loops inside each other Python allows, with a few to spare."""
 
 
-def finder(rule: Rule, writer: Writer) -> Callable[[Table], Find] | None:
-    """Return what binds a rule to a table; None where it looks for too many individuals.
+def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
+    """Return what may be brought about before a rule's step: what it asks of the state, and what the step compares."""
+    if rule.steps > 1:
+        return ()
+    behavior = problem.domain.behaviors[rule.does[0]]
+    put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
+    compared = (c for c in behavior.preconditions if isinstance(c, Comparison) and mentions(c) <= put.keys())
+    return (*(c for c in rule.asks if not _static(c)), *(substituted(c, put) for c in compared))
+
+
+def finder(rule: Rule, writer: Writer, asks: Sequence[Condition]) -> Bind | None:
+    """Return what binds a rule, of which some conditions may be unmet, to a table; None where it has too many roles.
 
     The problem has what it speaks of (`known`).
     """
-    lines = _lines(rule, writer)
+    lines = _Join(rule, writer, asks).lines()
     if lines is None:
         return None
-    bind = writer.function(lines, "find")
-    return lambda table: bind(table.now, table.who)
+    bind = writer.function(lines, "find", ", pick")
+    return lambda table, pick: bind(table.now, table.who, pick)
 
 
 def known(rule: Rule, problem: Problem) -> bool:
@@ -54,95 +70,99 @@ def known(rule: Rule, problem: Problem) -> bool:
     )
 
 
-def _lines(rule: Rule, writer: Writer) -> list[str] | None:
-    kinds = dict(rule.kinds)
-    given = (*rule.goal.arguments, rule.goal.value)
-    lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}):"]
-    bound: set[str] = set()
-    waiting = list(rule.asks)
-    depth = 0
-    leave = "return"
+def _static(condition: Condition) -> bool:
+    return not any(isinstance(inner, ValueCondition | Comparison) for inner in walk(condition))
 
-    def emit(text: str) -> None:
-        lines.append("    " * (depth + 1) + text)
 
-    def unless(test: str) -> None:
-        emit(f"if not ({test}): {leave}")
+def _variables(terms: Iterable[str]) -> set[str]:
+    return {term for term in terms if is_variable(term)}
 
-    def fill(role: str) -> None:
-        """Say that a role is filled: by one of its class, and none that fills another one."""
-        unless(writer.member(role, kinds[role]))
-        members = writer.problem.members
-        others = [r for r in sorted(bound) if not members(kinds[r]).isdisjoint(members(kinds[role]))]
-        if others:
-            unless(f"{written(role)} not in {tuple_written(map(written, others))}")
-        bound.add(role)
 
-    for i, term in enumerate(given):
-        if term.startswith("?") and term not in bound:
-            emit(f"{written(term)} = i{i}")
-            fill(term)
-        else:
-            unless(f"i{i} == {written(term)}")
-    while True:
-        ready = [c for c in waiting if not mentions(c) - bound]
-        for condition in sorted(ready, key=lambda c: not isinstance(c, ValueCondition)):
-            waiting.remove(condition)
-            unless(writer.expression(condition, set(bound), kinds, rule.name))
-        left = [role for role, _ in rule.kinds if role not in bound]
-        if not left:
-            break
-        _, filled, source, tests = min(_ways(waiting, bound, left, kinds, writer), key=lambda way: way[0])
-        if source is None:
-            emit(f"{written(filled[0])} = {tests[0]}")
-        else:
-            depth_of = written(filled[0]) if len(filled) == 1 and not tests else "key"
-            emit(f"for {depth_of} in {source}:")
+class _Join:
+    """Writes the function of one rule."""
+
+    def __init__(self, rule: Rule, writer: Writer, asks: Sequence[Condition]) -> None:
+        self.rule, self.writer, self.soft = rule, writer, asks
+        self.kinds, self.problem = dict(rule.kinds), writer.problem
+        self.hard = [c for c in rule.asks if c not in asks]
+        self.bound: set[str] = set()
+
+    def lines(self) -> list[str] | None:
+        """Return the function, `None` if it would have too many loops inside each other."""
+        rule, depth = self.rule, 0
+        given = (*rule.goal.arguments, rule.goal.value)
+        lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}, everybody):"]
+        amount = self.problem.domain.situations[rule.goal.situation].quantity is not None
+        for i, term in enumerate(given):
+            if term in self.kinds and term not in self.bound:
+                lines += [f"    {written(term)} = i{i}", f"    if not ({' and '.join(self.tests(term))}): return"]
+            elif not amount or i < len(given) - 1:  # by how much an amount changes is found out by doing it
+                lines.append(f"    if i{i} != {written(term)}: return")
+        lines.append(f"    if not ({' and '.join(self.ready()) or True}): return")
+        while left := [role for role, _ in rule.kinds if role not in self.bound]:
+            role, now, others = min(
+                ((role, *self.sources(role)) for role in left), key=lambda way: (not way[1], way[2][0])
+            )
+            name, indent = written(role), "    " * (depth + 1)
+            tests = " and ".join(self.tests(role))
+            picked = f"[{name} for {name} in pick({others[1]}) if {tests}]"
+            if now:
+                lines.append(f"{indent}found = [{name} for {name} in dict.fromkeys([{', '.join(now)}]) if {tests}]")
+                lines.append(f"{indent}if everybody or not found: found = list(dict.fromkeys(found + {picked}))")
+            else:
+                lines.append(f"{indent}found = {picked}")
+            lines.append(f"{indent}for {name} in found:")
             depth += 1
-            leave = "continue"
-            for test in tests:
-                emit(test)
-        for role in filled:
-            fill(role)
-        if depth > DEEPEST:
-            return None
-    emit(f"yield {tuple_written(written(role) for role, _ in rule.kinds)}")
-    return lines
+            if depth > DEEPEST:
+                return None
+        indent = "    " * (depth + 1)
+        lines.append(f"{indent}unmet = ()")
+        for number, c in enumerate(self.soft):
+            text = self.writer.expression(c, set(self.bound), self.kinds, rule.name)
+            lines.append(f"{indent}if not ({text}): unmet += ({number},)")
+        lines.append(f"{indent}yield {tuple_written(written(role) for role, _ in rule.kinds)}, unmet")
+        return lines
 
+    def tests(self, role: str) -> list[str]:
+        """Fill a role; return the tests on who fills it: that it is of its class, fills no other role, and what must hold."""
+        members = self.problem.members
+        mine = members(self.kinds[role])
+        others = [r for r in sorted(self.bound) if not members(self.kinds[r]).isdisjoint(mine)]
+        found = [self.writer.member(role, self.kinds[role])]
+        if others:
+            found.append(f"{written(role)} not in {tuple_written(map(written, others))}")
+        self.bound.add(role)
+        return found + self.ready()
 
-def _ways(
-    waiting: Sequence[Condition], bound: set[str], left: Sequence[str], kinds: Mapping[str, str], writer: Writer
-) -> Iterator[tuple[float, list[str], str | None, list[str]]]:
-    """Yield ways to fill roles: how many there may be, the roles, what to go through (None: a value), and lines for each."""
-    problem = writer.problem
-    for condition in waiting:
-        match condition:
-            case ValueCondition(situation, arguments, value, False):
-                unknown = [a for a in dict.fromkeys(arguments) if a in left]
-                if value in left and not unknown:
-                    yield 0.0, [value], None, [writer.look(condition)]
-                elif unknown and value not in left and writer.listed(situation, value):
-                    who = f"{identifier('who', situation)}.get({written(value)}, ())"
-                    values = len(problem.classes.get(problem.domain.situations[situation].range, ())) or 1
-                    symbols = 1.0
-                    for of in problem.domain.situations[situation].arguments:
-                        symbols *= len(problem.classes.get(of, ()))
-                    fan = symbols / values if value != "true" else symbols ** (len(unknown) / len(arguments))
-                    if len(arguments) == 1:
-                        yield fan, unknown, who, []
-                    elif len(set(arguments)) == len(arguments):
-                        tests = [
-                            f"if key[{i}] != {written(a)}: continue"
-                            for i, a in enumerate(arguments)
-                            if a not in unknown
-                        ]
-                        tests += [f"{written(a)} = key[{i}]" for i, a in enumerate(arguments) if a in unknown]
-                        yield fan, unknown, who, tests
-            case RelationCondition(relation, arguments, False):
-                unknown = [a for a in dict.fromkeys(arguments) if a in left]
-                if len(unknown) == 1 and arguments.count(unknown[0]) == 1:
-                    source, fan = writer.adjacent(relation, arguments, unknown[0])
-                    yield fan, unknown, source, []
-    for role in left:
-        members = problem.classes.get(kinds[role], ())
-        yield len(members) + 1.0, [role], writer.constant(("members", kinds[role]), members), []
+    def ready(self) -> list[str]:
+        """Return tests for what must hold and speaks of nobody who isn't known yet, once."""
+        now = [c for c in self.hard if not mentions(c) - self.bound]
+        self.hard = [c for c in self.hard if c not in now]
+        now.sort(key=lambda c: not isinstance(c, ValueCondition))
+        return [self.writer.expression(c, set(self.bound), self.kinds, self.rule.name) for c in now]
+
+    def sources(self, role: str) -> tuple[list[str], tuple[float, str]]:
+        """Return who fills a role by the state, as elements of a list, and what else there is, with how many these are."""
+        now, writer = list[str](), self.writer
+        members = self.problem.classes.get(self.kinds[role], ())
+        other = len(members) + 1.0, writer.constant(("members", self.kinds[role]), members)
+        for c in (*self.soft, *self.hard):
+            if isinstance(c, ValueCondition) and not c.negated:
+                others = _variables((*c.arguments, c.value)) - self.bound
+                if others == {role} and c.value == role and role not in c.arguments:
+                    now.append(writer.look(c))
+                elif others == {role} and c.arguments.count(role) == 1 and writer.listed(c.situation, c.value):
+                    who, place = (
+                        f"{identifier('who', c.situation)}.get({written(c.value)}, ())",
+                        c.arguments.index(role),
+                    )
+                    if len(c.arguments) > 1:
+                        same = (f"k[{i}] == {written(a)}" for i, a in enumerate(c.arguments) if i != place)
+                        who = f"[k[{place}] for k in {who} if {' and '.join(same)}]"
+                    now.append(f"*{who}")
+            elif isinstance(c, RelationCondition) and not c.negated and c.arguments.count(role) == 1:
+                if _variables(c.arguments) - self.bound != {role}:
+                    continue
+                text, fan = writer.adjacent(c.relation, c.arguments, role)
+                other = min(other, (fan, text))
+        return now, other

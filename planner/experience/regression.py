@@ -178,6 +178,7 @@ class Course:
             if self.problem.domain.behaviors[done.ground[0]].level != level:
                 return  # part of the way left the level: what must be at rest after it, goals don't say
             need, served = self.needed(after, done, facts, later)
+            linked = list(self.links(done, served, facts, later)) if served else []
             undo(later, done.mark)
             if position > start:
                 undo(facts, self.done[position - 1].mark)
@@ -188,13 +189,14 @@ class Course:
                 return
             order.update(dict.fromkeys(done.ground[1]))
             order.update((t, None) for c in need for inner in walk(c) for t in terms(inner) if not t.startswith("?"))
+            yield from linked
             rule = self.lifted(wanted, tuple(need), done.ground, steps, tuple(order))
             if rule is not None:
                 yield rule
 
     def needed(
         self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
-    ) -> tuple[dict[Condition, None], bool]:
+    ) -> tuple[dict[Condition, None], dict[Condition, None]]:
         """Return what must hold before a step so that something holds after it, and whether the step serves that at all.
 
         What is defined is replaced by what it rests on, as far as the step brought it about; what follows no more, by what it
@@ -234,7 +236,28 @@ class Course:
             need.update(dict.fromkeys(done.asked))
             for c in served:
                 need.update(dict.fromkeys(self.before(c, done, facts)))
-        return need, bool(served)
+        return need, served
+
+    def links(self, done: Done, served: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
+        """Yield for each change of a step that something needed the rule that the step brings it about: a goal of its own."""
+        goals: dict[ValueCondition, None] = {}
+        for c in served:
+            if isinstance(c, ValueCondition) and c.situation in self.problem.domain.rules:
+                value = c.value if not c.negated else FALSE if c.value == TRUE else TRUE
+                goals[ValueCondition(c.situation, c.arguments, value)] = None
+                continue
+            about = [i for i in walk(c) if isinstance(i, ValueCondition)]
+            for situation, key, value, _ in done.changes:
+                if any(i.situation == situation and (i is not c or i.arguments == key) for i in about):
+                    goals[ValueCondition(situation, key, value)] = None
+        for goal in goals:
+            need, own = self.needed([goal], done, facts, later)
+            if own:
+                order = dict.fromkeys((*goal.arguments, goal.value, *done.ground[1]))
+                order.update((t, None) for c in need for i in walk(c) for t in terms(i) if not t.startswith("?"))
+                rule = self.lifted(goal, tuple(need), done.ground, 1, tuple(order))
+                if rule is not None:
+                    yield rule
 
     def apart(self, condition: Witness, done: Done, facts: Facts) -> Iterator[Condition]:
         """Yield why a step doesn't bring about what nobody may be: what is static and doesn't hold of those whom it changes."""
@@ -363,9 +386,12 @@ def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[t
     found, of = list[Condition](), dict(kinds)
     for condition in conditions:
         if isinstance(condition, Witness) and not condition.negated:
-            of[condition.variable] = condition.kind
-            inner, of = opened(condition.conditions, of)
-            found += [*inner, ClassCondition(condition.variable, condition.kind)]
+            who = condition.variable
+            while who in of:  # another one of the same name
+                who += "_"
+            of[who] = condition.kind
+            inner, of = opened([substituted(c, {condition.variable: who}) for c in condition.conditions], of)
+            found += [*inner, ClassCondition(who, condition.kind)]
         else:
             found.append(condition)
     return tuple(found), of

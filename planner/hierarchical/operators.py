@@ -49,7 +49,8 @@ class Achiever:
     """One effect of one behaviour, seen from the value that it brings about.
 
     `soft` are the conditions that the state can change, by position; `determined` says of which symbol a variable is the
-    value: its situation type and argument terms; of a rule, `determining` has the conditions that do so.
+    value: its situation type and argument terms; of a rule, `determining` has the conditions that do so. If `deep`, what nobody may
+    satisfy is also to be brought about by what somebody is looked for inside of it.
     """
 
     behavior: str
@@ -59,6 +60,7 @@ class Achiever:
     kinds: Mapping[str, str]
     determining: Sequence[Condition] = ()
     rule: bool = False
+    deep: bool = False
 
 
 @dataclass

@@ -127,7 +127,7 @@ class Wants:
                     for individual in self._satisfying(achiever, condition, env):
                         inner = {**env, variable: individual}
                         for c in conditions:
-                            if isinstance(c, ValueCondition | Comparison):
+                            if isinstance(c, ValueCondition | Comparison) or (achiever.deep and isinstance(c, Witness)):
                                 yield from self.of(achiever, self._negation(c), inner, level)
                 else:
                     lacking: list[tuple[str, list[Condition]]] = []

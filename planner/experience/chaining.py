@@ -1,0 +1,328 @@
+"""What a rule lacks becomes a goal of its own, for which rules are asked again: chains of rules, on every level.
+
+way        a rule with individuals in its roles, and which of its conditions are unmet
+distance   how many rules must follow each other at least, each condition taken by itself; beyond a chain's end nothing is promised
+lacks      the wants, one of which would do, for an unmet condition (`planner.hierarchical.subgoals`)
+attain     the nearest way is gone: its conditions are brought about in the order in which plans did, the farthest first where
+           none is known, then its step is done; what was reached on the way may be lost and brought about again, a few times
+
+A want isn't sought while it is sought already. Each step that is done costs the budget, and what comes to nothing is undone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from math import inf
+from typing import TypeAlias
+
+from planner.experience.matching import Bind, Find, finder, soft
+from planner.hierarchical.operators import FEW, Achiever
+from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.serialization import Call
+from planner.transitions import Cell, arguments_of, key_of
+from reasoner.amounts import meets, number
+from reasoner.memory.experience import Ground, Rule
+from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition
+
+WAYS, TRIES = 40, 3
+"""So many ways to follow a rule are compared, and so many of the best of all rules tried."""
+SLACK = 2
+"""By so much a chain may get longer while its conditions are brought about."""
+FARTHEST = 30
+"""Longer chains aren't looked for."""
+
+Roles: TypeAlias = "tuple[str, ...]"
+Goal: TypeAlias = "tuple[Cell, str]"
+Steps: TypeAlias = "list[RefinedStep]"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A way to follow a rule now: the symbol that it is for, the individuals in its roles, and which conditions are unmet."""
+
+    rule: Rule
+    goal: Cell
+    roles: Roles
+    unmet: tuple[int, ...] = ()
+
+    @property
+    def named(self) -> dict[str, str]:
+        """The individuals by role."""
+        return dict(zip((role for role, _ in self.rule.kinds), self.roles, strict=True))
+
+    @property
+    def ground(self) -> Ground:
+        """The step to do."""
+        filled = self.named
+        return self.rule.does[0], tuple([filled.get(term, term) for term in self.rule.does[1]])
+
+
+@dataclass
+class Budget:
+    """How many steps may still be done."""
+
+    left: int
+
+
+class Chains:
+    """Chains of rules in one call.
+
+    Parameters
+    ----------
+    call : Call
+    rules : mapping of level and situation type to rules
+        It may grow.
+    joins : dict
+        What was compiled of rules for other calls over the same program; grows.
+    prefer : function of a candidate
+        Of ways that are equally near the one of the least value is gone first.
+    before : function of two conditions with who is in their roles
+        Whether the first is known to be brought about before the second.
+    """
+
+    def __init__(
+        self,
+        call: Call,
+        rules: Mapping[tuple[int, str], list[Rule]],
+        joins: dict[str, Bind | None],
+        prefer: Callable[[Candidate], tuple[bool, float]],
+        before: Callable[[Condition, Condition, Mapping[str, str]], bool],
+    ) -> None:
+        self.call, self.rules, self.joins, self.prefer, self.before = call, rules, joins, prefer, before
+        self.finds: dict[str, Find | None] = {}
+        self.achievers: dict[str, Achiever] = {}
+        self.age = -1
+        self.found: dict[tuple[int, Cell, str, bool], list[Candidate]] = {}
+        self.near: dict[tuple[int, Cell, str, bool], int] = {}
+        self.beyond: dict[tuple[int, Cell, str, bool], float] = {}
+        """How long chains may be that lead to a goal, and how long they may not."""
+        self.picked: dict[int, Sequence[str]] = {}
+        self.seen: set[tuple[int, Cell, str, bool]] = set()
+        self.cut = False
+
+    def met(self, goal: Goal) -> bool:
+        """Whether something is as wanted now."""
+        (situation, key), value = goal
+        return meets(self.call.table.now[situation].get(key, FALSE), value)
+
+    def ways(self, level: int, goal: Goal, everybody: bool = False) -> list[Candidate]:
+        """Return the ways to follow rules for a goal now."""
+        if self.age != self.call.table.age:
+            self.age = self.call.table.age
+            for known in (self.found, self.near, self.beyond, self.picked):
+                known.clear()
+        (cell, value), key = goal, (level, *goal, everybody)
+        if key not in self.found:
+            self.found[key] = [
+                Candidate(rule, cell, *way)
+                for rule in self.rules.get((level, cell[0]), ())
+                for way in islice(self.find(rule, cell, value, everybody), WAYS)
+            ]
+        return self.found[key]
+
+    def find(self, rule: Rule, cell: Cell, value: str, everybody: bool) -> Iterator[tuple[Roles, tuple[int, ...]]]:
+        """Return ways to fill the roles of a rule; it is compiled when it is first asked."""
+        name, program = rule.name, self.call.program
+        if name not in self.finds:
+            asks = soft(rule, program.problem)
+            if name not in self.joins:
+                self.joins[name] = finder(rule, program.writer, asks)
+            bind = self.joins[name]
+            self.finds[name] = bind(self.call.table, self.pick) if bind is not None else None
+            self.achievers[name] = Achiever(name, 0, asks, {}, dict(rule.kinds), deep=True)
+        find = self.finds[name]
+        return find(*arguments_of(cell[1]), value, everybody) if find is not None else iter(())
+
+    def pick(self, candidates: tuple[str, ...]) -> Sequence[str]:
+        """Return of many candidates one of each sort and state."""
+        found = self.picked.get(id(candidates))
+        if found is None:
+            alike, now = self.call.program.alike, self.call.table.now
+            found = candidates if len(candidates) <= FEW else alike.unlike(candidates, (), now)
+            self.picked[id(candidates)] = found
+        return found
+
+    def lacks(self, level: int, way: Candidate, number: int) -> list[Goal]:
+        """Return the wants of which one would do for a condition."""
+        achiever, env = self.achievers[way.rule.name], way.named
+        asked = achiever.soft[number]
+        defined = isinstance(asked, ValueCondition) and asked.situation in self.call.program.rules
+        if isinstance(asked, ValueCondition) and defined and (level, asked.situation) in self.rules:
+            key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
+            return [((asked.situation, key), TRUE if (asked.value == TRUE) is not asked.negated else FALSE)]
+        wants = self.call.segments.wants.of(achiever, asked, env, level)
+        return [((situation, key), value) for situation, key, values in wants for value in values]
+
+    # --------------------------------------------------------------------------------------------------------- distance
+
+    def distance(self, level: int, goal: Goal, everybody: bool, most: float = FARTHEST) -> float:
+        """Return how long a chain to a goal is at least; infinity if there is none, or a longer one."""
+        for n in range(int(min(most, FARTHEST)) + 1):
+            self.cut, self.seen = False, set()
+            if self.within(level, goal, n, everybody):
+                return n
+            if not self.cut:  # nothing of what was looked at can be reached by a chain of any length
+                self.beyond.update(dict.fromkeys(self.seen, inf))
+                return inf
+        return inf
+
+    def far(self, level: int, goal: Goal) -> float:
+        """Return the same, of somebody who comes to mind if there is a chain, else of anybody."""
+        near = self.distance(level, goal, False)
+        return near if near < inf else self.distance(level, goal, True)
+
+    def within(self, level: int, goal: Goal, most: int, everybody: bool) -> bool:
+        """Whether a chain of at most so many rules may lead to a goal."""
+        if self.met(goal):
+            return True
+        ways = self.ways(level, goal, everybody)
+        key = (level, *goal, everybody)
+        if self.near.get(key, inf) <= most:
+            return True
+        if most <= 0 or self.beyond.get(key, 0) >= most:
+            self.cut |= key not in self.seen and self.beyond.get(key, 0) < inf
+            return False
+        self.beyond[key] = most  # met again on the way, it isn't nearer
+        self.seen.add(key)
+        self.cut |= any(way.rule.steps > most for way in ways)
+        if any(
+            way.rule.steps <= most and all(self.mended(level, way, n, most - 1, everybody) for n in way.unmet)
+            for way in ways
+        ):
+            self.near[key] = most
+            return True
+        return False
+
+    def mended(self, level: int, way: Candidate, number: int, most: int, everybody: bool) -> bool:
+        """Whether chains of at most so many rules may lead to a condition; of what nothing is known to lead to, one hopes so."""
+        lacks = self.lacks(level, way, number)
+        return any(self.within(level, goal, most, everybody) for goal in lacks) if lacks else most > 0
+
+    def cost(self, level: int, way: Candidate, everybody: bool, most: float) -> float:
+        """Return how long a chain is at least whose last rule is followed this way."""
+        if not way.unmet:
+            return way.rule.steps
+        lacks = (self.lacks(level, way, n) for n in way.unmet)
+        return 1 + max(min((self.distance(level, g, everybody, most) for g in goals), default=1) for goals in lacks)
+
+    def nearest(self, level: int, goal: Goal, below: float = inf) -> list[tuple[float, Candidate]]:
+        """Return the nearest ways to a goal, each with its distance, the best first."""
+        for everybody in (False, True):
+            most = self.distance(level, goal, everybody)
+            if most < inf:
+                ways = [
+                    (cost, way)
+                    for way in self.ways(level, goal, everybody)
+                    if (cost := self.cost(level, way, everybody, most + 2)) < below
+                ]
+                if ways:
+                    return self.best(ways)
+        return []
+
+    def best(self, ways: list[tuple[float, Candidate]]) -> list[tuple[float, Candidate]]:
+        """Return the first few of the ways in the order in which to try them."""
+        groups: dict[tuple[float, int], list[Candidate]] = {}
+        for cost, way in ways:
+            groups.setdefault((cost, len(way.unmet)), []).append(way)
+        found: list[tuple[float, Candidate]] = []
+        for (cost, _), group in sorted(groups.items()):
+            if len(found) < TRIES:
+                found += [(cost, way) for way in (sorted(group, key=self.prefer) if len(group) > 1 else group)]
+        return found[:TRIES]
+
+    # ---------------------------------------------------------------------------------------------------------- attaining
+
+    def attain(
+        self, level: int, goal: Goal, budget: Budget, above: tuple[Goal, ...] = (), below: float = inf
+    ) -> Steps | None:
+        """Do steps that lead to a goal; None, and the table as it was, without any."""
+        if self.met(goal):
+            return []
+        if goal in above or len(above) > FARTHEST:
+            return None
+        table, off = self.call.table, self.off(goal)
+        for cost, way in self.nearest(level, goal, below):
+            if cost == inf or budget.left <= 0:
+                return None
+            mark = len(table.trail)
+            steps = self.go(level, way, cost, budget, (*above, goal))
+            if steps:
+                on = cost
+                if way.rule.steps == 1 and (steps[-1].behavior, steps[-1].arguments) == way.ground:
+                    on = below if self.off(goal) < off else 0.0  # an amount may need the same once more
+                rest = self.attain(level, goal, budget, above, on)
+                if rest is not None:
+                    return steps + rest
+            table.undo(mark)
+        return None
+
+    def off(self, goal: Goal) -> float:
+        """Return by how much an amount isn't as wanted; nothing of what is none."""
+        (situation, key), value = goal
+        if self.call.program.domain.situations[situation].quantity is None:
+            return 0.0
+        now = float(number(self.call.table.now[situation].get(key)))
+        return min(abs(now - float(number(bound.lstrip("<>=")))) for bound in value.split(","))
+
+    def go(self, level: int, way: Candidate, cost: float, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
+        """Bring about what a way lacks, and do its step; where it turns out to be longer than promised, stop before that.
+
+        Without steps the table may be changed.
+        """
+        call, steps, ground = self.call, list[RefinedStep](), way.ground
+        asks = self.achievers[way.rule.name].soft
+        for _ in range(2 * len(asks) + 1):
+            if not way.unmet:
+                break
+            done = self.mend(level, way, budget, above)
+            if done is None:
+                return None
+            steps += done
+            same = self.same(level, way, ground, above[-1])
+            if same is None or self.cost(level, same, True, cost + SLACK) > cost + SLACK:
+                return steps
+            way = same
+        else:
+            return None
+        if budget.left <= 0 or call.segments.forward[ground[0]](*ground[1]) is None:
+            return None
+        budget.left -= 1
+        call.segments.expand(level)
+        step = call.refiner.do(level, *ground)
+        return None if step is None else [*steps, step]
+
+    def same(self, level: int, way: Candidate, ground: Ground, goal: Goal) -> Candidate | None:
+        """Return the way to do the same step by the same rule that lacks least now."""
+        now = (w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule and w.ground == ground)
+        return min(now, key=lambda w: len(w.unmet), default=None)
+
+    def mend(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
+        """Bring about the next of the conditions that a way lacks."""
+        asks, env = self.achievers[way.rule.name].soft, way.named
+        first: tuple[int, float, int] | None = None
+        goals: list[tuple[float, int, Goal]] = []
+        for n in way.unmet:
+            lacks = self.lacks(level, way, n)
+            near = sorted((self.far(level, g), i, g) for i, g in enumerate(lacks))
+            if not near:
+                continue  # perhaps it comes with the others
+            if near[0][0] == inf:
+                return None
+            later = sum(m != n and self.before(asks[m], asks[n], env) for m in way.unmet)
+            if first is None or (later, -near[0][0], n) < first:
+                first, goals = (later, -near[0][0], n), near
+        for far, _, goal in goals[:TRIES]:
+            done = self.attain(level, goal, budget, above) if far < inf else None
+            if done is not None:
+                return done
+        return None
+
+
+def fact(condition: Condition, env: Mapping[str, str]) -> Fact | None:
+    """Return the value that a condition asks for, if it asks for one."""
+    if not isinstance(condition, ValueCondition) or condition.negated:
+        return None
+    arguments = tuple([env.get(a, a) for a in condition.arguments])
+    return Fact(Symbol(condition.situation, arguments), env.get(condition.value, condition.value))
