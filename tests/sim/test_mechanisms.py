@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import confab
+from confab.reaching import with_reach
 from confab.scene import Scene
 from planner.acting.episode import Change, Intervention
+from planner.plan import Step
 from reasoner.embodiment.skill_checks import RULES
 from reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES
 from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
@@ -188,6 +190,18 @@ def test_the_lever_of_the_authoring_guide_is_turned_and_turned_back(tmp_path: Pa
         for skill, value in (("operate", "true"), ("operate_back", "false")):
             perform(world, skills[skill], roles)
             assert world.observe()[Symbol("OPENED", ("lever",))] == value
+
+
+def test_a_knob_is_turned_and_a_door_slides_aside_as_an_author_describes_them(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "docs" / "examples" / "workshop" / "workshop.ttl"
+    (tmp_path / file.name).write_text(file.read_text())
+    scene = with_reach(confab.load(tmp_path / file.name))
+    assert str(scene.plan().verify()).startswith("verified")
+    with World(scene.embodiment, scene.problem.initial, seed=1, perturb=Perturbation(), beads=False) as world:
+        for i, behavior in enumerate(("F3_OPEN", "F3_SHUT")):
+            verdict = world.execute(Step((i,), 0, 3, behavior, ("right_hand", "valve")))
+            assert verdict.ok, verdict
+            assert (world.links["valve"].values()["valve"] > 1.0) == (behavior == "F3_OPEN")
 
 
 def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
