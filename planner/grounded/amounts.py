@@ -245,11 +245,16 @@ class Amounts:
         """Return a state's bits with the first amounts."""
         return state & self.keep | self._masks[0]
 
-    def applied(self, before: int, after: int, operator: int) -> int | None:
-        """Return a state with its amounts changed by an operator as they were before; None if one can't be what it would be."""
+    def made(self, operator: int) -> tuple[Move, ...]:
+        """Return the changes that an operator makes, worked out once."""
         moves = self._moves.get(operator)
         if moves is None:
             moves = self._moves[operator] = self.moves(operator)
+        return moves
+
+    def applied(self, before: int, after: int, operator: int) -> int | None:
+        """Return a state with its amounts changed by an operator as they were before; None if one can't be what it would be."""
+        moves = self.made(operator)
         if not moves:
             return after
         number = before >> self.size

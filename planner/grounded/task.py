@@ -157,6 +157,8 @@ class Task:
                 asked, changes = self.known(operator)
                 for when, _, _ in changes:
                     asked |= when
+                for move in () if self.amounts is None else self.amounts.made(operator):
+                    asked |= move.when
                 state = self.derived.fresh(state, asked)
             after = self.applied(state, operator, follow)
             if after is not None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from random import Random
@@ -18,11 +19,13 @@ from planner.plan import Limits, Status
 from planner.solve import Request, solve
 from planner.transitions import Table, key_of
 from planner.validation import Facts
+from reasoner.amounts import Quantity
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     Behavior,
     Domain,
     Parameter,
@@ -36,6 +39,7 @@ from reasoner.symbols import (
 from reasoner.validation.validate import validate
 from tests.planner import naive
 from worlds.language import DEFINED, language
+from worlds.writing import becomes, has, world
 
 State = Mapping[Symbol, str]
 
@@ -130,6 +134,40 @@ def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
                     seen.add(key)
                     order.append(after)
     return order, True
+
+
+def test_what_is_defined_is_worked_out_where_only_a_change_of_an_amount_asks_for_it() -> None:
+    """A cart is rolled out of the shade before it stays too wet there; nothing but the amount asks for the shade."""
+    cart = Parameter("?c", "Cart")
+    shaded = tuple(Rule("SHADED", (cart,), (), (has("AT", "?c", where),)) for where in ("shade", "porch"))
+    takes = AmountEffect("WET", ("bed",), "decrease", Fraction(1), (has("SHADED", "cart", "true"),))
+    problem = world(
+        [
+            SituationType("AT", ("Cart",), "AT"),
+            SituationType("SHADED", ("Cart",), "Truth", boolean=True),
+            SituationType("WET", ("Bed",), "WET", quantity=Quantity(least=Fraction(0))),
+            SituationType("DAYS", ("Bed",), "DAYS", quantity=Quantity()),
+        ],
+        [
+            Behavior("ROLL", 1, (cart, Parameter("?p", "AT")), (), (), (becomes("AT", "?c", "?p"),)),
+            Behavior("SUN", 1, (), amounts=(takes, AmountEffect("DAYS", ("bed",), "increase", Fraction(1)))),
+        ],
+        {"Cart": ("cart",), "Bed": ("bed",), "AT": ("shade", "porch", "yard")},
+        {"AT cart": "shade", "WET bed": "1", "DAYS bed": "0"},
+        {"DAYS bed": ">=3", "WET bed": "0"},
+    )
+    problem = replace(problem, domain=replace(problem.domain, rules={"SHADED": shaded}))
+    task = ground(problem, 1)
+    assert isinstance(task, Task)
+    steps = {task.describe(o)[:2]: o for o in range(len(task))}
+    roll, sun = steps["ROLL", ("cart", "yard")], steps["SUN", ()]
+    plan, state = [sun, roll, sun, sun], task.initial
+    for operator in plan:
+        after = task.applied(state, operator)
+        assert after is not None
+        state = after
+    assert task.carried_out(task.initial, plan) == (state, plan)
+    assert solve(Request(problem)).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
