@@ -1,7 +1,8 @@
 """Writers of files, killed at any moment: what was acknowledged is still there, and every file is whole.
 
-python -m benchmarks.kills          100 SIGKILLs for each command, as docs/promises.md quotes them
-python -m benchmarks.kills save 20  so many for one
+python -m benchmarks.kills             100 SIGKILLs for each command, as docs/promises.md quotes them
+python -m benchmarks.kills save 20     so many for one
+python -m benchmarks.kills --ctrl-c    SIGINTs in their place: each call ends with 0 or 130, and in no other way
 """
 
 from __future__ import annotations
@@ -17,17 +18,19 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import NamedTuple
 
 import pyoxigraph as ox
 
 from confab import load as confab_scene
 from confab.cli import main as confab
 from confab.memory import Memory
+from confab.terminal import INTERRUPTED
 from reasoner.files import alone
 from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
@@ -45,16 +48,18 @@ LEARNING = ("learn", "execute", "run")
 """What adds an episode."""
 
 
-def killed(write: Callable[[], object], after: float = math.inf, call: float = math.inf) -> tuple[bool, float, int]:
-    """Run something in a process of its own; kill it after so many seconds of CPU time, or at one of its calls.
+class Ended(NamedTuple):
+    """How a process ended: its exit code, negative for a signal; its CPU seconds, and its calls where they were counted."""
 
-    Returns
-    -------
-    bool
-        Whether it had ended well by itself.
-    float, int
-        CPU seconds that it had, and calls of functions that it made, where `call` was given.
-    """
+    code: int
+    seconds: float
+    calls: int
+
+
+def killed(
+    write: Callable[[], object], after: float = math.inf, call: float = math.inf, sign: int = signal.SIGKILL
+) -> Ended:
+    """Run something in a process of its own; signal it after so many seconds of CPU time, or at one of its calls."""
     made = mmap.mmap(-1, 8)  # shared with the child
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
@@ -62,35 +67,38 @@ def killed(write: Callable[[], object], after: float = math.inf, call: float = m
     if child == 0:
         code = 1
         try:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
                 if call != math.inf or after == math.inf:
-                    sys.setprofile(_counting(made, call))
+                    sys.setprofile(_counting(made, call, sign))
                 write()
             code = 0
         except SystemExit as end:
             code = int(end.code or 0)
+        except KeyboardInterrupt:
+            code = INTERRUPTED
         finally:
             os._exit(code)
     while (ended := os.wait4(child, os.WNOHANG))[0] == 0:
         if spent(child) >= after:
-            os.kill(child, signal.SIGKILL)
+            os.kill(child, sign)
             ended = os.wait4(child, 0)
             break
         time.sleep(0.0005 if after < math.inf else 0.02)
     _, state, used = ended
-    well = os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
-    return well, used.ru_utime + used.ru_stime, int.from_bytes(made[:8], "little")
+    return Ended(os.waitstatus_to_exitcode(state), used.ru_utime + used.ru_stime, int.from_bytes(made[:8], "little"))
 
 
-def _counting(made: mmap.mmap, last: float) -> Callable[[FrameType, str, object], None]:
-    """Return what counts calls, of Python's functions and of C's, and ends the process at the last."""
+def _counting(made: mmap.mmap, last: float, sign: int) -> Callable[[FrameType, str, object], None]:
+    """Return what counts calls, of Python's functions and of C's, and signals the process at the last."""
     so_far = 0
 
     def count(frame: FrameType, event: str, argument: object) -> None:
         nonlocal so_far
         so_far += 1
         if so_far >= last:
-            os.kill(os.getpid(), signal.SIGKILL)
+            sys.setprofile(None)
+            os.kill(os.getpid(), sign)
         if last == math.inf:
             made[:8] = so_far.to_bytes(8, "little")
 
@@ -179,8 +187,11 @@ def rename(file: Path) -> str:
     return "Mug=Cup" if "Mug" in classes else "Cup=Mug"
 
 
-def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
-    """Kill a command so many times; return how often it had answered, and how many acknowledged episodes and files were lost."""
+def trial(kills: int, command: str, seed: int = 0, sign: int = signal.SIGKILL) -> tuple[int, int]:
+    """Kill a command so many times; return how often it had answered, and how many acknowledged episodes and files were lost.
+
+    A process that ends of a SIGINT in another way than with exit 130 counts as lost, too.
+    """
     draw, lost, done = random.Random(seed), 0, 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -205,34 +216,38 @@ def trial(kills: int, command: str, seed: int = 0) -> tuple[int, int]:
         learn(file, -1)
         with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), suppress(SystemExit):
             writes[command](-2)  # imports what it needs, once for all
-        well, seconds, calls = killed(lambda: writes[command](-3))
-        assert well, f"{command} doesn't work at all"
+        code, _, calls = killed(lambda: writes[command](-3))
+        assert code == 0, f"{command} doesn't work at all"
         _, seconds, _ = killed(lambda: writes[command](-4), after=1e9)
         acknowledged = Memory.load(file).experience.episodes["me"]
         for number in range(kills):
             # half of them at any time, half while or after the files are written, which comes last
             when = draw.choice((draw.uniform(0.0, 1.1), draw.uniform(0.9, 1.05)))
             moment = {"after": seconds * when} if number % 2 else {"call": calls * when}
-            if killed(lambda number=number: writes[command](number), **moment)[0]:  # type: ignore[misc]
-                done += 1
-                acknowledged += command in LEARNING
+            code = killed(partial(writes[command], number), **moment, sign=sign).code
+            done += code == 0
+            acknowledged += code == 0 and command in LEARNING
+            lost += code not in (0, INTERRUPTED if sign == signal.SIGINT else -sign)
             found = Memory.load(file).experience.episodes["me"]
             lost += max(0, acknowledged - found) + len(torn(folder))
             acknowledged = found
     return done, lost
 
 
-def main() -> int:
+def main(arguments: Sequence[str]) -> int:
     """Print the table; return 1 if anything was lost."""
-    commands = sys.argv[1:2] or list(COMMANDS)
-    kills, worst = int(sys.argv[2]) if len(sys.argv) > 2 else 100, 0
-    print("| killed | times | answered before | acknowledged episodes lost, or files torn |\n|---|---|---|---|")
+    sign = signal.SIGINT if "--ctrl-c" in arguments else signal.SIGKILL
+    words = [word for word in arguments if word != "--ctrl-c"]
+    commands = words[:1] or [command for command in COMMANDS if command != "crowd" or sign == signal.SIGKILL]
+    kills, worst = int(words[1]) if len(words) > 1 else 100, 0
+    what = "interrupted" if sign == signal.SIGINT else "killed"
+    print(f"| {what} | times | answered before | acknowledged episodes lost, or files torn |\n|---|---|---|---|")
     for command in commands:
-        done, lost = crowd(kills) if command == "crowd" else trial(kills, command)
+        done, lost = crowd(kills) if command == "crowd" else trial(kills, command, sign=sign)
         worst = max(worst, lost)
         print(f"| `{COMMANDS[command]}` | {kills} | {done} | {lost} |", flush=True)
     return int(bool(worst))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

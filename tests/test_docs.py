@@ -91,3 +91,19 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "LOCATION" in (tmp_path / "reference.html").read_text()
+
+
+def test_what_shows_each_promise_is_there() -> None:
+    text = (DOCS / "promises.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"`pytest (\S+)(?: -k (?:\"([^\"]+)\"|(\w+)))?`", text))
+    assert len(shown) == len(set(re.findall(r"`pytest [^`]*`", text))) > 12
+    collect = [sys.executable, "-m", "pytest", "-q", "--collect-only", "-n0", "-p", "no:cacheprovider"]
+    files = sorted({file for file, *_ in shown})
+    done = subprocess.run([*collect, *files], cwd=ROOT, capture_output=True, text=True, check=False)
+    tests = [line for line in done.stdout.splitlines() if "::" in line]
+    for file, several, one in shown:
+        words = several.split(" or ") if several else [one]
+        for word in words:
+            assert any(line.startswith(file) and word in line.split("::")[1] for line in tests), f"{file} -k {word}"
+    for module in set(re.findall(r"`python -m ([\w.]+)", text)):
+        assert find_spec(module), module

@@ -185,6 +185,49 @@ def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: P
     assert (tmp_path / "m.ttl").read_text() == "old"
 
 
+@pytest.mark.parametrize(
+    ("prepare", "said"),
+    [("head -c 2m /dev/zero > fill", "No space left"), ("mount -o remount,ro .", "Read-only file system")],
+)
+def test_on_a_full_or_read_only_disk_the_file_is_named_and_the_old_one_stays(
+    tmp_path: Path, prepare: str, said: str
+) -> None:
+    memory = Memory.of(confab.load("living-room"))
+    memory.experience = lived("me")
+    memory.save(tmp_path / "m.ttl")
+    code = """
+import sys
+from pathlib import Path
+from confab.cli import main
+before = Path("m.ttl").read_bytes()
+for call in sys.argv[1:]:
+    try:
+        main(call.split())
+    except SystemExit as end:
+        print(end.code)
+print(Path("m.ttl").read_bytes() == before, sorted(path.name for path in Path().rglob("*") if path.is_file()))
+"""
+    calls = [f"memory {what}" for what in ("merge m.ttl m.ttl -o m.ttl", "trust m.ttl all", "migrate m.ttl Plate=Dish")]
+    calls += ["-q execute living-room --memory m.ttl --learn", "-q execute living-room --save e.ttl"]
+    calls += ["generate served --objects 40 -o s.ttl", "export living-room -o pddl"]
+    disk = (
+        f"mkdir disk; mount -t tmpfs -o size=1m tmpfs disk && cp m.ttl disk && cd disk && {{ {prepare}; "
+        + 'exec "$@"; }'
+    )
+    done = subprocess.run(
+        ["unshare", "-rm", "bash", "-c", disk, "-", sys.executable, "-c", code, *calls],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    *codes, last = done.stdout.splitlines()
+    assert (codes, last.replace(", 'fill'", "").replace("'fill', ", "")) == (["2"] * 7, "True ['m.ttl']"), done.stderr
+    told = re.findall(rf"^confab: (\S+): (?:can't be written: )?(?:{said}|is read-only)", done.stderr, re.MULTILINE)
+    assert told == ["m.ttl"] * 4 + ["e.ttl", "s.ttl", "pddl/domain.pddl"], done.stderr
+
+
 def test_a_rename_waits_for_whoever_writes_and_says_so(
     tmp_path: Path, tearoom: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
