@@ -1,0 +1,205 @@
+"""What the checker reads conditions and states as, kind by kind: it is asked by hand, on worlds small enough to see the answer."""
+
+import pytest
+
+from planner.plan import Plan, Step
+from planner.validation import Facts, Rules, stretches, successor, validate
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    Witness,
+)
+from worlds.writing import becomes, behavior, has, lacks, world
+
+
+def shelves(*conditions: Condition, variables: str = "", terms: str = "?c:Cup") -> Problem:
+    """Three cups on two shelves, one of them full; whether a behaviour of these conditions can be done is the question."""
+    return world(
+        [
+            SituationType("AT", ("Cup",), "Place"),
+            SituationType("FULL", ("Cup",), "Truth", boolean=True),
+            SituationType("NEAR", ("Cup", "Place"), "Truth", boolean=True),
+        ],
+        [behavior("DO", 1, terms, conditions, [becomes("FULL", "?c", TRUE)], variables)],
+        {"Cup": ("cup1", "cup2", "cup3"), "Place": ("high", "low", "floor"), "Bowl": ("cup3",)},
+        {"AT cup1": "high", "AT cup2": "low", "AT cup3": "low", "FULL cup2": TRUE, "NEAR cup1 low": TRUE},
+        {},
+        {"above": [("high", "low"), ("low", "floor")], "self": [("low", "low")]},
+    )  # fmt: skip
+
+
+def done(problem: Problem) -> str:
+    """Return the cups that the behaviour can be done with, by their numbers."""
+    do = problem.domain.behaviors["DO"]
+    rest = tuple(problem.classes[p.kind][0] for p in do.parameters[1:])
+    return "".join(
+        cup[-1] for cup in problem.classes["Cup"] if successor(problem, do, (cup, *rest), problem.initial) is not None
+    )
+
+
+P, Q = "?p:Place", "?p:Place ?q:Place"
+
+
+@pytest.mark.parametrize(
+    ("conditions", "variables", "cups"),
+    [
+        ([], "", "123"),
+        ([has("AT", "?c", "low")], "", "23"),
+        ([lacks("AT", "?c", "low")], "", "1"),
+        ([has("FULL", "?c", TRUE)], "", "2"),
+        ([has("FULL", "?c", FALSE)], "", "13"),
+        ([lacks("FULL", "?c", FALSE)], "", "2"),
+        ([has("NEAR", "?c", "low", TRUE)], "", "1"),
+        ([has("NEAR", "?c", "?p", TRUE)], P, "1"),
+        ([has("NEAR", "?c", "?p", FALSE), has("AT", "?c", "?p")], P, "123"),
+        ([has("NEAR", "?c", "cup1", FALSE)], "", ""),  # of what isn't there nothing is so
+        ([lacks("NEAR", "?c", "cup1", FALSE)], "", "123"),
+        ([ClassCondition("?c", "Bowl")], "", "3"),
+        ([ClassCondition("?c", "Bowl", True)], "", "12"),
+        ([ClassCondition("?c", "Pan")], "", ""),
+        ([EqualityCondition("?c", "cup2")], "", "2"),
+        ([EqualityCondition("?c", "cup2", True)], "", "13"),
+        ([has("AT", "?c", "?p"), RelationCondition("above", ("?p", "floor"))], P, "23"),
+        ([has("AT", "?c", "?p"), RelationCondition("above", ("?p", "floor"), True)], P, "1"),
+        (
+            [
+                has("AT", "?c", "?p"),
+                RelationCondition("above", ("?p", "?q")),
+                RelationCondition("above", ("?q", "floor")),
+            ],
+            Q,
+            "1",
+        ),
+        ([has("AT", "?c", "?p"), RelationCondition("above", ("?q", "?p"))], Q, "23"),
+        ([has("AT", "?c", "?p"), RelationCondition("self", ("?p", "?p"))], P, "23"),
+        ([RelationCondition("self", ("?p", "?p")), has("AT", "?c", "?p")], P, "23"),
+        ([RelationCondition("none", ("?c",))], "", ""),
+        ([has("AT", "?c", "?p")], "?p:Bowl", ""),  # who is determined has to be of the right class
+        ([has("AT", "?d", "?p"), has("FULL", "?d", TRUE), has("AT", "?c", "?p")], "?d:Cup ?p:Place", "23"),
+        ([has("AT", "?d", "high"), EqualityCondition("?d", "?c", True)], "?d:Cup", "23"),
+        ([lacks("AT", "?c", "?p"), lacks("AT", "cup1", "?p")], P, "123"),
+        ([Witness("?x", "Cup", (has("AT", "?x", "?p"), has("FULL", "?x", TRUE))), has("AT", "?c", "?p")], P, "23"),
+        ([Witness("?x", "Cup", (has("AT", "?x", "?p"), has("FULL", "?x", TRUE)), True), has("AT", "?c", "?p")], P, "1"),
+        ([Witness("?x", "Bowl", (has("AT", "?x", "?p"), has("AT", "?c", "?p")))], P, "23"),
+        ([Witness("?c", "Bowl", ())], "", "123"),  # another ?c
+        ([AnyOf(((has("FULL", "?c", TRUE),), (has("AT", "?c", "high"),)))], "", "12"),
+        ([AnyOf(((has("FULL", "?c", TRUE),), (has("AT", "?c", "high"),)), True)], "", "3"),
+        (
+            [AnyOf(((has("AT", "?c", "?p"), RelationCondition("above", ("?p", "floor"))), (has("FULL", "?c", TRUE),)))],
+            P,
+            "23",
+        ),
+        ([AnyOf(())], "", ""),
+        ([AnyOf((), True)], "", "123"),
+        ([AnyOf(((),))], "", "123"),
+        # What is chosen inside of a condition is forgotten outside of it.
+        ([AnyOf(((has("AT", "?c", "?p"),),)), has("AT", "cup1", "?p")], P, "1"),
+    ],
+)
+def test_what_can_be_done_is_what_the_conditions_say(conditions: list[Condition], variables: str, cups: str) -> None:
+    assert done(shelves(*conditions, variables=variables)) == cups
+    assert done(shelves(*reversed(conditions), variables=variables)) == cups
+
+
+def test_arguments_have_to_be_as_many_and_of_the_classes_that_are_asked_for() -> None:
+    problem = shelves(terms="?c:Cup ?p:Place")
+    do = problem.domain.behaviors["DO"]
+    assert successor(problem, do, ("cup1", "low"), problem.initial) is not None
+    for wrong in ((), ("cup1",), ("low", "cup1"), ("cup1", "low", "low"), ("cup1", "cup2")):
+        assert successor(problem, do, wrong, problem.initial) is None
+
+
+def test_a_conditional_effect_is_made_where_its_condition_held_before() -> None:
+    effects = [
+        becomes("AT", "?c", "?q", when=(has("AT", "?c", "?p"), RelationCondition("above", ("?p", "?q")))),
+        becomes("FULL", "?c", FALSE, when=(has("FULL", "?c", TRUE),)),
+        becomes("FULL", "?c", TRUE, when=(has("FULL", "?c", FALSE),)),
+        becomes("NEAR", "?c", "cup1", TRUE),
+    ]
+    problem = shelves()
+    fall = behavior("FALL", 1, "?c:Cup", [], effects, "?p:Place ?q:Place")
+    for cup, place, full in (("cup1", "low", TRUE), ("cup2", "floor", FALSE)):
+        state = successor(problem, fall, (cup,), problem.initial)
+        assert state is not None
+        assert (state[Symbol("AT", (cup,))], state[Symbol("FULL", (cup,))]) == (place, full)
+        assert Symbol("NEAR", (cup, "cup1")) not in state  # there is no such symbol
+
+
+def test_what_becomes_true_and_false_at_once_is_true() -> None:
+    both = behavior("BOTH", 1, "?c:Cup", [], [becomes("FULL", "?c", TRUE), becomes("FULL", "?c", FALSE)])
+    state = successor(shelves(), both, ("cup1",), shelves().initial)
+    assert state is not None
+    assert state[Symbol("FULL", ("cup1",))] == TRUE
+
+
+def test_facts_remember_what_was_overwritten() -> None:
+    facts = Facts(shelves(), shelves().initial)
+    assert [facts.value("FULL", (cup,)) for cup in ("cup1", "cup2", "floor")] == [FALSE, TRUE, None]
+    assert list(facts.holders("AT", "low")) == [("cup2",), ("cup3",)]
+    facts.put("AT", ("cup2",), "high")
+    facts.put("AT", ("cup2",), "high")
+    facts.put("FULL", ("cup1",), TRUE)
+    assert facts.log == [("AT", ("cup2",), "low"), ("FULL", ("cup1",), FALSE)]
+    assert (list(facts.holders("AT", "low")), list(facts.holders("AT", "high"))) == (
+        [("cup3",)],
+        [("cup1",), ("cup2",)],
+    )
+    assert facts.since(0) == {("AT", ("cup2",)): "low", ("FULL", ("cup1",)): FALSE}
+    assert facts.since(1) == {("FULL", ("cup1",)): FALSE}
+    facts.put("AT", ("cup2",), "low")
+    assert facts.since(0) == {("FULL", ("cup1",)): FALSE}
+    assert facts.since(2) == {("AT", ("cup2",)): "high"}
+    assert facts.state()[Symbol("AT", ("cup2",))] == "low"
+
+
+def test_who_satisfies_conditions_is_told() -> None:
+    problem = shelves()
+    facts, kinds = Facts(problem, problem.initial), {"?c": "Cup", "?p": "Place"}
+    conditions = [has("AT", "?c", "?p"), has("FULL", "?c", TRUE)]
+    assert Rules(problem).satisfied(conditions, {}, kinds, facts) == {"?c": "cup2", "?p": "low"}
+    assert Rules(problem).satisfied(conditions, {"?c": "cup1"}, kinds, facts) is None
+    assert Rules(problem).satisfied([ValueCondition("AT", ("?c",), "?p")], {"?c": "cup1"}, kinds, facts) == {
+        "?c": "cup1",
+        "?p": "high",
+    }
+
+
+def test_relations_are_found_by_what_stands_at_a_place() -> None:
+    rules = Rules(shelves())
+    assert rules.related("above", 0) == {"high": [("high", "low")], "low": [("low", "floor")]}
+    assert rules.related("above", 1) == {"low": [("high", "low")], "floor": [("low", "floor")]}
+    assert rules.related("none", 0) == {}
+
+
+def step(level: int, name: str = "DO", *arguments: str, id: int = 0) -> Step:
+    return Step((), id, level, name, arguments or ("cup1",))
+
+
+def test_lower_steps_stand_together_between_those_of_a_level() -> None:
+    one, low, lower = step(1), step(2), step(3)
+    assert list(stretches([one, low, lower, one, one, low], 1)) == [[one], [low, lower], [one], [one], [low]]
+    assert list(stretches([low, one], 1)) == [[low], [one]]
+    assert list(stretches([], 1)) == []
+
+
+def test_a_plan_is_told_each_thing_that_is_wrong_with_it() -> None:
+    problem = shelves(has("FULL", "?c", FALSE))
+    assert validate(problem, Plan((step(1),))) == []
+    said = [fault.text for fault in validate(problem, Plan((step(1), step(1))))]
+    assert said == ["0 DO cup1: its preconditions don't hold where it is done"]
+    said = [fault.text for fault in validate(problem, Plan((step(1, "DO", "cup3", id=5),)))]
+    assert said == ["5 DO cup3: its ID by the numbering of level 1 is 2"]
+    for wrong in (step(1, "DONE"), step(1, "DO", "low"), step(1, "DO", "cup1", "cup2")):
+        assert (
+            "no such behaviour, or its parameters don't take these arguments"
+            in validate(problem, Plan((wrong,)))[0].text
+        )
