@@ -97,8 +97,8 @@ class Definitions:
     numbers : set of properties that lead to numbers
     kinds : mapping of property to the classes of subject and value, as names; "" where nothing says it
     concluded : mapping of class to situation type and owner
-        Classes that SWRL rules conclude, the situation type that holds of each, and the class that has it, "" if several do
-        (`reasoner.reading.swrl`).
+        Classes that rules conclude, SWRL's (`reasoner.reading.swrl`) or others, the situation type that holds of each, and the
+        class that has it, "" if several do.
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
@@ -172,7 +172,7 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return what makes a situation type hold of a class's individuals, besides what SWRL rules conclude of them."""
+        """Return what makes a situation type hold of a class's individuals, besides what rules conclude of them."""
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):

@@ -1029,9 +1029,10 @@ def _definitions(schema: Schema, names: Names) -> Definitions:
         kinds[iri] = one, other
     concluded = {}
     of_rules = swrl.heads(schema.swrl) if schema.swrl else ()
-    for iri in schema.of_kind("SituationType") if of_rules else ():
+    ruled = {one for rule in schema.of_kind("Rule") for one in schema.nodes[rule].get(CORE + "situationType", ())}
+    for iri in schema.of_kind("SituationType") if of_rules or ruled else ():
         for kind in schema.nodes[iri].get(CORE + "holdsOf", ()):
-            if kind in of_rules:
+            if kind in of_rules or iri in ruled:
                 concluded[kind] = iri, owners[iri][0] if len(owners[iri]) == 1 else ""
     nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
     return Definitions(nodes, properties, names, schema.numbers, kinds, concluded)

@@ -1,10 +1,13 @@
 """A class defined by situations becomes conditions, so that it stays true as the state changes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from planner.paper.transitions import Model
+from planner.solve import Request, solve
+from planner.validation import Facts
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.reading.problem import Reading, read
@@ -177,3 +180,36 @@ def test_a_property_that_is_neither_situation_nor_relation_is_refused_by_name(tm
         KnowledgeError, match="liesBy stands in a definition, but is neither a value property nor a relation"
     ):
         read(load(path))
+
+
+RULED = """@prefix : <https://example.org/port#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/port> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Box a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :PAID, :CLEARED, :SEALED .
+:PAID a owl:NamedIndividual, c:SituationType .
+:CLEARED a owl:NamedIndividual, c:SituationType ; c:holdsOf :Cleared . :Cleared a owl:Class .
+:CLEARED.rule a owl:NamedIndividual, c:Rule ; c:situationType :CLEARED ; c:about :CLEARED.box ; c:condition :CLEARED.paid .
+:CLEARED.box a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Box .
+:CLEARED.paid a owl:NamedIndividual, c:ValueCondition ; c:about :CLEARED.box ; c:situationType :PAID .
+:SEALED a owl:NamedIndividual, c:SituationType ; c:holdsOf :Sealed .
+:Sealed a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :Box [ a owl:Class ; owl:complementOf :Cleared ] ) ] .
+:PAY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ;
+  c:update "INSERT { ?box :PAID true } WHERE { ?box a :Box . ?box :SEALED true }" .
+:box1 a owl:NamedIndividual, :Box ; c:index 1 . :box2 a owl:NamedIndividual, :Box ; c:index 2 .
+:fact a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :box2 ; c:situationType :PAID .
+[ a owl:AllDifferent ; owl:distinctMembers ( :box1 :box2 ) ] .
+"""
+
+
+def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_path: Path) -> None:
+    """Nothing is stated to be in the class: taken for one that never changes, it would be empty, and each box sealed for ever."""
+    path = tmp_path / "port.ttl"
+    path.write_text(RULED)
+    problem = read(load(path)).problem
+    facts = Facts(problem, problem.initial)
+    assert [facts.value("SEALED", (box,)) for box in ("box1", "box2")] == ["true", "false"]
+    plan = solve(Request(replace(problem, goal={Symbol("SEALED", ("box1",)): "false"}))).plan
+    assert plan is not None
+    assert [step.behavior for step in plan.steps] == ["PAY"]
