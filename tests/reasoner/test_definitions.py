@@ -194,7 +194,8 @@ RULED = """@prefix : <https://example.org/port#> .
 :CLEARED.box a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Box .
 :CLEARED.paid a owl:NamedIndividual, c:ValueCondition ; c:about :CLEARED.box ; c:situationType :PAID .
 :SEALED a owl:NamedIndividual, c:SituationType ; c:holdsOf :Sealed .
-:Sealed a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :Box [ a owl:Class ; owl:complementOf :Cleared ] ) ] .
+:Sealed a owl:Class ;
+  owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :Box [ a owl:Class ; owl:complementOf :Cleared ] ) ] .
 :PAY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ;
   c:update "INSERT { ?box :PAID true } WHERE { ?box a :Box . ?box :SEALED true }" .
 :box1 a owl:NamedIndividual, :Box ; c:index 1 . :box2 a owl:NamedIndividual, :Box ; c:index 2 .
