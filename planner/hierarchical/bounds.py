@@ -13,16 +13,19 @@ from __future__ import annotations
 
 import heapq
 import math
+from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
 from planner.grounded.grounding import ground
 from planner.grounded.shortest import Bound, shortest, ways
 from planner.grounded.task import Task
+from planner.hierarchical.flattened import shortened
 from planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
+from planner.hierarchical.regrouping import under_the_levels_above
 from planner.hierarchical.unsolvability import closed, refusal
-from planner.plan import Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan import LimitError, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.symbols import Problem
@@ -56,7 +59,8 @@ def plan(
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)
-    plan = found if found is not None and not validate(problem, found) else best.plan
+    flat = () if found is None else (under_the_levels_above(problem, found), found)
+    plan = next((plan for plan in flat if not validate(problem, plan)), best.plan)
     status = Status.SOLVED if plan is not None else best.status
     return replace(
         best,
@@ -83,6 +87,10 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
         shapes *= 4
         if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again
+    if best.plan is not None:
+        with suppress(LimitError):
+            flat = shortened(problem, best.plan, deadline)
+            best = replace(best, plan=min(best.plan, flat, key=lambda plan: cost_of(problem, plan)))
     return best
 
 

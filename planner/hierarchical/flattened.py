@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from planner.grounded.best_first import SHORTEN
 from planner.grounded.grounding import ground
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
@@ -22,7 +23,7 @@ MOST_ROWS = 20_000
 """The largest level that is searched as a whole, in rows of a join on the way to its operators."""
 
 WORK = 1_000_000
-"""Operators that are looked at to make a plan shorter."""
+"""Operators that are looked at to make a plan of the lowest level shorter."""
 
 
 def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Plan:
@@ -57,10 +58,10 @@ def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Pl
     return plan
 
 
-def fewer(
+def shortest_known(
     problem: Problem, steps: Sequence[RefinedStep], deadline: float | None = None
 ) -> list[tuple[str, tuple[str, ...]]]:
-    """Return fewer steps of the most abstract level in the place of some, not refined; none if none are found.
+    """Return as few steps of the most abstract level as are found in the place of some, not refined.
 
     Raises
     ------
@@ -68,12 +69,12 @@ def fewer(
         The deadline came before grounding was done.
     """
     level = problem.domain.levels[0]
+    known = [(step.behavior, step.arguments) for step in steps]
     task = small(problem, level, deadline) if all(step.level == level for step in steps) else None
-    operators = task.operators_of([(s.behavior, s.arguments) for s in steps]) if task is not None else None
+    operators = task.operators_of(known) if task is not None else None
     if task is None or operators is None:
-        return []
-    found = shorter(task, operators, WORK, deadline)
-    return [task.describe(operator)[:2] for operator in found] if len(found) < len(operators) else []
+        return known
+    return [task.describe(operator)[:2] for operator in shorter(task, operators, SHORTEN, deadline)]
 
 
 def small(problem: Problem, level: int, deadline: float | None) -> Task | None:

@@ -136,16 +136,19 @@ def _plan(
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> None:
     """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
-    concerned = concerns(call.refiner, call.steps) if len(call.program.levels) > 1 else []
+    if len(call.program.levels) == 1:
+        return
+    first, call.steps = call.steps, fewer(call)
+    concerned = concerns(call.refiner, call.steps)
     if not put_aside(concerned):
         return
     improver = Improver(call.refiner, call.using.shapes, improve)
-    first, call.steps = call.steps, reordered(call, advised)
+    before, call.steps = call.steps, reordered(call, advised)
     if not leave_levels:
         return
-    before = call.steps
+    again, before = call.steps is not before, call.steps
     improver.clusters_left = improve if before is first else (improve + 1) // 2
-    call.steps = improver.improve(before, concerned if before is first else ())
+    call.steps = improver.improve(before, () if again else concerned)
     if length(call.steps) < length(before) and any(left.broken for left in levels_left(call.problem, call.tree())):
         call.steps = before
 
@@ -164,49 +167,52 @@ def levelled(call: Call) -> Plan:
     return plan
 
 
+def unmet(call: Call) -> int:
+    """Return how many goals don't hold in the beginning."""
+    initial = call.problem.initial
+    return sum(not meets(initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items())
+
+
+def fewer(call: Call) -> list[RefinedStep]:
+    """Return a call's steps with fewer of the most abstract level, where that level is small and has more steps than goals."""
+    if len(call.steps) <= unmet(call):
+        return call.steps
+    from planner.hierarchical.flattened import shortest_known
+
+    found = shortest_known(call.problem, call.steps, call.segments.deadline)
+    if len(found) == len(call.steps):
+        return call.steps
+    other = Call(call.problem, call.using, call.segments.deadline, call.segments.most)
+    for step in found:
+        done = other.refiner.do(call.program.levels[0], *step)
+        if done is None:
+            return call.steps
+        other.steps.append(done)
+    return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
+
+
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
-    """Return the shortest of a call's steps, those with the goals reversed, those to all goals at once, and with windows anew.
+    """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
     tried uses the most abstract level alone.
     """
-    unmet = sum(
-        not meets(call.problem.initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items()
-    )
-    if len(call.steps) < DETOURS * unmet:
+    if len(call.steps) < DETOURS * unmet(call):
         return call.steps
-    first = call.program.levels[0]
-    reversed_goal = replace(call.problem, goal=dict(reversed(list(call.problem.goal.items()))))
     best = call.steps
-    left = max(call.segments.worked, MUCH)  # for all together
-
-    def at_once(recovery: Recovery) -> bool:
-        return recovery.together(first) and (
-            all(map(recovery.call.met, recovery.call.goal)) or recovery.finish()  # what the first level doesn't see
-        )
-
-    def in_series(recovery: Recovery) -> bool:
-        return recovery.call.serialise(recovery.harder)
-
-    def by_windows(recovery: Recovery) -> bool:
-        from planner.hierarchical.flattened import fewer
-
-        steps = [recovery.call.refiner.do(first, *step) for step in fewer(call.problem, best, call.segments.deadline)]
-        recovery.call.steps = [step for step in steps if step is not None]
-        return bool(steps) and None not in steps
-
-    ways = [
-        (reversed_goal, in_series),
-        *([] if call.at_once else [(call.problem, at_once)]),
-        (call.problem, by_windows),
-    ]
-    for problem, way in ways:
-        other = Call(problem, call.using, call.segments.deadline, call.segments.most)
+    first = call.program.levels[0]
+    reversed_goal = dict(reversed(list(call.problem.goal.items())))
+    left = max(call.segments.worked, MUCH)  # for both together
+    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
+        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
         other.segments.most_work = left
         advised(other)
+        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
-            done = way(Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True))
-            if done and all(map(other.met, other.goal)) and length(other.steps) < length(best):
+            done = recovery.together(first) if at_once else other.serialise(recovery.harder)
+            if at_once and done and not all(map(other.met, other.goal)):  # what the first level doesn't see
+                done = recovery.finish() and all(map(other.met, other.goal))
+            if done and length(other.steps) < length(best):
                 best = other.steps
         left = max(left - other.segments.worked, 0)
     return best
