@@ -88,8 +88,9 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
         if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again
     if best.plan is not None:
+        now = perf_counter()
         with suppress(LimitError):
-            flat = shortened(problem, best.plan, deadline)
+            flat = shortened(problem, best.plan, None if deadline is None else now + (deadline - now) / 4)
             best = replace(best, plan=min(best.plan, flat, key=lambda plan: cost_of(problem, plan)))
     return best
 
