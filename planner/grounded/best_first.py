@@ -60,10 +60,15 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Portfolio:
-    """The searches that share the time, and how many states are relaxed at once at most where arrays are less work."""
+    """How a task is searched.
+
+    The searches that share the time; how many states are relaxed at once at most, where arrays are less work; whether a plan that
+    was found is searched anew with less greed.
+    """
 
     turns: tuple[Turn, ...]
     widest: int
+    restarts: bool
 
 
 LEVEL = Portfolio(
@@ -75,6 +80,7 @@ LEVEL = Portfolio(
         Turn(1, by_novelty=True, by_landmarks=True),
     ),
     widest=32,
+    restarts=True,
 )
 """For a whole level: large tasks, which landmarks lead through."""
 WORLD = Portfolio(
@@ -86,6 +92,7 @@ WORLD = Portfolio(
         Turn(1),
     ),
     widest=1,
+    restarts=False,
 )
 """For a small world on the way to one goal: short plans, found before landmarks would pay."""
 
@@ -227,7 +234,8 @@ def search(
             if found:
                 found(plan)
             shortening = SHORTEN + total // SHORTENING
-            return Flat(Status.SOLVED, tuple(shorter(task, plan, shortening, deadline)), None, counts, total)
+            best = shorter(task, plan, shortening, deadline, portfolio.restarts)
+            return Flat(Status.SOLVED, tuple(best), None, counts, total)
         if total >= most_work:
             return Flat(Status.GAVE_UP, (), Reason("the limit of work came first"), counts, total)
         if counts.expanded >= limits.expansions:

@@ -40,7 +40,9 @@ TRIALS = 2_000_000  # of a step that might be left out, in all
 LOOK = 50  # operators ranked for what one evaluated costs
 
 
-def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
+def shorter(
+    task: Task, plan: Sequence[int], work: int, deadline: float | None = None, restarts: bool = True
+) -> list[int]:
     """Return a plan that costs no more than a given one: a cheapest one where few states tell, else by replacing windows of it.
 
     Parameters
@@ -52,6 +54,8 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         Operators that may be looked at, half a million to a million per second.
     deadline : float, optional
         On the clock of `time.perf_counter`.
+    restarts : bool
+        Whether the whole is searched anew for what work windows leave.
     """
     best = shortened(task, plan, deadline)
     if task.prices and task.cost_of(best) > task.cost_of(plan):
@@ -70,7 +74,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
             best = windows.pass_over(regrouped(task, best), size)
         best = shortened(task, best, deadline)
         if len(best) == before or windows.over:
-            best = windows.restarted(best)
+            best = windows.restarted(best) if restarts else best
             return best if task.cost_of(best) <= task.cost_of(plan) else list(plan)  # fewer steps may cost more
 
 
