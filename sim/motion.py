@@ -199,17 +199,19 @@ def connect(
     attempts : int
         Bound on the number of samples.
     """
-    for i, goal in enumerate(goals):
+    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # a search would end at the others as well
+    for i in within:
+        goal = goals[i]
         if reacher.follow(line(start, goal)) is not None:
             return i, np.stack([start, goal])
         for middle in reacher.detours(start, goal):
             corners = np.stack([start, *middle, goal])
             if reacher.follow(polyline(corners)) is not None:
                 return i, corners
-    found = _rrt_connect(reacher, start, goals, rng, attempts)
+    found = _rrt_connect(reacher, start, [goals[i] for i in within], rng, attempts) if within else None
     if found is None:
         return None
-    reached = next(i for i, goal in enumerate(goals) if np.array_equal(goal, found[-1]))
+    reached = next(i for i in within if np.array_equal(goals[i], found[-1]))
     return reached, _shortcut(reacher, found, rng)
 
 

@@ -123,3 +123,12 @@ def test_postures_that_touch_nothing_are_those_whose_distances_say_so(serving: C
         found = free(here.mover.at(q), here.mover.spheres.radii, around, margin)
         np.testing.assert_array_equal(found, gaps > margin)
         assert 0 < found.sum() < len(q)
+
+
+def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
+    """A search that grew from it would end there, and the hand could plan no further motion from where it is."""
+    blocked = reacher(serving.embodiment, pillar())
+    bent = START.copy()
+    bent[:3] = (0.25, 0.22, 0.85)  # so near to the shoulder that the elbow would fold beyond its limit
+    assert not blocked.solve(bent[None])[1].any()
+    assert connect(blocked, START, [bent], np.random.default_rng(0), attempts=300) is None
