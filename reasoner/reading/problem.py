@@ -793,6 +793,8 @@ class _Schema:
         if _is(node, "AnyOf"):
             groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
             return AnyOf(tuple(groups), negated)
+        if _is(node, "AllOf"):
+            return AnyOf((self.conditions(iri, "condition"),), negated)
         if _is(node, "Comparison"):
             sign = self.word(iri, "sign", tuple(COMPARING))
             return Comparison(self.left(iri), sign, self.right(iri), negated)
@@ -844,12 +846,14 @@ class _Schema:
         return found
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
-        return tuple(self.condition(value) for value in self.values(iri, name))
+        return tuple(condition for value in self.values(iri, name) for condition in self.group(value))
 
     def group(self, iri: str) -> tuple[Condition, ...]:
-        if iri in self.nodes and _is(self.nodes[iri], "AllOf"):
-            return self.conditions(iri, "condition")
-        return (self.condition(iri),)
+        """Return a condition, or those that all have to hold where it says so."""
+        found = self.condition(iri)
+        if isinstance(found, AnyOf) and len(found.alternatives) == 1 and not found.negated:
+            return found.alternatives[0]
+        return (found,)
 
     def effect(self, iri: str) -> Effect:
         """Return an effect; with a class in the place of an individual it is made for each of the class for which `when` holds."""
@@ -1294,6 +1298,10 @@ def _with_goal(problem: Problem, known: Frame) -> Problem:
             symbol = Symbol(wanted.situation, wanted.arguments)
             _check_arguments(symbol, problem.domain, "a goal")
             value = _wanted_value(iri, wanted, known)
+            kind = problem.domain.situations[symbol.situation]
+            members = (known.classes.get(of, ()) for of in kind.arguments)
+            if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
+                continue  # what can't be so of these isn't
             if goal.setdefault(symbol, value) != value:
                 raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:

@@ -8,6 +8,7 @@ from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.reading.problem import Reading, parse_fact, read, with_goals
 from reasoner.symbols import Symbol, Witness
 
+SCENES = Path(__file__).resolve().parents[2] / "ontology" / "scenes"
 SCENE = """
 @prefix : <https://example.org/mine#> . @prefix k: <https://w3id.org/confab/tabletop#> .
 @prefix c: <https://w3id.org/confab/core#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -80,3 +81,30 @@ def test_a_situated_object_needs_exactly_one_value(tmp_path: Path, stated: str, 
     path.write_text(SCENE.format(stated))
     with pytest.raises(KnowledgeError, match=message):
         read(load(path))
+
+
+def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(tmp_path: Path) -> None:
+    """A towel that can't be clean isn't: with that goal as without it."""
+    scene = (SCENES / "drawers-small.ttl").read_text()
+    goal = ":keepsakes.never a owl:NamedIndividual, c:ValueCondition ; c:about :album ; c:situationType d:OPENED ; c:negated true ."
+    path = tmp_path / "mine.ttl"
+    path.write_text(scene.replace(":keepsakes.letter .", ":keepsakes.letter, :keepsakes.never .", 1) + goal)
+    assert read(load(path)).problem.goal == read(load("drawers-small")).problem.goal
+
+
+def test_several_conditions_may_stand_together_wherever_one_stands(tmp_path: Path) -> None:
+    domain = (SCENES.parent / "domains" / "drawers.ttl").read_text()
+    together = "c:precondition :L2_TAKE.all ;"
+    found = domain.replace("c:precondition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ;", together)
+    assert found != domain
+    all_ = ":L2_TAKE.all a owl:NamedIndividual, c:AllOf ; c:condition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ."
+    path = tmp_path / "drawers.ttl"
+    path.write_text(found + all_)
+    mine = tmp_path / "mine.ttl"
+    mine.write_text((SCENES / "drawers-small.ttl").read_text())
+    (tmp_path / "catalog-v001.xml").write_text(
+        '<?xml version="1.0"?><catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">'
+        '<uri name="https://w3id.org/confab/drawers" uri="drawers.ttl"/></catalog>'
+    )
+    said = read(load(mine)).problem.domain.behaviors["L2_TAKE"]
+    assert said == read(load("drawers-small")).problem.domain.behaviors["L2_TAKE"]
