@@ -4,7 +4,8 @@
     CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
     CONFAB_ALL=1 …                                   every problem, not only four per folder
-    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``)
+    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``; ``enhsp``, which
+                                                     takes numbers, where the peers' Python has up-enhsp)
 
 Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and problems, beside the domain or in
 a folder ``testing…`` below it. Where the peers can't be had, ours run alone. What a run
@@ -116,6 +117,10 @@ def planners(python: str | None) -> dict[str, list[str]]:
     inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
     place = subprocess.run([python, "-c", inside], capture_output=True, text=True, check=True).stdout.strip()
     downward = [python, f"{place}/downward/fast-downward.py"]
+    jar = Path(place).parent / "up_enhsp" / "ENHSP" / "enhsp.jar"  # where somebody installed up-enhsp
+    java = ["java", "-Xmx2g", "-XX:CompressedClassSpaceSize=64m", "-XX:ReservedCodeCacheSize=64m", "-jar", str(jar)]
+    if jar.exists():
+        confab["enhsp"] = [*java, "-o", "{domain}", "-f", "{problem}", "-sp", "{plan}"]
     return {
         **confab,
         "pyperplan": [python, "-m", "pyperplan", "-s", "gbf", "-H", "hff", "{domain}", "{problem}"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -121,7 +121,7 @@ def card(scene: Known, name: str) -> Figure:
 
 
 def class_tree(scene: Known) -> Figure:
-    """Return the classes of objects from the left to the right, each with the situation types that it brings."""
+    """Return the classes of objects from the left to the right, each with what it brings, what follows last."""
     from matplotlib.figure import Figure
 
     below: dict[str, list[str]] = {}
@@ -132,6 +132,9 @@ def class_tree(scene: Known) -> Figure:
     situations: dict[str, list[str]] = {}
     for row in scene.knowledge.select(SITUATIONS):
         situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
+    defined: set[str] = set()
+    with suppress(KnowledgeError):  # what can't be planned in can still be drawn
+        defined |= {local_name(scene.names.iri(name)) for name in scene.reading.problem.domain.rules}
     root = next((iri for iri in below if local_name(iri) == "Object"), None)
     if root is None:
         raise KnowledgeError(f"{scene.iri} has no classes of objects to draw")
@@ -159,7 +162,9 @@ def class_tree(scene: Known) -> Figure:
             to = ((spots[child][0] + 0.5) / (deep + 1), spots[child][1])
             axes.plot([x, to[0]], [y, to[1]], color="0.7", linewidth=1, zorder=0)
         own = situations.get(iri, [])
-        words = local_name(iri) + (f"\n{', '.join(own)}" if own else "")
+        changed, follows = ([one for one in own if (one in defined) is which] for which in (False, True))
+        words = "\n".join([local_name(iri), *([", ".join(changed)] * bool(changed))])
+        words += f"\nfollows: {', '.join(follows)}" if follows else ""
         _box(axes, x, y, fill_lines(words), BLUE if own else GREY, 8)
     axes.set_ylim(rows - 0.5, -0.5)
     return figure

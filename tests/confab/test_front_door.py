@@ -8,6 +8,7 @@ import pytest
 import rdflib
 
 import confab
+from confab.picturing import class_tree
 from reasoner.generate import write_scene
 
 TABLETOP = rdflib.Namespace("https://w3id.org/confab/tabletop#")
@@ -168,3 +169,8 @@ def test_names_of_neighbours_do_not_meet_on_a_map(scene: confab.Scene) -> None:
         for i, (x, y, wide, said) in enumerate(boxes):
             for x2, y2, wide2, said2 in boxes[:i]:
                 assert abs(y - y2) >= 9 or abs(x - x2) >= (wide + wide2) / 2, (name, said, said2)
+
+
+def test_a_picture_of_classes_tells_what_follows() -> None:
+    words = [text.get_text() for text in class_tree(confab.load("packing-small")).axes[0].texts]
+    assert "Thing\nLIES_IN\nfollows: INSIDE, OUT_OF_REACH,\nSTORED_AWAY" in words
