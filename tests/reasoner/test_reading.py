@@ -97,7 +97,9 @@ def test_several_conditions_may_stand_together_wherever_one_stands(tmp_path: Pat
     together = "c:precondition :L2_TAKE.all ;"
     found = domain.replace("c:precondition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ;", together)
     assert found != domain
-    all_ = ":L2_TAKE.all a owl:NamedIndividual, c:AllOf ; c:condition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ."
+    all_ = (
+        ":L2_TAKE.all a owl:NamedIndividual, c:AllOf ; c:condition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ."
+    )
     path = tmp_path / "drawers.ttl"
     path.write_text(found + all_)
     mine = tmp_path / "mine.ttl"
