@@ -103,7 +103,11 @@ def report_html(
         parts += [tag("h2", "Who did what when, and what that changed"), timeline(course, labels, speed)]
         parts += [tag("h2", "The plan, and why"), _plan(course, labels, report, execution)]
     parts += [_wanted(course, problem, labels), _learned(learned)]
-    parts += [tag("h2", "Again"), tag("pre", again or _again(scene, report, execution)), *_small_print(outcome)]
+    parts += [
+        tag("h2", "Again"),
+        tag("pre", again or _again(scene, report, execution, course is not None and course.unit == "s")),
+        *_small_print(outcome),
+    ]
     return Template(asset("page.html")).substitute(
         title=joined(title), style=asset("style.css"), body=joined(parts), script=asset("script.js")
     )
@@ -306,12 +310,12 @@ def _learned(memory: Memory | None) -> Markup | None:
     return joined(tag("h2", "What was learned"), tag("p", memory.said()), *rules)
 
 
-def _again(scene: Known, report: Report | None, execution: Executed | None) -> str:
+def _again(scene: Known, report: Report | None, execution: Executed | None, physical: bool) -> str:
     path = scene.knowledge.path
     name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
     if execution is not None:
         people = "".join(f" --intervene '{i.text}'" for i, _ in execution.episode.interventions)
-        return f"confab execute {name}{people}"
+        return f"confab execute {name}{' --world pybullet' if physical else ''}{people}"
     seed = f" --seed {report.rollouts[0].seed}" if report is not None and report.rollouts[0].seed else ""
     return f"confab run {name}{seed}" if report is not None else f"confab run {name}"
 
