@@ -59,7 +59,7 @@ CASES = {
     "lid onto pot": Case("two arms", "kitchen-corner", goals=("lid LOCATION pot_top",)),
     "pick and place": Case("two arms", "beverage-serving", goals=("cup2 LOCATION location5",)),
     "move and pour": Case("two arms", "beverage-serving-moved", beads=True),
-    "kitchen corner": Case("two arms", "kitchen-corner"),
+    "kitchen corner": Case("two arms", "spice-drawer"),
     "laboratory": Case("two arms", "centrifuge"),
     "serving": Case("Panda", "panda-serving", beads=True),
     "driving and serving": Case("two arms that drive", "two-tables", beads=True),
