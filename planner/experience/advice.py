@@ -1,9 +1,10 @@
 """Planning with experience, which may lead but not spoil.
 
 =========  ====================================================================================================
-guarded    rules lead from the beginning on, for those kinds of goals on which they have helped as often as not
+guarded    rules lead from the beginning on, for those kinds of goals that they have reached, and as often as not; where that
+           is none, they are tried beside the search, with a fifth of its expansions
 leading    rules lead whatever their record is
-strict     rules lead only while what they may waste is a twentieth of the effort so far
+strict     rules are tried beside the search, with a twentieth of its expansions (`planner.experience.racing`)
 =========  ====================================================================================================
 
 Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`);
@@ -21,6 +22,7 @@ from planner.experience.chaining import Candidate
 from planner.experience.evidence import Judge, View
 from planner.experience.leading import Guide, rules_in, usable
 from planner.experience.matching import Bind
+from planner.experience.racing import raced
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
@@ -28,6 +30,9 @@ from planner.plan import Limits, Outcome
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
+
+STRICT, GUARDED = 20, 5
+"""One of so many expansions rules may have beside the search: in strict mode, and where they have reached nothing yet."""
 
 
 @dataclass
@@ -69,10 +74,26 @@ class Memory:
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
         return any(rule.goal.situation in open_ and rule.does[0] in problem.domain.behaviors for rule in self.rules)
 
+    def record(self, rule: Rule) -> Tally:
+        """Return how often rules for such goals of a task reached them, and how often not."""
+        return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
+
     def helps(self, rule: Rule) -> bool:
-        """Whether rules for such goals of a task reached them as often as not; while nothing was tried, one is hopeful."""
-        record = self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
-        return record.chosen + 1 >= record.failed
+        """Whether rules for such goals have reached some, and as often as not."""
+        return self.record(rule).chosen >= max(1, self.record(rule).failed)
+
+    def harms(self, rule: Rule) -> bool:
+        """Whether they have failed more often than not."""
+        return self.record(rule).chosen < self.record(rule).failed
+
+    def share(self, problem: Problem, mode: str) -> int | None:
+        """Return one of how many expansions rules may have beside the search; None where they lead."""
+        if mode == "strict" or not self.trusted:
+            return STRICT
+        open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
+        if mode == "guarded" and not any(rule.goal.situation in open_ and self.helps(rule) for rule in self.rules):
+            return GUARDED
+        return None
 
     def guide(self, call: Call, mode: str, joins: dict[str, Bind | None] | None = None) -> Guide:
         """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
@@ -82,8 +103,8 @@ class Memory:
             return self.judge.told(view, c.rule, c.roles)
 
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
-        rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or self.helps(rule)]
-        return Guide(call, rules, self.orders, score, joins, strict=mode == "strict")
+        rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or not self.harms(rule)]
+        return Guide(call, rules, self.orders, score, joins)
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""
@@ -145,10 +166,18 @@ def plan(
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
     joins: dict[str, Bind | None] = {}
 
-    def advised(call: Call) -> None:
-        call.advise(memory.guide(call, mode if memory.trusted else "strict", joins))
+    share = memory.share(problem, mode)
+    if share is not None:
 
-    warm = memory.warmed(using) if memory.trusted else using
+        def guide(call: Call) -> Guide:
+            return memory.guide(call, "leading", joins)
+
+        return raced(problem, guide, share, limits, using, improve, leave_levels)
+
+    def advised(call: Call) -> None:
+        call.advise(memory.guide(call, mode, joins))
+
+    warm = memory.warmed(using)
     return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)
 
 

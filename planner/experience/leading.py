@@ -34,8 +34,6 @@ CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
 WASTE = 10
 """Of so many expansions one may have been for steps of rules that were undone."""
-SHARE, LONG = 20, 12
-"""In strict mode: one of so many, with promises of so many steps counted as wasted before they are tried."""
 PATIENCE = 30
 """So many steps are done for one thing that is wanted."""
 VAIN = 2
@@ -65,9 +63,8 @@ class Guide:
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
-        strict: bool = False,
     ) -> None:
-        self.call, self.score, self.strict = call, score, strict
+        self.call, self.score = call, score
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.names: set[str] = set()
@@ -84,7 +81,7 @@ class Guide:
         self.chains = Chains(call, self.by_goal, {} if joins is None else joins, self.least, self.sooner)
         self.add(rules)
         first = call.program.levels[0]
-        self.expects = not strict and all((first, situation) in self.by_goal for situation, _ in self.open())
+        self.expects = all((first, situation) in self.by_goal for situation, _ in self.open())
 
     def add(self, rules: Iterable[Rule]) -> None:
         """Follow more rules."""
@@ -119,7 +116,7 @@ class Guide:
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal comes first."""
-        return not self.strict and any(not self.call.met(other) for other in self.before.get(cell, ()))
+        return any(not self.call.met(other) for other in self.before.get(cell, ()))
 
     def candidates(self, cells: Mapping[Cell, str]) -> list[Candidate]:
         """Return the ways to follow a rule of the most abstract level for some values that lack nothing and promise most."""
@@ -128,9 +125,7 @@ class Guide:
         return [way for way in found if way.rule.steps == least]
 
     def ready(self) -> bool:
-        """Whether no more than a share of the effort was wasted so far; if strict, would be after one promise more."""
-        if self.strict:
-            return (self.wasted + LONG) * SHARE <= self.call.segments.expanded
+        """Whether no more than a share of the effort was wasted so far."""
         return self.wasted * WASTE <= self.call.segments.expanded
 
     def rank(self, cell: Cell) -> int:

@@ -55,7 +55,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
             lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
-    experience.learn(lesson)
+    experience.learn(shown(experience, lesson, problem, using))
     return plan
 
 
@@ -100,6 +100,7 @@ def live(
     lesson = tried(experience, problem, using) if failed is None and plan.steps else Lesson()
     if plan.steps:
         lesson += learned(experience, problem, plan, using, failed)
+        lesson = shown(experience, lesson, problem, using) if failed is None else lesson
     for there, step in vain:
         lesson += in_vain(experience, there, step, using)
     experience.learn(lesson)
@@ -110,11 +111,17 @@ def grounds(steps: Sequence[Step]) -> list[tuple[str, tuple[str, ...]]]:
     return [(step.behavior, step.arguments) for step in steps]
 
 
-def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
-    """Return how good what is known proves on a problem: which of its goals it reaches by itself."""
-    rules = rules_in(experience)
+def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
+    """Return a lesson with what its own rules show on it, where there were none before: that is all that they have shown."""
+    if not rules_in(experience):
+        lesson += tried(experience, problem, using, [one for one in lesson.said if isinstance(one, Rule)])
+    return lesson
+
+
+def tried(experience: Experience, problem: Problem, using: Compiled, new: Sequence[Rule] = ()) -> Lesson:
+    """Return how good what is known, and what is new, proves on a problem: which of its goals it reaches by itself."""
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Guide(call, rules, usable(experience))
+    guide = Guide(call, [*rules_in(experience), *new], usable(experience))
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)

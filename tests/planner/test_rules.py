@@ -1,5 +1,6 @@
 """Experience becomes rules: they lead in larger worlds and never spoil; what was never seen is treated as its like."""
 
+import random
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,6 +113,35 @@ def test_in_strict_mode_expansions_never_exceed_the_memoryless_ones_by_more_than
     alone, with_memory = fast.plan(within), plan(within, memory, "strict")
     assert with_memory.status is alone.status
     assert expanded(with_memory) <= 1.05 * expanded(alone)
+
+
+def spoiled(memory: Memory, seed: int) -> Memory:
+    """Return a memory whose rules were changed at random, of which nothing is known."""
+    dice, experience = random.Random(seed), Experience("spoiled")
+    rules = rules_in(memory.experience)
+    for rule in rules:
+        name, given = rule.does
+        arguments = tuple(dice.sample(given, len(given)))
+        asks = tuple(c for c in rule.asks if dice.random() < 0.7)
+        experience.learn(
+            Lesson(said=[replace(rule, does=(name, arguments), asks=asks, steps=dice.choice(rules).steps)])
+        )
+    return Memory(experience)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("mode", "share"), [("strict", 20), ("guarded", 5)])
+def test_rules_that_have_shown_nothing_have_their_share_of_the_expansions_of_each_kind_and_no_more(
+    seed: int, mode: str, share: int
+) -> None:
+    family = random.Random(seed).choice(FAMILIES)
+    within = problem(family, 10, seed)
+    alone, beside = fast.plan(within, improve=0), plan(within, spoiled(taught(), seed), mode, improve=0)
+    every = [sum(counts.expanded for counts in outcome.search.values()) for outcome in (alone, beside)]
+    assert beside.plan is not None
+    assert validate(within, beside.plan) == []
+    assert share * every[1] <= (share + 1) * every[0]
+    assert share * expanded(beside) <= (share + 1) * expanded(alone)
 
 
 def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
