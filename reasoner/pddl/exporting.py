@@ -133,7 +133,7 @@ class _Export:
         here = [s for s in problem.domain.situations.values() if s.level <= level]
         self.situations = {s.name: s for s in here if s.quantity is None}
         self.quantities = {s.name for s in here if s.quantity is not None}
-        self.functions: dict[str, int] = {}  # and how many arguments each has
+        self.functions: dict[str, tuple[str, ...]] = {}  # and the types of their arguments
         self.measured: dict[str, str] = {}  # relations that give a number, and their functions
         self.behaviors = problem.domain.at_level(level)
         self.sets = {kind: frozenset(members) for kind, members in problem.classes.items()}
@@ -292,7 +292,11 @@ class _Export:
         """Return the function that is an amount, or what a relation gives."""
         name = self.name("function", f"{kind} {ours}", ours)
         words = [self.term(t) for t in arguments if t not in self.world]
-        self.functions[name] = len(words)
+        kinds = self.problem.domain.situations[ours].arguments if kind == "situation" else ("",) * len(arguments)
+        types = (
+            self.type_of.get(one, "object") for one, t in zip(kinds, arguments, strict=True) if t not in self.world
+        )
+        self.functions[name] = tuple(types)
         if kind == "relation":
             self.measured[ours] = name
         return f"({' '.join([name, *words])})"
@@ -683,7 +687,10 @@ class _Export:
         types = "\n    ".join(f"{kind} - {above}" for kind, above in self.above.items())
         constants = [o for o in self.individuals() if self.name("object", o) in self.mentioned(body)]
         said = f"  (:constants\n    {self.objects_text(constants)})\n" if constants else ""
-        declared = [f"({name}{''.join(f' ?x{i}' for i in range(n))})" for name, n in sorted(self.functions.items())]
+        declared = [
+            f"({name}{''.join(f' ?x{i} - {kind}' for i, kind in enumerate(kinds))})"
+            for name, kinds in sorted(self.functions.items())
+        ]
         declared += ["(total-cost)"] * self.costs
         functions = f"  (:functions {' '.join(declared)} - number)\n" if declared else ""
         return (

@@ -12,6 +12,12 @@ from planner.plan import Limits, Status
 from planner.plan_costs import cost_of
 from planner.solve import Request, solve
 from planner.validation import validate
+from reasoner.graph.knowledge import load
+from reasoner.pddl.exporting import to_pddl
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
+from reasoner.pddl.turtle import turtle
+from reasoner.reading.problem import read
 from reasoner.symbols import Problem
 from worlds.numbers import jugs, rounds
 
@@ -78,3 +84,14 @@ def test_a_cost_beside_a_price_is_refused(tmp_path: Path) -> None:
     path.write_text(DELIVERY.replace("c:price :DRIVE.fare", "c:price :DRIVE.fare ; c:cost 1.0"))
     with pytest.raises(confab.KnowledgeError, match="DRIVE> has a :cost and a :price; keep one of them"):
         confab.load(path).plan()
+
+
+def test_a_price_of_what_changes_survives_pddl_and_the_file_made_of_it(tmp_path: Path) -> None:
+    """Functions are typed: else each place would have to have a load."""
+    path = tmp_path / "van.ttl"
+    path.write_text(DELIVERY)
+    exported = to_pddl(read(load(path)).problem)
+    again = tmp_path / "again.ttl"
+    found = imported(parse(exported.domain, exported.problem))
+    again.write_text(turtle(found.problem, "van", "a van", found.said))
+    assert confab.load(again).plan(optimal=True).outcome.cost == 8.0
