@@ -46,6 +46,8 @@ def write_whole(
     target = _behind(path)
     part = target.parent / f".confab-{uuid4().hex}.part"
     try:
+        if target.is_symlink():
+            raise OSError(errno.ELOOP, "is a link that leads back to itself; give the name of a file")
         old = target.stat() if target.exists() else None
         if old is not None and not stat.S_ISREG(old.st_mode):
             what = "a folder" if stat.S_ISDIR(old.st_mode) else "no ordinary file"

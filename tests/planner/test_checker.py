@@ -1,12 +1,17 @@
 """What the checker reads conditions and states as, kind by kind: it is asked by hand, on worlds small enough to see the answer."""
 
+from dataclasses import replace
+from fractions import Fraction
+
 import pytest
 
 from planner.plan import Plan, Step
 from planner.validation import Facts, Rules, stretches, successor, validate
+from reasoner.amounts import Amount, Quantity
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     ClassCondition,
     Condition,
@@ -33,7 +38,7 @@ def shelves(*conditions: Condition, variables: str = "", terms: str = "?c:Cup") 
         {"Cup": ("cup1", "cup2", "cup3"), "Place": ("high", "low", "floor"), "Bowl": ("cup3",)},
         {"AT cup1": "high", "AT cup2": "low", "AT cup3": "low", "FULL cup2": TRUE, "NEAR cup1 low": TRUE},
         {},
-        {"above": [("high", "low"), ("low", "floor")], "self": [("low", "low")]},
+        {"above": [("high", "low"), ("low", "floor")], "self": [("low", "low")], "likes": [("cup1", "low")]},
     )  # fmt: skip
 
 
@@ -101,6 +106,12 @@ P, Q = "?p:Place", "?p:Place ?q:Place"
         ([AnyOf(())], "", ""),
         ([AnyOf((), True)], "", "123"),
         ([AnyOf(((),))], "", "123"),
+        ([lacks("AT", "?d", "low"), EqualityCondition("?d", "?c")], "?d:Cup", "1"),
+        ([has("FULL", "?d", FALSE), EqualityCondition("?d", "?c")], "?d:Cup", "13"),
+        ([has("AT", "?d", "low"), EqualityCondition("?d", "?c")], "?d:Cup", "23"),
+        ([RelationCondition("likes", ("?d", "?p")), has("AT", "?c", "?p")], "?d:Cup ?p:Place", "23"),
+        ([RelationCondition("likes", ("?d", "?p"))], "?d:Cup ?p:Place", "123"),
+        ([RelationCondition("likes", ("?d", "?p"))], "?d:Place ?p:Cup", ""),
         # What is chosen inside of a condition is forgotten outside of it.
         ([AnyOf(((has("AT", "?c", "?p"),),)), has("AT", "cup1", "?p")], P, "1"),
     ],
@@ -203,3 +214,35 @@ def test_a_plan_is_told_each_thing_that_is_wrong_with_it() -> None:
             "no such behaviour, or its parameters don't take these arguments"
             in validate(problem, Plan((wrong,)))[0].text
         )
+
+
+def test_after_a_step_that_cannot_be_done_nothing_more_is_said() -> None:
+    problem = replace(shelves(has("FULL", "?c", FALSE)), goal={Symbol("AT", ("cup1",)): "floor"})
+    for wrong in (step(1, "DONE"), step(1, "DO", "cup2", id=1)):
+        assert len(validate(problem, Plan((wrong, wrong)))) == 1
+    (fault,) = validate(problem, Plan((step(1),)))
+    assert fault.text == "the goal <cup1, AT> = floor isn't reached: it is high in the end"
+
+
+def test_amounts_change_beside_values_and_a_price_is_worked_out() -> None:
+    fill = SituationType("FILL", ("Cup",), "FILL", quantity=Quantity("", least=Fraction(0)))
+    pour = replace(
+        behavior("POUR", 1, "?c:Cup", [has("AT", "?c", "low")], [becomes("FULL", "?c", FALSE)]),
+        amounts=(AmountEffect("FILL", ("?c",), "decrease", Fraction(2)),),
+        price=Amount("FILL", ("?c",)),
+    )
+    old = shelves()
+    situations = {**old.domain.situations, "FILL": fill}
+    problem = replace(
+        old,
+        domain=replace(old.domain, situations=situations, behaviors={"POUR": pour}),
+        initial={**old.initial, Symbol("FILL", ("cup2",)): "3", Symbol("FILL", ("cup3",)): "1"},
+    )
+    state = successor(problem, pour, ("cup2",), problem.initial)
+    assert state is not None
+    assert (state[Symbol("FILL", ("cup2",))], state[Symbol("FULL", ("cup2",))]) == ("1", FALSE)
+    assert successor(problem, pour, ("cup3",), problem.initial) is None  # that would be less than nothing
+    rules, facts = Rules(problem), Facts(problem, problem.initial)
+    assert rules.price(pour, ("cup2",), facts) == 3
+    assert rules.price(pour, ("cup1",), facts) is None
+    assert rules.price(replace(pour, name="FREE", price=None), ("cup2",), facts) is None

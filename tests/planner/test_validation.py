@@ -50,6 +50,11 @@ def test_a_refinement_that_leaves_the_object_in_the_hand_is_found(serving: Probl
     assert "its refinement leaves <cup1, LOCATION> = in_hand" in faults(serving, (unfinished, *steps[1:]))
 
 
+def test_after_a_refinement_that_cannot_be_done_nothing_more_is_said(serving: Problem, steps: tuple[Step, ...]) -> None:
+    turned = replace(steps[0], steps=steps[0].steps[::-1])
+    assert faults(serving, (turned, *steps[1:])).count("\n") == 0
+
+
 def test_an_argument_of_another_class_is_found(serving: Problem, steps: tuple[Step, ...]) -> None:
     odd = replace(steps[0], arguments=("cup1", "cup2"))
     assert "don't take these arguments" in faults(serving, (odd, *steps[1:]))

@@ -1,0 +1,135 @@
+"""Files are written whole or not at all, in turns, whoever they belong to and however they are reached."""
+
+import os
+import stat
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from reasoner import files
+from reasoner.files import alone, as_iri_part, write_whole
+from reasoner.limits import LimitError
+
+
+def left(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_texts_bytes_and_pieces_are_written_as_they_are(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "folder" / "a.txt"
+    for content, wanted in (("häß", "häß".encode()), (b"\xff\x00", b"\xff\x00"), (iter(["a", "b"]), b"ab"), ("", b"")):
+        write_whole(file, content)
+        assert file.read_bytes() == wanted
+    assert left(file.parent) == ["a.txt"]
+
+
+def test_what_fails_while_it_is_made_or_read_back_replaces_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_text("old")
+
+    def broken() -> Iterator[str]:
+        yield "half"
+        raise ValueError("no more")
+
+    def refuse(part: Path) -> None:
+        assert part.read_text() == "new"
+        assert part.parent == tmp_path
+        raise ValueError("can't be read")
+
+    with pytest.raises(ValueError, match="no more"):
+        write_whole(file, broken())
+    with pytest.raises(ValueError, match="can't be read"):
+        write_whole(file, "new", refuse)
+    assert file.read_text() == "old"
+    assert left(tmp_path) == ["a.txt"]
+    seen: list[str] = []
+    write_whole(file, "new", lambda part: seen.append(file.read_text()))
+    assert (seen, file.read_text()) == (["old"], "new")
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664])
+def test_permissions_stay_and_new_files_have_those_of_the_umask(tmp_path: Path, mode: int) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.touch()
+    old.chmod(mode)
+    before = os.umask(0o027)
+    try:
+        write_whole(old, "x")
+        write_whole(new, "x")
+    finally:
+        os.umask(before)
+    assert [stat.S_IMODE(file.stat().st_mode) for file in (old, new)] == [mode, 0o640]
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can give a file away")
+def test_a_file_of_somebody_else_stays_theirs(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_text("old")
+    os.chown(file, 1234, 2345)
+    write_whole(file, "new")
+    assert (file.stat().st_uid, file.stat().st_gid) == (1234, 2345)
+
+
+def test_links_are_followed_also_in_circles_and_to_what_isnt_there_yet(tmp_path: Path) -> None:
+    (tmp_path / "one").symlink_to("two")
+    (tmp_path / "two").symlink_to("three")
+    write_whole(tmp_path / "one", "x")
+    assert (tmp_path / "three").read_text() == "x"
+    assert (tmp_path / "one").is_symlink() and (tmp_path / "two").is_symlink()
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(OSError, match="leads back to itself"):
+        write_whole(tmp_path / "a", "x")
+
+
+def test_what_is_no_ordinary_file_or_read_only_is_left_and_named(tmp_path: Path) -> None:
+    folder, pipe, locked = tmp_path / "folder", tmp_path / "pipe", tmp_path / "locked"
+    folder.mkdir()
+    os.mkfifo(pipe)
+    locked.write_text("old")
+    locked.chmod(0o444)
+    for path, said in ((folder, "is a folder"), (pipe, "is no ordinary file"), (locked, "is read-only")):
+        with pytest.raises(OSError, match=said) as error:
+            write_whole(path, "new")
+        assert error.value.filename == str(path)
+    assert locked.read_text() == "old"
+    assert left(tmp_path) == ["folder", "locked", "pipe"]
+    with pytest.raises(OSError, match="can't be written") as error:
+        write_whole(locked / "inside", "new")
+    assert error.value.filename == str(locked / "inside")
+
+
+def test_one_writes_after_the_other_and_who_waits_says_so_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "link").symlink_to("a.txt")
+    order: list[str] = []
+
+    def second() -> None:
+        with alone(tmp_path / "link"):
+            order.append("second")
+
+    waiting = threading.Thread(target=second)
+    with alone(tmp_path / "a.txt"):
+        waiting.start()
+        waiting.join(0.2)
+        order.append("first")
+    waiting.join()
+    assert order == ["first", "second"]
+    assert caplog.text.count("waiting for another process that writes in") == 1
+    with alone(tmp_path / "b" / "c.txt"):  # nobody waits for what lies elsewhere
+        assert (tmp_path / "b").is_dir()
+
+
+def test_nobody_waits_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "PATIENCE", 0.05)
+    with alone(tmp_path / "a.txt"), pytest.raises(LimitError, match="has been writing in"), alone(tmp_path / "b.txt"):
+        pass
+    with alone(tmp_path / "a.txt"):
+        pass
+
+
+def test_a_name_becomes_part_of_an_iri() -> None:
+    assert as_iri_part("my table/ä%") == "my%20table%2Fä%25"
