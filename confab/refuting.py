@@ -5,15 +5,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import ontology
 from confab.known import Known, S
-from confab.physics import Report
 from planner.acting.failure_memory import chain_to, refuted_by
 from reasoner.embodiment.reach import add_to_reach
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.reading.restating import refuted, with_refuted
 from reasoner.refutations import Refutation
+
+if TYPE_CHECKING:
+    from confab.physics import Report
 
 log = logging.getLogger(__name__)
 

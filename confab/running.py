@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from confab.memory import Memory, undisturbed
-from confab.physics import Report
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, with_reach
@@ -20,6 +20,9 @@ from reasoner.files import write_whole
 from reasoner.reading.observed import assert_observed, save_observed
 from reasoner.validation.findings import listing
 from reasoner.validation.validate import validate
+
+if TYPE_CHECKING:
+    from confab.physics import Report
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8

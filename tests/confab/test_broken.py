@@ -679,6 +679,7 @@ for line in sys.stdin:
         print(end.code, " ".join(err.getvalue().split()))
 """
     works = [f"plan {scene}", f"execute {scene}", f"validate {scene}", f"picture {scene} --classes -o {tmp_path}/a.svg"]
+    works.append(f"run towers-small -o {tmp_path}/out")
     needs = [
         f"run {scene} --no-video",
         f"verify {scene} {plan}",
@@ -689,8 +690,8 @@ for line in sys.stdin:
         [sys.executable, "-c", code], input="\n".join(works + needs), capture_output=True, text=True, check=True
     )
     answers = done.stdout.splitlines()
-    assert [answer[0] for answer in answers] == ["0"] * 4 + ["2"] * 4, done.stdout
-    assert all("this needs physics, and PyBullet isn't installed" in answer for answer in answers[4:])
+    assert [answer[0] for answer in answers] == ["0"] * 5 + ["2"] * 4, done.stdout
+    assert all("this needs physics, and PyBullet isn't installed" in answer for answer in answers[5:])
     assert scene.with_name("pouring-scene.reach.ttl").is_file()
 
 

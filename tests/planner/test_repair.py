@@ -5,10 +5,10 @@ from functools import cache
 
 import pytest
 
-from planner.acting.repair import CLOSE, difference, mend, rejected, replan, vanished
+from planner.acting.repair import CLOSE, changed_individuals, difference, mend, rejected, replan, vanished
 from planner.hierarchical.planner import plan
 from planner.hierarchical.serialization import Compiled, compiled
-from planner.plan import Limits, Plan, Step
+from planner.plan import Limits, Plan, Status, Step
 from planner.plan_costs import cost_of
 from planner.validation import successor
 from reasoner.graph.knowledge import load
@@ -106,3 +106,53 @@ def test_steps_that_the_checker_rejects_are_not_followed() -> None:
     assert rejected(problem, outcome.plan.steps) is None
     assert rejected(problem, outcome.plan.steps[:-1]) is not None
     assert rejected(problem, outcome.plan.steps[0].steps[1:]) is not None
+
+
+def test_who_is_touched_by_a_change_is_named_by_it_before_or_after() -> None:
+    now = replace(
+        serving(),
+        initial={
+            **{s: v for s, v in serving().initial.items() if s != location("bottle1")},
+            location("cup1"): "location7",
+            Symbol("LOCATION", ("stranger",)): "location8",
+        },
+        goal={location("cup2"): "location6"},
+    )
+    was = {s: v for s, v in serving().goal.items() if s != location("cup2")}
+    touched = {"cup1", "location7", serving().initial[location("cup1")], "stranger", "location8", "bottle1"}
+    touched |= {serving().initial[location("bottle1")], "cup2", "location6", "false"}
+    touched |= {name for symbol, value in was.items() for name in (*symbol.arguments, value)}
+    touched |= {value for symbol, value in serving().goal.items() if symbol == location("cup2")}
+    assert changed_individuals(serving(), now) == touched
+    assert changed_individuals(now, serving()) == touched
+    assert changed_individuals(serving(), serving()) == set()
+
+
+def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
+    first, *others = planned().steps
+    pick, place = first.steps
+    begun = replace(serving(), initial=after(serving().initial, (pick,)))
+    rest = (replace(first, steps=(place,)), *others)
+    mended = mend(begun, rest, begun, using=using())
+    assert (mended.kind, mended.steps is not None) == ("repair", True)
+    assert mended.steps is not None
+    assert difference(rest, mended.steps) == (0, 0)
+    anew = mend(begun, rest, begun, using=using(), in_progress=False)
+    assert anew.steps is not None
+    end = after(begun.initial, anew.steps)
+    assert all(end[symbol] == value for symbol, value in begun.goal.items())
+    assert 0 <= mended.seconds < 60
+    assert mended.cost == cost_of(begun, Plan(mended.steps))
+
+
+def test_a_limit_of_time_is_kept_to() -> None:
+    now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
+    late = mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=-1.0))
+    assert late.steps is None
+    assert late.outcome is not None
+    assert late.outcome.status is Status.GAVE_UP
+    assert late.cost == 0
+    assert 0 <= late.seconds < 60
+    begun = replace(serving(), initial=after(serving().initial, planned().steps[0].steps[:1]))
+    assert mend(begun, (), begun, using=using(), limits=Limits(seconds=-1.0)).steps is None
+    assert mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None

@@ -9,7 +9,7 @@ from planner.paper.hierarchy import plan
 from planner.paper.learning import learn
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_into
 from reasoner.memory.links import Links
-from reasoner.memory.links_file import load_links, save_links
+from reasoner.memory.links_file import links_text, load_links, memory_names, save_links
 from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Symbol
 
@@ -86,3 +86,23 @@ def test_a_missing_or_broken_memory_is_a_clear_error(tmp_path: Path, serving: Re
     (tmp_path / "broken.ttl").write_text("<a> <b")
     with pytest.raises(KnowledgeError, match=r"broken\.ttl"):
         load_links(tmp_path / "broken.ttl", serving.names)
+
+
+def test_terms_that_the_scene_does_not_have_are_kept_under_their_names(tmp_path: Path, serving: Reading) -> None:
+    links = Links({("B1_JUGGLE", ("cup1", "club9")): {Symbol("SPINS", ("club9",)): {"fast": 0.5}}})
+    save_links(tmp_path / "m.ttl", links, serving.names, serving.problem.scene)
+    assert load_links(tmp_path / "m.ttl", serving.names) == links
+
+
+def test_the_text_of_links_is_that_of_the_file_without_its_head(tmp_path: Path, serving: Reading, links: Links) -> None:
+    text = links_text(links, serving.names, serving.problem.scene)
+    assert "imports" not in text
+    assert "Ontology" not in text
+    save_links(tmp_path / "m.ttl", links, serving.names, serving.problem.scene)
+    (tmp_path / "n.ttl").write_text(text)
+    assert load_links(tmp_path / "n.ttl", serving.names) == links
+    scene, names = memory_names(tmp_path / "m.ttl")
+    assert scene == serving.problem.scene
+    assert names.iri("cup1") == serving.names.iri("cup1")
+    with pytest.raises(KnowledgeError, match="it imports no scene"):
+        memory_names(tmp_path / "n.ttl")
