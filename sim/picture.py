@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from reasoner.embodiment.values import Embodiment, Shape
 from sim.assembly import read_robot
 from sim.bodies import outline, wall
+from sim.collision import fixed_spheres, read_mover
 from sim.engine import Engine
+from sim.kinematics import read_arm
 from sim.linkage import with_open_mechanisms
-from sim.urdf import Array
+from sim.urdf import Array, Spheres
 from sim.urdf import rotation as rotated
 
 NEAR, FAR = 0.1, 8.0
@@ -115,7 +117,8 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
     """
     places, _ = with_open_mechanisms(embodiment)
     middle = np.array([place.position for place in places.values()]).mean(0)
-    base = np.array(embodiment.robots[0].position) if embodiment.robots else middle - [0.5, 0.0, 0.0]
+    robots = [robot.position for robot in embodiment.robots]
+    base = np.mean(robots, axis=0) if robots else middle - [0.5, 0.0, 0.0]
     away = middle - base
     away[2] = 0.0
     away /= max(float(np.linalg.norm(away)), 1e-9)
@@ -137,7 +140,7 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
 
 
 def _seen(embodiment: Embodiment) -> Array:
-    """Return points (n, 3) that a picture shall show: corners of tables, what stands on places, robots without their arms."""
+    """Return points (n, 3) that a picture shall show: corners of tables, what stands on places, robots at rest."""
     places, around = with_open_mechanisms(embodiment)
     points: list[Array] = []
     for solid in around:
@@ -152,11 +155,14 @@ def _seen(embodiment: Embodiment) -> Array:
         points.append(np.array([(x, y, z), (x, y, z + TALL)]))
     for robot in embodiment.robots:
         model = read_robot(robot)
-        moved = {joint for hand in robot.hands for joint in (*hand.arm, *hand.fingers)}
-        for link, cover in model.spheres.items():
-            if len(cover.radii) and not moved & {joint.name for joint in model.chains.get(link, ())}:
-                for shift in (-1.0, 1.0):
-                    points.append(cover.centers + shift * cover.radii[:, None] * np.array([0.0, 0.0, 1.0]))
+        arms = [read_arm(model, hand.arm, hand.tip, hand.turned) for hand in robot.hands]
+        covers = [fixed_spheres(model, arms)]
+        for hand, arm in zip(robot.hands, arms, strict=True):
+            mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))
+            covers.append(Spheres(mover.at(np.array([hand.home]))[0], mover.spheres.radii))
+        for cover in covers:
+            for shift in (-1.0, 1.0):
+                points.append(cover.centers + shift * cover.radii[:, None] * np.array([0.0, 0.0, 1.0]))
     seen = np.concatenate(points)
     low = min((place.position[2] for place in places.values()), default=0.0) - LEGS
     return np.maximum(seen, [-np.inf, -np.inf, low])

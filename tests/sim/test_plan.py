@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from sim.assembly import read_robot
 from sim.faults import hidden_wall
 from sim.film import BAR, DOING, DONE, Film
+from sim.kinematics import link_transforms, read_arm
 from sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
 from sim.verify import verify
 from sim.world import World
@@ -179,3 +181,18 @@ def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(se
     again = behind.copy()
     _draw_opaque(again, np.full((80, 120), 0.5), camera, np.eye(3), np.zeros(3), clay)
     assert (again == behind).all()
+
+
+@pytest.mark.parametrize("scene", ["panda-pair-serving", "iiwa-serving", "two-tables"])
+def test_robots_at_rest_are_wholly_in_the_picture(scene: str) -> None:
+    """An arm that is all there is of a robot, too, and one of several robots."""
+    embodiment = case(scene).embodiment
+    camera = view_of(embodiment)
+    for robot in embodiment.robots:
+        for hand in robot.hands:
+            arm = read_arm(read_robot(robot), hand.arm, hand.tip, hand.turned)
+            r, t = link_transforms(arm, np.array([hand.home]))
+            joints = np.einsum("kij,kj->ki", r[0], arm.origins) + t[0]
+            x, y, z = camera.axes @ (joints - np.array(camera.eye)).T
+            assert (np.abs(x / z) * camera.focal < camera.width / 2).all()
+            assert (np.abs(y / z) * camera.focal < camera.height / 2).all()
