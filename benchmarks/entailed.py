@@ -23,7 +23,8 @@ from planner.transitions import Table, key_of
 from planner.validation import Facts
 from reasoner.amounts import written
 from reasoner.graph.knowledge import load
-from reasoner.reading.problem import decimal, read
+from reasoner.reading.problem import read
+from reasoner.reading.rows import decimal
 from reasoner.symbols import TRUE, Problem, Symbol
 from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, plainly, random_state
 

@@ -21,7 +21,7 @@ from planner.solve import DEFAULT_MODE
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.links import Links
 from reasoner.names import nearest
-from reasoner.reading.problem import parse_fact, with_goals
+from reasoner.reading.goals import parse_fact, with_goals
 from reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
@@ -331,7 +331,7 @@ def carry_out(
     from confab.live import spectator
 
     scene.settle()
-    problem = getattr(plan, "problem", None) or with_goals(scene.reading, several(goals))
+    problem = getattr(plan, "problem", None) or with_goals(scene.reading.problem, several(goals))
     check_goal(scene.iri, problem)
     begun = None if plan is None else plan_of(plan, problem)
     if isinstance(memory, str | Path):

@@ -18,7 +18,8 @@ from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.limits import Deadline
 from reasoner.names import Names, nearest
-from reasoner.reading.problem import Reading, parse_fact, read
+from reasoner.reading.goals import parse_fact
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Fact, Problem
 
 if TYPE_CHECKING:

@@ -20,7 +20,8 @@ from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline
 from reasoner.memory.links import Links
-from reasoner.reading.problem import Reading, read, with_goals
+from reasoner.reading.goals import with_goals
+from reasoner.reading.problem import Reading, read
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
 
@@ -146,7 +147,7 @@ def _plan(
     else:
         seen = _seen(scene.reading, observed) if observed else recognise(scene.knowledge, goals)
     scene.knowledge.confirm()
-    problem = with_goals(seen, goals) if observed or mode == "paper" else seen.problem
+    problem = with_goals(seen.problem, goals) if observed or mode == "paper" else seen.problem
     quantified = perf_counter() - begin
     check_goal(scene.iri, problem)
 

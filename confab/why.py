@@ -15,7 +15,7 @@ from planner.plan import Outcome, Plan, Status, Step
 from planner.plan_costs import cost_of
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
-from reasoner.reading.problem import parse_fact
+from reasoner.reading.goals import parse_fact
 from reasoner.symbols import Behavior, Fact, Problem, Symbol
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import nearest
-from reasoner.reading.problem import FIRST_INDEX_OF_NONE, Reading
+from reasoner.reading.problem import Reading
+from reasoner.reading.rows import FIRST_INDEX_OF_NONE
 from reasoner.symbols import Behavior, GroundBehavior, Parameter
 
 

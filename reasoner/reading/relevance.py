@@ -24,23 +24,9 @@ import pyoxigraph as ox
 from reasoner.amounts import situations_in, terms_of
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.names import local_name
-from reasoner.reading.problem import (
-    BOUNDS,
-    FIRST_INDEX_OF_NONE,
-    Frame,
-    Member,
-    Node,
-    Reading,
-    Schema,
-    Triple,
-    frame,
-    index_of,
-    link,
-    read_schema,
-    reading_of,
-    stated,
-    with_goals,
-)
+from reasoner.reading.goals import BOUNDS, with_goals
+from reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
+from reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Node, Schema, Triple, index_of, link, stated
 from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,
@@ -121,7 +107,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     members = search.members()
     known = frame(schema, members, _namesakes(graph, schema, members), lifted)
     reading = reading_of(graph.scene, known, search.facts(known), search.tuples(), whole=False)
-    return replace(reading, problem=with_goals(reading, goals))
+    return replace(reading, problem=with_goals(reading.problem, goals))
 
 
 # ------------------------------------------------------------------------------------------------- 1. what leads to what

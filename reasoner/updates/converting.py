@@ -16,7 +16,8 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
 from reasoner.names import local_name
-from reasoner.reading.problem import Schema, as_written, read_schema
+from reasoner.reading.problem import as_written, read_schema
+from reasoner.reading.rows import Schema
 from reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
 from reasoner.updates.compiling import compiled
 from reasoner.updates.writing import Situations, update

@@ -21,7 +21,8 @@ from reasoner.derivation import needed
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from reasoner.names import local_name, nearest
 from reasoner.reading.definitions import Definitions
-from reasoner.reading.problem import Node, Reading, Schema
+from reasoner.reading.problem import Reading
+from reasoner.reading.rows import Node, Schema
 from reasoner.reading.swrl import SWRL
 from reasoner.symbols import (
     FALSE,

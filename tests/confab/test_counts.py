@@ -18,8 +18,9 @@ import confab
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
 from reasoner.names import local_name
-from reasoner.reading.problem import SCHEMA, Member, Schema
+from reasoner.reading.problem import SCHEMA
 from reasoner.reading.relevance import recognise
+from reasoner.reading.rows import Member, Schema
 
 
 class Looked(SimpleMemory):

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import Reading, parse_fact, read, with_goals
+from reasoner.reading.goals import parse_fact, with_goals
+from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Symbol, Witness
 
 SCENES = Path(__file__).resolve().parents[2] / "ontology" / "scenes"
@@ -50,7 +51,7 @@ def test_terms_are_short_names_that_lead_back_to_iris(serving: Reading) -> None:
 
 
 def test_a_goal_replaces_that_of_its_symbol(serving: Reading) -> None:
-    problem = with_goals(serving, ["cup2 LOCATION location8"])
+    problem = with_goals(serving.problem, ["cup2 LOCATION location8"])
     assert problem.goal[Symbol("LOCATION", ("cup2",))] == "location8"
     assert len(problem.goal) == len(serving.problem.goal)
 

@@ -16,7 +16,8 @@ from planner.paper.transitions import Model, ground
 from planner.plan import Limits, Status
 from reasoner.generate import families, generate, write_scene
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from reasoner.reading.problem import read, with_goals
+from reasoner.reading.goals import with_goals
+from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import Problem
 from tests.ontology.faults import skeleton
@@ -195,9 +196,9 @@ def test_what_a_changed_goal_names_is_read_too(tmp_path: Path) -> None:
     write_scene(path, "served", clutter=3)
     graph, goals = load(path), ["thing2 LOCATION location7"]
     with pytest.raises(KnowledgeError, match="unknown individual 'thing2'"):
-        with_goals(recognise(graph), goals)
+        with_goals(recognise(graph).problem, goals)
     reading = recognise(graph, goals)
-    problem = with_goals(reading, goals)
+    problem = with_goals(reading.problem, goals)
     assert not reading.whole
     assert "thing2" in reading.problem.classes["Cup"]
     assert "thing3" not in reading.problem.classes["Cup"]

@@ -10,7 +10,8 @@ from benchmarks.entailed import NAMES, compared, derived, first_problem, in_stat
 from planner.solve import Request, solve
 from planner.validation import Facts
 from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import read, with_goals
+from reasoner.reading.goals import with_goals
+from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise
 from reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
 from tests.planner import naive
@@ -71,7 +72,7 @@ def test_what_planning_derives_is_what_a_plain_reading_gives(seed: int) -> None:
 )
 def test_plans_lead_to_what_is_defined(yard: Yard, goal: str, steps: int) -> None:
     for reading in (read(load(yard(""))), recognise(load(yard("")), [goal])):
-        plan = solve(Request(with_goals(reading, [goal]))).plan
+        plan = solve(Request(with_goals(reading.problem, [goal]))).plan
         assert plan is not None
         assert len(plan.steps) == steps
 

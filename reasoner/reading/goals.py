@@ -1,0 +1,200 @@
+"""What is wanted: the goals of a task, and those that people type."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from reasoner.amounts import (
+    DECIMAL,
+    Amount,
+    bounds_written,
+    written,
+)
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import nearest
+from reasoner.reading.parts import Parts
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Comparison,
+    Condition,
+    Domain,
+    Problem,
+    Symbol,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+
+BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
+"""What is wanted of an amount, as people write it."""
+
+
+def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
+    """Return the problem with some goals replaced, each written like ``cup2 LOCATION location8``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind, the object doesn't have the situation type, or two goals exclude each other.
+    """
+    given: dict[Symbol, str] = {}
+    for fact in goals:
+        symbol, value = parse_fact(problem, fact)
+        if given.setdefault(symbol, value) != value:
+            raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
+    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())))
+
+
+def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
+    """Return symbol and value of a fact written as ``object SITUATION [argument …] value``.
+
+    Raises
+    ------
+    KnowledgeError
+        A word names nothing of its kind; the message has the nearest known name.
+    """
+    words = fact.split()
+    individuals = {name for members in problem.classes.values() for name in members}
+    if len(words) < 2:
+        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
+    about, name, *rest = words
+    if about not in individuals:
+        raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals)}")
+    if name not in problem.domain.situations:
+        known = problem.domain.situations
+        raise KnowledgeError(
+            f"unknown situation type '{name}' in '{fact}'{nearest(name, known)} (known: {', '.join(known)})"
+        )
+    situation = problem.domain.situations[name]
+    if situation.boolean and len(rest) == len(situation.arguments) - 1:
+        rest.append(TRUE)
+    if len(rest) != len(situation.arguments):
+        raise KnowledgeError(f"'{fact}': {name} takes {len(situation.arguments)} words behind it, got {len(rest)}")
+    if situation.quantity is not None:
+        if not BOUNDS.fullmatch(rest[-1]):
+            raise KnowledgeError(
+                f"'{fact}': '{rest[-1]}' is no amount; write a number like 2 or 1.5, or bounds like >=2"
+            )
+        rest[-1] = bounds_written(rest[-1])
+    ranges = (*situation.arguments[1:], *([] if situation.quantity else [situation.range]))
+    for kind, word in zip(ranges, rest, strict=situation.quantity is None):
+        if word not in individuals and word not in (TRUE, FALSE):
+            raise KnowledgeError(
+                f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
+            )
+        if word not in problem.classes.get(kind, ()):
+            raise KnowledgeError(
+                f"'{fact}': {word} is no value of {name}; values: {some_of(problem.classes.get(kind, ()))}"
+            )
+    symbol = Symbol(name, (about, *rest[:-1]))
+    if about not in problem.classes.get(situation.arguments[0], ()):
+        raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
+    return symbol, rest[-1]
+
+
+def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
+    """Return the problem with the goals of some tasks.
+
+    Raises
+    ------
+    KnowledgeError
+        A goal is none, or two exclude each other.
+    """
+    goal = dict[Symbol, str]()
+    for task in tasks:
+        goals = parts.values(task, "goal")
+        for iri, wanted in ((goal, one) for goal in goals for one in _wanted(parts, goal, problem.classes)):
+            if isinstance(wanted, Comparison):
+                symbol, value = _bounds(iri, wanted)
+                value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
+                goal[symbol] = value
+                if symbol not in problem.initial:
+                    raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
+                continue
+            if not isinstance(wanted, ValueCondition):
+                raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
+            symbol = Symbol(wanted.situation, wanted.arguments)
+            check_arguments(symbol, problem.domain, "a goal")
+            value = _wanted_value(iri, wanted, problem)
+            kind = problem.domain.situations[symbol.situation]
+            members = (problem.classes.get(of, ()) for of in kind.arguments)
+            if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
+                continue  # what can't be so of these isn't
+            if goal.setdefault(symbol, value) != value:
+                raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
+            if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
+                raise KnowledgeError(
+                    f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
+                )
+    return replace(problem, goal=dict(sorted(goal.items())))
+
+
+def _wanted_value(iri: str, wanted: ValueCondition, problem: Problem) -> str:
+    """Return the value that a goal wants; of a negated one, what is left if not this.
+
+    Raises
+    ------
+    KnowledgeError
+        Several values are left.
+    """
+    if not wanted.negated:
+        return wanted.value
+    situation = problem.domain.situations[wanted.situation]
+    if situation.boolean:
+        return FALSE if wanted.value == TRUE else TRUE
+    left = [value for value in problem.classes.get(situation.range, ()) if value != wanted.value]
+    if len(left) != 1:
+        raise KnowledgeError(
+            f"<{iri}>: the goal says which value {wanted.situation} shall not have, and leaves {some_of(left) or 'none'}; name the "
+            "one that it shall have, or want a situation type that is defined"
+        )
+    return left[0]
+
+
+def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
+    """Return what a goal wants: of a class in the place of an individual, the same of each of the class."""
+    found = parts.condition(iri)
+    if not (isinstance(found, Witness) and parts.classes_in(iri)):
+        return [found]
+    wanted: list[Condition] = [found]
+    while isinstance(found, Witness):
+        *others, _ = found.conditions
+        if others:
+            raise KnowledgeError(
+                f"<{iri}> wants something of all of a class whose individuals change; name a class that situations don't define, "
+                "or want a situation type that is defined"
+            )
+        wanted = [
+            substituted(one.conditions[-1], {one.variable: member})
+            for one in wanted
+            if isinstance(one, Witness)
+            for member in classes.get(one.kind, ())
+        ]
+        found = found.conditions[-1]
+    return [replace(one, negated=not one.negated) for one in wanted]
+
+
+def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
+    """Return of which symbol a goal wants an amount, and its bounds."""
+    contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
+    sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
+    if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):
+        raise KnowledgeError(f"<{iri}>: a goal compares the amount of one object with a number, as <, <=, =, >= or >")
+    symbol = Symbol(wanted.left.situation, wanted.left.arguments)
+    return symbol, f"{sign}{written(wanted.right)}"
+
+
+def check_arguments(symbol: Symbol, domain: Domain, what: str) -> None:
+    """Raise `KnowledgeError` if a symbol names more or fewer individuals than its situation type takes."""
+    many, wanted = len(symbol.arguments), len(domain.situations[symbol.situation].arguments)
+    if many != wanted:
+        raise KnowledgeError(f"{symbol}: {what} about {many} individuals; {symbol.situation} is about {wanted}")
+
+
+def some_of(names: Sequence[str], most: int = 12) -> str:
+    """Return the first of some names as text."""
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

@@ -1,0 +1,421 @@
+"""From nodes to the parts of behaviours and goals: terms, conditions, calculations, effects."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from reasoner.amounts import (
+    COMPARING,
+    OPERATIONS,
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+)
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import Names, local_name
+from reasoner.reading.definitions import Definitions
+from reasoner.reading.rows import (
+    HIGHEST_COST,
+    HIGHEST_LEVEL,
+    Node,
+    decimal,
+    is_a,
+    ordered,
+    whole_number,
+)
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    Comparison,
+    Condition,
+    Effect,
+    EqualityCondition,
+    Parameter,
+    RelationCondition,
+    Rule,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+from reasoner.vocabulary import ARGUMENTS, CORE
+
+SIGNS = ("+", "-", "*", "/")
+DEEPEST = 50
+"""Conditions inside one another."""
+MOST_CONDITIONS = 10_000
+"""In one behaviour, each counted as often as it is named."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The nodes of behaviours, conditions and situation types, read as values."""
+
+    nodes: Mapping[str, Node]
+    names: Names
+    terms: set[str]
+    pairs: set[str]  # situation types whose value is one of the arguments of a boolean symbol
+    definitions: Definitions
+    individuals_of: frozenset[str] = frozenset()  # classes that stand for all of their individuals
+    standing: dict[str, str] = field(
+        default_factory=dict
+    )  # those of what is being read, and the term for each individual
+    inside: list[str] = field(default_factory=list)  # the conditions that are being read, one inside the other
+    count: Counter[str] = field(default_factory=Counter)  # of conditions, by behaviour
+
+    def values(self, iri: str, name: str) -> Sequence[str]:
+        """Return what a property of a node leads to."""
+        return self.nodes.get(iri, {}).get(CORE + name, ())
+
+    def one(self, iri: str, name: str) -> str:
+        """Return the one value of a property; a node has to have exactly one."""
+        found = self.values(iri, name)
+        if len(found) != 1:
+            raise KnowledgeError(f"<{iri}>: wanted one :{name}, found {len(found)}; state it in the ontology")
+        return found[0]
+
+    def number(self, iri: str, name: str, least: int, most: int, default: int | None = None) -> int:
+        """Return a whole number that a property gives, between bounds."""
+        found = self.values(iri, name)
+        if not found and default is not None:
+            return default
+        return whole_number(self.one(iri, name), f"<{iri}>: :{name}", least, most)
+
+    def level(self, iri: str) -> int:
+        """Return the level of a behaviour."""
+        return self.number(iri, "level", 1, HIGHEST_LEVEL)
+
+    def price(self, iri: str) -> Expression | None:
+        """Return what a behaviour is worked out to cost, if it is."""
+        if not self.values(iri, "price"):
+            return None
+        if self.values(iri, "cost"):
+            raise KnowledgeError(f"<{iri}> has a :cost and a :price; keep one of them")
+        return self.expression(self.one(iri, "price"))
+
+    def cost(self, iri: str) -> float:
+        """Return what a behaviour costs where nothing is worked out."""
+        if not self.values(iri, "cost"):
+            return 1.0
+        said = self.one(iri, "cost")
+        try:
+            cost = float(said)
+        except ValueError:
+            cost = -1.0
+        if not 0 <= cost <= HIGHEST_COST:  # not a number is neither
+            raise KnowledgeError(f"<{iri}>: :cost is '{said[:40]}'; wanted a number from 0 to {HIGHEST_COST}")
+        return cost
+
+    def decimal(self, iri: str, name: str) -> Fraction | None:
+        """Return a number that a property gives, exact; None if it gives none."""
+        if not self.values(iri, name):
+            return None
+        return decimal(self.one(iri, name), f"<{iri}>: :{name}")
+
+    def word(self, iri: str, name: str, known: Sequence[str]) -> str:
+        """Return the one of some known words that a property gives."""
+        said = self.one(iri, name)
+        if said not in known:
+            raise KnowledgeError(f"<{iri}>: :{name} is '{said[:40]}'; wanted one of {' '.join(known)}")
+        return said
+
+    def flag(self, iri: str, name: str) -> bool:
+        """Return whether a property is said to be true."""
+        said = set(self.values(iri, name))
+        if said - {"true", "false", "1", "0"} or len(said) > 1:
+            raise KnowledgeError(f"<{iri}>: :{name} is '{' and '.join(sorted(said))[:40]}'; wanted true or false")
+        return bool(said & {"true", "1"})
+
+    def term(self, iri: str) -> str:
+        """Return a term's name (``?hand`` for the parameter B2_PICK.hand), or the individual's."""
+        if iri in self.terms:
+            return "?" + local_name(iri).rsplit(".", 1)[-1]
+        if iri in self.standing:
+            return self.standing[iri]
+        name = self.names.short(iri)
+        if self.terms and name not in self.names and name not in (TRUE, FALSE):  # a scene's facts have no terms
+            raise KnowledgeError(
+                f"<{iri}> is named in a behaviour, but isn't declared as a parameter, a variable or an individual; declare it, "
+                "or mend the name"
+            )
+        return name
+
+    def parameter(self, iri: str) -> Parameter:
+        """Return a parameter or variable as a term with its class."""
+        if iri not in self.terms:
+            raise KnowledgeError(
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+            )
+        return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
+
+    def membership(self, iri: str) -> tuple[Condition, ...]:
+        """Return what the type of a term asks of it, if that is a class defined by situations."""
+        return self.definitions.beyond_base(self.term(iri), self.one(iri, "termType"))
+
+    def arguments(self, iri: str) -> tuple[str, ...]:
+        """Return the terms that a node is about, in order."""
+        return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
+
+    def situation(self, iri: str) -> str:
+        """Return the situation type that a condition, an effect or a calculation is about."""
+        situation = self.one(iri, "situationType")
+        if situation not in self.nodes or not is_a(self.nodes[situation], "SituationType"):
+            raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or mend the name")
+        return situation
+
+    def situation_and_value(self, iri: str) -> tuple[str, tuple[str, ...], str]:
+        """Return situation type, arguments and value; a value that is an argument of a boolean symbol moves there."""
+        situation = self.situation(iri)
+        if is_a(self.nodes[situation], "Amount"):
+            raise KnowledgeError(
+                f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
+                "use a :Comparison or an :AmountEffect"
+            )
+        arguments = self.arguments(iri)
+        value = [self.term(v) for v in self.values(iri, "value")]
+        if situation in self.pairs:
+            arguments, value = (*arguments, *value), []
+        return self.names.short(situation), arguments, value[0] if value else TRUE
+
+    def condition(self, iri: str) -> Condition:
+        """Return a condition; one that contains itself, or is too deep, is a fault."""
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as a condition but isn't declared as one")
+        if iri in self.inside or len(self.inside) > DEEPEST:
+            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
+            raise KnowledgeError(f"<{iri}>: the condition {what}; take it out of one of them")
+        self.count[self.inside[0] if self.inside else ""] += 1
+        if self.inside and self.count[self.inside[0]] > MOST_CONDITIONS:
+            raise KnowledgeError(
+                f"<{self.inside[0]}>: more than {MOST_CONDITIONS} conditions, each counted as often as it is named; say less"
+            )
+        self.inside.append(iri)
+        found = self._of_all(iri)
+        self.inside.pop()
+        return found
+
+    def classes_in(self, iri: str) -> list[str]:
+        """Return the classes that stand in the place of an individual of a condition or an effect, and stand for nobody yet."""
+        said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
+        found = [value for value in said if value in self.individuals_of and value not in self.standing]
+        if twice := [kind for kind in found if found.count(kind) > 1]:
+            raise KnowledgeError(
+                f"<{iri}> names the class {local_name(twice[0])} twice, so that it can't be told whether the same individual is "
+                "meant; use a :Witness with a variable for one of them"
+            )
+        situation = self.values(iri, "situationType")[:1]
+        if found and found[-1:] == [*self.values(iri, "value")] and situation and situation[0] not in self.pairs:
+            raise KnowledgeError(
+                f"<{iri}> wants every {local_name(found[-1])} as the one value of {local_name(situation[0])}; name an individual, "
+                "or seek some one by a :Witness"
+            )
+        return found
+
+    def _of_all(self, iri: str) -> Condition:
+        """Return a condition; of a class in the place of an individual it asks for each of the class."""
+        kinds = self.classes_in(iri)
+        for kind in kinds:
+            self.standing[kind] = f"?each{len(self.standing) or ''}"
+        found = self._condition(iri)
+        for kind in reversed(kinds):
+            term = self.standing.pop(kind)
+            contrary = replace(found, negated=not found.negated)
+            inner = (*self.definitions.beyond_base(term, kind), contrary)
+            found = Witness(term, self.names.short(self.definitions.base(kind)), inner, negated=True)
+        return found
+
+    def _condition(self, iri: str) -> Condition:
+        node, negated = self.nodes[iri], self.flag(iri, "negated")
+        if is_a(node, "ValueCondition"):
+            return ValueCondition(*self.situation_and_value(iri), negated)
+        if is_a(node, "RelationCondition"):
+            arguments = (*self.arguments(iri), *(self.term(v) for v in self.values(iri, "value")))
+            relation = self.one(iri, "relation")
+            if relation not in self.nodes or not is_a(self.nodes[relation], "Relation", "ReachRelation"):
+                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+            return RelationCondition(self.names.short(relation), arguments, negated)
+        if is_a(node, "ClassCondition"):
+            return self.definitions.condition(self.term(self.one(iri, "about")), self.one(iri, "ofClass"), negated)
+        if is_a(node, "EqualityCondition"):
+            return EqualityCondition(self.term(self.one(iri, "about")), self.term(self.one(iri, "value")), negated)
+        if is_a(node, "AbsenceCondition"):
+            name, _, value = self.situation_and_value(iri)
+            anyone, kind = "?anyone", self.one(iri, "ofClass")
+            inner = (ValueCondition(name, (anyone,), value), *self.definitions.beyond_base(anyone, kind))
+            return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not negated)
+        if is_a(node, "Witness"):
+            sought = self.one(iri, "witness")
+            variable, inner = self.parameter(sought), (*self.conditions(iri, "condition"), *self.membership(sought))
+            return Witness(variable.name, variable.kind, inner, negated)
+        if is_a(node, "AnyOf"):
+            groups = [self.group(alternative) for alternative in self.values(iri, "alternative")]
+            return AnyOf(tuple(groups), negated)
+        if is_a(node, "AllOf"):
+            return AnyOf((self.conditions(iri, "condition"),), negated)
+        if is_a(node, "Comparison"):
+            sign = self.word(iri, "sign", tuple(COMPARING))
+            return Comparison(self.left(iri), sign, self.right(iri), negated)
+        raise KnowledgeError(f"<{iri}>: a condition of no known kind; give it one of the subclasses of :Condition")
+
+    def left(self, iri: str) -> Expression:
+        """Return the left side of a comparison or calculation: its own amount, if it has no other."""
+        return self.expression(self.one(iri, "left")) if self.values(iri, "left") else self.measured(iri)
+
+    def right(self, iri: str) -> Expression:
+        """Return the right side of a comparison, calculation or effect: its own number, if it has no other."""
+        if self.values(iri, "right"):
+            return self.expression(self.one(iri, "right"))
+        number = self.decimal(iri, "amount")
+        if number is None:
+            raise KnowledgeError(
+                f"<{iri}> has neither :amount nor :right; state a number, or what it is worked out from"
+            )
+        return number
+
+    def measured(self, iri: str) -> Expression:
+        """Return the amount of an object, or what a relation gives for it."""
+        if self.values(iri, "relation"):
+            relation = self.one(iri, "relation")
+            if relation not in self.nodes or not is_a(self.nodes[relation], "Relation", "ReachRelation"):
+                raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or mend the name")
+            return Measure(self.names.short(relation), self.arguments(iri))
+        situation = self.situation(iri)
+        if not is_a(self.nodes[situation], "Amount"):
+            raise KnowledgeError(
+                f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
+                "declare it as :Amount, or use a value condition or effect"
+            )
+        return Amount(self.names.short(situation), self.arguments(iri))
+
+    def expression(self, iri: str) -> Expression:
+        """Return an amount, a number or a calculation."""
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as a calculation but isn't declared as one")
+        if iri in self.inside or len(self.inside) > DEEPEST:
+            what = "contains itself" if iri in self.inside else f"lies inside more than {DEEPEST} others"
+            raise KnowledgeError(f"<{iri}>: the calculation {what}; take it out of one of them")
+        self.inside.append(iri)
+        if self.values(iri, "sign"):
+            found: Expression = Calculation(self.word(iri, "sign", SIGNS), self.left(iri), self.right(iri))
+        else:
+            number = self.decimal(iri, "amount")
+            found = self.measured(iri) if number is None else number
+        self.inside.pop()
+        return found
+
+    def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
+        """Return the conditions that a property leads to."""
+        return tuple(condition for value in self.values(iri, name) for condition in self.group(value))
+
+    def group(self, iri: str) -> tuple[Condition, ...]:
+        """Return a condition, or those that all have to hold where it says so."""
+        found = self.condition(iri)
+        if isinstance(found, AnyOf) and len(found.alternatives) == 1 and not found.negated:
+            return found.alternatives[0]
+        return (found,)
+
+    def effect(self, iri: str) -> Effect:
+        """Return an effect; with a class in the place of an individual it is made for each of the class for which `when` holds."""
+        if iri not in self.nodes:
+            raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
+        kinds = self.classes_in(iri)
+        if len(kinds) > 1:
+            raise KnowledgeError(
+                f"<{iri}> is about all of two classes, {' and '.join(map(local_name, kinds))}; make one of them a parameter"
+            )
+        for kind in kinds:
+            self.standing[kind] = "?each"
+        of_amount = is_a(self.nodes[iri], "AmountEffect")
+        found = self.amount_effect(iri) if of_amount else self.value_effect(iri)
+        for kind in kinds:
+            term = self.standing.pop(kind)
+            each = Parameter(term, self.names.short(self.definitions.base(kind)))
+            found = replace(found, when=(*self.definitions.beyond_base(term, kind), *found.when), each=each)
+        return found
+
+    def value_effect(self, iri: str) -> ValueEffect:
+        """Return an effect that gives a symbol a value."""
+        situation, arguments, value = self.situation_and_value(iri)
+        if self.flag(iri, "negated"):
+            value = FALSE
+        return ValueEffect(situation, arguments, value, self.conditions(iri, "when"))
+
+    def amount_effect(self, iri: str) -> AmountEffect:
+        """Return an effect that changes an amount."""
+        changed = self.measured(iri)
+        if not isinstance(changed, Amount):
+            raise KnowledgeError(f"<{iri}>: a static relation can't be changed; make it an :Amount")
+        operation = self.word(iri, "change", OPERATIONS)
+        when = self.conditions(iri, "when")
+        return AmountEffect(changed.situation, changed.arguments, operation, self.right(iri), when)
+
+    def behavior(self, iri: str) -> Behavior:
+        """Return a behaviour with all its parts."""
+        parameters = tuple(map(self.parameter, ordered(self.values(iri, "parameter"), self.nodes, self.names)))
+        used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
+        effects = [self.effect(effect) for effect in self.values(iri, "postcondition")]
+        price = self.price(iri)
+        return Behavior(
+            name=self.names.short(iri),
+            level=self.level(iri),
+            parameters=parameters,
+            variables=tuple(map(self.parameter, used)),
+            preconditions=(
+                *self.conditions(iri, "precondition"),
+                *(c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)),
+                *([] if price is None else [Comparison(price, ">=", Fraction(0))]),
+            ),
+            effects=tuple(effect for effect in effects if isinstance(effect, ValueEffect)),
+            cost=self.cost(iri),
+            amounts=tuple(effect for effect in effects if isinstance(effect, AmountEffect)),
+            price=price,
+        )
+
+    def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
+        """Return a rule of a situation type with arguments of some classes; an individual among its terms is compared."""
+        situation, arguments, value = self.situation_and_value(iri)
+        if value != TRUE:
+            raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
+        if len(arguments) != len(kinds):
+            raise KnowledgeError(f"<{iri}> speaks of {situation} with {len(arguments)} arguments; it has {len(kinds)}")
+        parameters: list[Parameter] = []
+        compared: list[Condition] = []
+        own = {self.term(t): t for t in self.terms_below(iri)}
+        for i, (term, kind) in enumerate(zip(arguments, kinds, strict=True)):
+            if term in own and term not in [p.name for p in parameters]:
+                parameters.append(self.parameter(own[term]))
+            else:
+                parameters.append(Parameter(f"?argument{i}", kind))
+                compared.append(EqualityCondition(f"?argument{i}", term))
+        names = {p.name for p in parameters}
+        membership = (c for t in sorted(own.values()) for c in self.membership(t))
+        variables = tuple(self.parameter(t) for name, t in sorted(own.items()) if name not in names)
+        conditions = (*compared, *self.conditions(iri, "condition"), *membership)
+        return Rule(situation, tuple(parameters), variables, conditions)
+
+    def terms_below(self, iri: str) -> set[str]:
+        """Return the terms that occur anywhere below a behaviour, those bound by a witness left out."""
+        found: set[str] = set()
+        bound: set[str] = set()
+        waiting, seen = [iri], {iri}
+        while waiting:
+            node = waiting.pop()
+            bound.update(self.values(node, "witness"))
+            for values in self.nodes.get(node, {}).values():
+                for value in values:
+                    if value in self.terms:
+                        found.add(value)
+                    elif value in self.nodes and value not in seen and _is_part(self.nodes[value]):
+                        seen.add(value)
+                        waiting.append(value)
+        return found - bound
+
+
+def _is_part(node: Node) -> bool:
+    return not is_a(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level")

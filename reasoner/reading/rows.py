@@ -1,0 +1,239 @@
+"""From the rows of queries to nodes (subject → property → values), once each value is of the kind that belongs there."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import chain
+
+import pyoxigraph as ox
+
+from reasoner.amounts import (
+    exact,
+    written,
+)
+from reasoner.graph.knowledge import KnowledgeError, Term, text
+from reasoner.names import Names, local_name
+from reasoner.vocabulary import CORE, OWL, TYPE
+
+FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
+DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update"))
+DATA |= {CORE + name for name in ("amount", "sign", "change", "unit", "wholeNumbers")}
+DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
+"""What the core says of its nodes in numbers, signs, truth values and text; all else that it says leads to other nodes."""
+OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
+HIGHEST_LEVEL = 1_000
+HIGHEST_COST = 10**9
+HIGHEST_NUMBER = 10**9
+
+Node = Mapping[str, Sequence[str]]
+Triple = tuple[str, str, str]
+Member = tuple[str, str, int]
+"""An individual, a class of it, and its index."""
+
+
+@dataclass(frozen=True)
+class Schema:
+    """What is the same for every individual: the rows of `SCHEMA`, as IRIs.
+
+    `nodes` are situation types, behaviours with their parts, relations and tasks; `pairs` the situation types whose value
+    property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
+    facts are nodes of their own, and `facts` has those about nobody;
+    `expressions` are the definitions of classes, `axioms` what is said of value properties, `swrl` the rules; `ontologies` the
+    IRIs of what was loaded.
+    """
+
+    nodes: Mapping[str, Node]
+    supers: Mapping[str, Sequence[str]]
+    owners: Sequence[tuple[str, str]]
+    pairs: frozenset[str]
+    whole: frozenset[str]
+    from_levels: Mapping[str, int]
+    facts: Mapping[str, Node]
+    tuples: bool
+    expressions: Mapping[str, Node]
+    axioms: Mapping[str, Node]
+    swrl: Mapping[str, Node]
+    ontologies: Sequence[str]
+
+    @cached_property
+    def by_kind(self) -> Mapping[str, Sequence[str]]:
+        """The nodes of each class that they are said to be of, in the order of their IRIs."""
+        found: dict[str, list[str]] = defaultdict(list)
+        for iri, node in self.nodes.items():
+            for kind in node[TYPE]:
+                found[kind].append(iri)
+        return found
+
+    @cached_property
+    def numbers(self) -> frozenset[str]:
+        """The properties that lead to numbers: value properties of amounts, and relations that give one."""
+        amounts = {p for iri in self.of_kind("Amount") for p in self.nodes[iri].get(CORE + "valueProperty", ())}
+        return frozenset(amounts.union(self.by_kind.get(OWL + "DatatypeProperty", ())))
+
+    @cached_property
+    def individuals_of(self) -> frozenset[str]:
+        """The classes of objects: where an individual is expected, they stand for all of theirs."""
+        known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}
+        known |= {iri for iri, node in self.expressions.items() if OWL + "equivalentClass" in node}
+        return frozenset(known - self.nodes.keys())
+
+    def of_kind(self, *kinds: str) -> list[str]:
+        """Return the nodes of some classes of the core."""
+        return [iri for kind in kinds for iri in self.by_kind.get(CORE + kind, ())]
+
+
+def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
+    """Return what is said of each subject: the subjects in order, and the values of each property."""
+    nodes: dict[str, dict[str, list[str]]] = {}
+    for subject, predicate, value in triples:
+        nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
+    for node in nodes.values():
+        for values in node.values():
+            if len(values) > 1:
+                values.sort()
+    return dict(sorted(nodes.items()))
+
+
+def core_triple(row: Sequence[Term]) -> Triple:
+    """Return a triple as text, once it is sure that a text isn't taken for the name of what is meant."""
+    subject, predicate, value = row
+    named = text(predicate)
+    return (
+        link(row, blank=True) if named.startswith(CORE) and named not in DATA else (text(subject), named, text(value))
+    )
+
+
+def link(row: Sequence[Term], blank: bool = False) -> Triple:
+    """Return a triple that leads from one individual to another, as text; only the core's own nodes can go without a name.
+
+    Raises
+    ------
+    KnowledgeError
+        A text, or something without a name, stands where an individual belongs.
+    """
+    subject, predicate, value = row
+    if text(predicate) in OF_ONTOLOGIES:
+        said = local_name(text(predicate))
+        raise KnowledgeError(
+            f"<{text(subject)}>: {said} is said of an ontology, not of an individual; move it beside owl:imports"
+        )
+    for term in (subject, value):
+        if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
+            what = f"'{text(term)[:60]}', a text" if isinstance(term, ox.Literal) else "something without a name"
+            raise KnowledgeError(
+                f"<{text(subject)}>: {local_name(text(predicate))} leads to {what}, where an individual belongs; name one"
+                + (", without quotation marks" if isinstance(term, ox.Literal) else "")
+            )
+    return text(subject), text(predicate), text(value)
+
+
+def stated(row: Sequence[Term], numbers: Collection[str]) -> Triple:
+    """Return a fact as text: a link, or by one of the properties that lead to numbers an amount."""
+    subject, predicate, value = row
+    if text(predicate) not in numbers:
+        return link(row)
+    what = f"<{text(subject)}>: {local_name(text(predicate))}"
+    if not isinstance(value, ox.Literal):
+        raise KnowledgeError(f"{what} leads to {text(value)[:60]}, where a number belongs; write one, like 2 or 1.5")
+    return text(subject), text(predicate), written(decimal(text(value), what))
+
+
+def decimal(text: str, what: str) -> Fraction:
+    """Return a number that stands in an ontology, exact.
+
+    Raises
+    ------
+    KnowledgeError
+        It is none.
+    """
+    found = exact(text)
+    if found is None:
+        raise KnowledgeError(f"{what} is '{text[:40]}'; wanted a number, like 2 or 1.5")
+    return found
+
+
+def index_of(iri: str, index: str) -> int:
+    """Return a node's place in the declared order; what has no index comes last."""
+    if not index:
+        return FIRST_INDEX_OF_NONE
+    return whole_number(index, f"<{iri}>: :index", -HIGHEST_NUMBER, HIGHEST_NUMBER)
+
+
+def whole_number(text: str, what: str, least: int, most: int) -> int:
+    """Return a number that stands in an ontology.
+
+    Raises
+    ------
+    KnowledgeError
+        It is none, or out of range.
+    """
+    number = int(text) if re.fullmatch(r"[+-]?\d{1,18}", text) else None
+    if number is None or not least <= number <= most:
+        raise KnowledgeError(f"{what} is '{text[:40]}'; wanted a whole number from {least} to {most}")
+    return number
+
+
+def is_a(node: Node, *kinds: str) -> bool:
+    """Whether a node is of one of some classes of the core."""
+    types = node[TYPE]
+    return any(CORE + kind in types for kind in kinds)
+
+
+def ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> list[str]:
+    """Return nodes by their index, then by name."""
+
+    def key(iri: str) -> tuple[int, str]:
+        if iri not in nodes:
+            raise KnowledgeError(
+                f"<{iri}> is used as a parameter but isn't declared as one; declare it, or mend the name"
+            )
+        index, *_ = nodes[iri].get(CORE + "index", [""])
+        return (index_of(iri, index), names.short(iri))
+
+    return sorted(iris, key=key)
+
+
+def superclasses(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return the direct superclasses of each class."""
+    supers: dict[str, list[str]] = defaultdict(list)
+    for sub, sup in pairs:
+        if sub != sup:
+            supers[sub].append(sup)
+    return dict(supers)
+
+
+def classes_of(
+    instances: Sequence[Member], supers: Mapping[str, Sequence[str]], names: Names
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Return the individuals of each class in declared order, superclasses included, and each class's direct superclasses."""
+    above: dict[str, frozenset[str]] = {}
+
+    def closure(kind: str) -> frozenset[str]:
+        if kind not in above:
+            found, waiting = {kind}, [kind]
+            while waiting:
+                for sup in supers.get(waiting.pop(), ()):
+                    if sup not in found:
+                        found.add(sup)
+                        waiting.append(sup)
+            above[kind] = frozenset(found)
+        return above[kind]
+
+    of: dict[str, set[str]] = defaultdict(set)
+    place: dict[str, int] = {}
+    for individual, kind, index in instances:
+        of[individual] |= closure(kind)
+        place[individual] = min(index, place.get(individual, index))
+    members: dict[str, list[str]] = {kind: [] for kind in {*supers, *chain.from_iterable(supers.values())}}
+    for _, name, kinds in sorted(
+        (place[individual], names.short(individual), kinds) for individual, kinds in of.items()
+    ):
+        for kind in kinds:
+            members.setdefault(kind, []).append(name)
+    classes = {name: tuple(members[kind]) for name, kind in sorted((names.short(kind), kind) for kind in members)}
+    return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
