@@ -155,11 +155,11 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
 def levelled(call: Call) -> Plan:
     """Return the plan of a call that left a level, or has only one, made shorter on the lowest one where that is small."""
-    from planner.hierarchical.flattened import shortened
-
     levels, plan = call.program.levels, call.tree()
     if len(levels) > 1 and not call.given_up:
         return plan
+    from planner.hierarchical.flattened import shortened
+
     with suppress(LimitError):
         plan = shortened(call.problem, plan, call.segments.deadline)
     if all(step.level == levels[0] for step in plan.steps):
