@@ -3,7 +3,8 @@
 off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
 rank      how many rules must follow each other (`planner.experience.chaining`); what is nearest is brought about first
 promise   what came to be right must not go wrong again
-wasted    steps that were undone because a promise was broken; nothing is tried while more than a tenth of all effort was
+wasted    steps that were undone because a promise was broken; nothing is tried while more than a tenth of all effort was, or
+          went into asking rules in vain
 
 The goals of a task, one by one in series, and the changes that a refinement must bring about are the same to rules: `Guide.follow`
 leaves the table as wanted, with all kept that must be, or as it was. So search goes on as if nobody had asked, and what it
@@ -17,7 +18,7 @@ from dataclasses import replace
 from math import inf
 from typing import TypeAlias
 
-from planner.experience.chaining import Budget, Candidate, Chains, fact
+from planner.experience.chaining import ASKED, Budget, Candidate, Chains, fact
 from planner.experience.evidence import told_apart
 from planner.experience.matching import Bind, known
 from planner.experience.regression import Course, ordered
@@ -34,6 +35,8 @@ CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
 WASTE = 10
 """Of so many expansions one may have been for steps of rules that were undone."""
+FREE = 1_000
+"""Rules may be asked in vain as if so many expansions had been done before."""
 PATIENCE = 30
 """So many steps are done for one thing that is wanted."""
 VAIN = 2
@@ -69,7 +72,7 @@ class Guide:
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.names: set[str] = set()
         self.off: dict[Cell, str] = {}
-        self.wasted = 0
+        self.wasted = self.heard = 0
         self.vain: dict[object, int] = {}
         """Of each kind of targets how often rules led nowhere."""
         self.taught: dict[object, tuple[int, int]] = {}
@@ -125,8 +128,9 @@ class Guide:
         return [way for way in found if way.rule.steps == least]
 
     def ready(self) -> bool:
-        """Whether no more than a share of the effort was wasted so far."""
-        return self.wasted * WASTE <= self.call.segments.expanded
+        """Whether no more than a share of the effort was wasted so far, nor went into asking in vain since rules last led on."""
+        done, vain = self.call.segments.expanded, (self.chains.asked - self.heard) // ASKED
+        return self.wasted * WASTE <= done and vain * WASTE <= done + FREE
 
     def rank(self, cell: Cell) -> int:
         """Return how many steps rules promise for a goal; 0 if they promise nothing."""
@@ -175,6 +179,7 @@ class Guide:
         if not failed and call.refiner.left_as_it_must(start, targets, keep) is None:
             self.taught.pop(kind, None)
             self.vain.pop(kind, None)
+            self.heard = self.chains.asked
             return steps
         if segments.expanded > began:
             self.vain[kind] = self.vain.get(kind, 0) + 1

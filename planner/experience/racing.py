@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
+from planner.experience.chaining import ASKED
 from planner.experience.leading import Guide, by_rules
 from planner.hierarchical import planner as fast
 from planner.hierarchical.serialization import Call, Compiled
@@ -73,8 +74,10 @@ def raced(
         call = Call(problem, using, base[0].segments.deadline, most)
         call.refiner.worlds = nowhere  # type: ignore[method-assign]
         tries.append(call)
+        rules = guide(call)
+        rules.chains.most_asked = most * ASKED
         with suppress(LimitError):
-            by_rules(guide(call))
+            by_rules(rules)
         spent += call.segments.expanded
         if all(map(call.met, call.goal)):
             raise _Led(call)
@@ -100,5 +103,5 @@ def raced(
     if done is not None and improve:
         with suppress(LimitError):
             fast.shorten(done, improve, leave_levels)
-        return replace(outcome, plan=done.tree(), search=search)
+        return replace(outcome, plan=fast.levelled(done), search=search)
     return outcome

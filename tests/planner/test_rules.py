@@ -8,8 +8,9 @@ import pytest
 
 import confab
 from planner.experience.advice import Memory, plan
+from planner.experience.chaining import ASKED
 from planner.experience.evidence import View
-from planner.experience.leading import Guide, rules_in
+from planner.experience.leading import FREE, Guide, rules_in
 from planner.experience.lessons import compared, live, teach
 from planner.experience.regression import Course
 from planner.grounded.task import Task
@@ -382,3 +383,21 @@ def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_ha
     assert not guide.ready()
     call.segments.expanded = 10 * guide.wasted
     assert guide.ready()
+
+
+def test_rules_that_are_asked_in_vain_are_left_alone_until_search_has_done_ten_times_as_much() -> None:
+    within = problem("swap", 12, 1)
+    call = Call(within, compiled(within), None, 100_000)
+    guide = Guide(call, taught().rules)
+    level, (cell, value) = call.program.levels[0], next(iter(guide.open().items()))
+    assert guide.rank(cell)
+    asked = guide.chains.asked
+    assert asked >= len(guide.by_goal[level, cell[0]])
+    guide.chains.asked += ASKED * FREE
+    assert not guide.ready()
+    assert not guide.rank(cell)
+    call.segments.expanded = 10 * FREE
+    assert guide.rank(cell)
+    assert guide.follow(level, {cell: value}, call.segments.keeping(call.kept))
+    call.segments.expanded = 0
+    assert guide.ready()  # what led on wasn't asked in vain
