@@ -107,3 +107,32 @@ def test_what_shows_each_promise_is_there() -> None:
             assert any(line.startswith(file) and word in line.split("::")[1] for line in tests), f"{file} -k {word}"
     for module in set(re.findall(r"`python -m ([\w.]+)", text)):
         assert find_spec(module), module
+
+
+def defined(file: Path) -> set[str]:
+    """Return the names that a module defines at its top, and those that its classes do, each behind its class."""
+    found = set()
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        for one, prefix in (
+            (node, ""),
+            *((inner, f"{node.name}.") for inner in getattr(node, "body", ()) if isinstance(node, ast.ClassDef)),
+        ):
+            if isinstance(one, ast.ClassDef | ast.FunctionDef):
+                found.add(prefix + one.name)
+            elif isinstance(one, ast.Assign | ast.AnnAssign):
+                targets = one.targets if isinstance(one, ast.Assign) else [one.target]
+                found |= {prefix + target.id for target in targets if isinstance(target, ast.Name)}
+    return found
+
+
+def test_the_files_and_names_to_which_the_architecture_leads_are_there() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w/]+\.py): ([\w., ]+)`", text)
+    assert len(named) > 40
+    missing = [
+        f"{file}: {name}"
+        for file, names in named
+        for name in names.split(", ")
+        if not (ROOT / file).exists() or name not in defined(ROOT / file)
+    ]
+    assert missing == []

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from math import inf
 from typing import TypeAlias
 
 from planner.language import DomainError
@@ -102,6 +103,7 @@ class AmountTable:
         }
         self.place = {s: i for i, s in enumerate(symbol for symbol in self.now if symbol.situation in changed)}
         self.first = tuple(self.now[symbol] for symbol in self.place)
+        self.quantities = [quantity for s in self.place if (quantity := situations[s.situation].quantity) is not None]
         self.bits: dict[tuple[Linear, str], int] = {}
         self._measures: dict[str, Mapping[tuple[str, ...], Exact]] = {}
 
@@ -164,10 +166,29 @@ class AmountTable:
             if not difference.terms:
                 found.append(() if COMPARING[upward](Fraction(difference.constant), Fraction(0)) else None)
                 continue
+            decided = self._decided(difference, upward)
+            if decided is not None:
+                found.append(() if decided else None)
+                continue
             if (difference, upward) not in self.bits:
                 self.bits[difference, upward] = fresh()
             found.append((self.bits[difference, upward],))
         return tuple(found)
+
+    def _decided(self, difference: Linear, sign: str) -> bool | None:
+        """Return whether a difference is always, or never, so whatever its amounts can be; None if that depends on them."""
+        least: float | Exact = difference.constant
+        most = least
+        for place, factor in difference.terms:
+            quantity = self.quantities[place]
+            low, high = (quantity.least, quantity.most) if factor > 0 else (quantity.most, quantity.least)
+            least += -inf if low is None else low * factor
+            most += inf if high is None else high * factor
+        if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
+            return False
+        if sign != "=" and (least > 0 or (least == 0 and sign == ">=")):
+            return True
+        return None
 
     def opposite(self, bit: int, fresh: Callable[[], int]) -> list[tuple[int, ...] | None] | None:
         """Return the alternatives of which one must hold for a comparison's bit not to be set; None if it is no comparison's."""
