@@ -134,7 +134,7 @@ def test_a_world_with_amounts_is_carried_out_to_its_goal() -> None:
 
 
 def test_what_no_amount_can_be_is_known_before_any_state_is_looked_at() -> None:
-    problem = pouring("1", 2, Fraction(5))  # the jug holds two servings
+    problem = pouring("1", 2, Fraction(5))  # the jug holds four servings
     outcome = plan_level(problem, 2)
     assert outcome.status is Status.UNSOLVABLE
     assert outcome.search[2].expanded == 0
