@@ -79,8 +79,11 @@ def fingerprint(embodiment: Embodiment) -> str:
     for robot in embodiment.robots:
         values = _told(asdict(robot), ("driving", "turning") if not robot.driving else ())
         bare = ("gripper", "flange", "mounting")
-        values["hands"] = tuple(_told(hand, () if hand["gripper"] else bare) for hand in values["hands"])
-        values["urdf"] = hashlib.sha256(Path(robot.urdf).read_bytes()).hexdigest()
+        values["hands"] = tuple(
+            {**hand, "gripper": _content(hand["gripper"])} if hand["gripper"] else _told(hand, bare)
+            for hand in values["hands"]
+        )
+        values["urdf"] = _content(robot.urdf)
         parts.append(repr(values))
     parts += [repr(fixture) for fixture in embodiment.fixtures]
     parts += [f"Place(name={p.name!r}, position={p.position!r})" for _, p in sorted(embodiment.places.items())]
@@ -99,6 +102,11 @@ def _heights(embodiment: Embodiment, place: Place, heights: Sequence[float]) -> 
     """Return the heights above a place at which hands take what stands there."""
     said = embodiment.places[place.name].height
     return heights if said is None else (said,)
+
+
+def _content(file: Path | str) -> str:
+    """Return a hash of what is in a file, wherever that is."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:

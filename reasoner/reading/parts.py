@@ -316,7 +316,7 @@ class Parts:
     def group(self, iri: str) -> tuple[Condition, ...]:
         """Return a condition, or those that all have to hold where it says so."""
         found = self.condition(iri)
-        if isinstance(found, AnyOf) and len(found.alternatives) == 1 and not found.negated:
+        if is_a(self.nodes[iri], "AllOf") and isinstance(found, AnyOf) and not found.negated:
             return found.alternatives[0]
         return (found,)
 
