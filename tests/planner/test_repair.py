@@ -1,5 +1,7 @@
 """Repair keeps what is still valid, and is a plan; where it is worse than replanning it gives way."""
 
+import random
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +16,7 @@ from planner.validation import successor
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.symbols import Problem, State, Symbol
-from worlds.families import tabletop
+from worlds.families import family, tabletop
 
 
 @cache
@@ -156,3 +158,61 @@ def test_a_limit_of_time_is_kept_to() -> None:
     begun = replace(serving(), initial=after(serving().initial, planned().steps[0].steps[:1]))
     assert mend(begun, (), begun, using=using(), limits=Limits(seconds=-1.0)).steps is None
     assert mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None
+
+
+def rest_of(steps: Sequence[Step], done: int) -> tuple[Step, ...]:
+    """Return what is left to do of steps after some of their primitives."""
+    found = []
+    for step in steps:
+        many = len(Plan((step,)).primitives)
+        if done < many:
+            found.append(replace(step, steps=rest_of(step.steps, done)) if done else step)
+        done = max(done - many, 0)
+    return tuple(found)
+
+
+def carried_out(problem: Problem, state: State, steps: Sequence[Step]) -> State:
+    for step in Plan(tuple(steps)).primitives:
+        following = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
+        assert following is not None, step
+        state = following
+    return state
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "kept", "cost", "changed"),
+    [
+        ("served", 4, 6, 167, 60),
+        ("swap", 6, 5, 246, 128),
+        ("full", 4, 8, 107, 48),
+        ("handover", 5, 7, 246, 86),
+        ("blocked", 5, 8, 184, 38),
+    ],
+)
+def test_whatever_is_moved_whenever_little_is_done_otherwise(
+    name: str, n: int, kept: int, cost: float, changed: int
+) -> None:
+    """Of eight interruptions somewhere in a plan as many are repaired, at no more cost, with no more steps dropped or added."""
+    problem = family(name, n)
+    uses = compiled(problem)
+    whole = plan(problem, using=uses).plan
+    assert whole is not None
+    repaired, spent, different = 0, 0.0, 0
+    for seed in range(8):
+        draw = random.Random(seed)
+        done = draw.randrange(len(whole.primitives) - 1)
+        rest, state = rest_of(whole.steps, done), carried_out(problem, problem.initial, whole.primitives[:done])
+        stand = {s: v for s, v in state.items() if s.situation == "LOCATION" and v != "in_hand"}
+        moved = draw.choice(sorted(stand))
+        place = draw.choice(sorted({*problem.classes["Location"]} - {*stand.values(), "in_hand"}))
+        now = replace(problem, initial={**state, moved: place})
+        mended = mend(now, rest, replace(problem, initial=state), using=uses)
+        assert mended.steps is not None
+        end = carried_out(problem, now.initial, mended.steps)
+        assert all(end[symbol] == value for symbol, value in problem.goal.items())
+        repaired += mended.kind == "repair"
+        spent += mended.cost
+        different += sum(difference(rest, mended.steps))
+    assert repaired >= kept
+    assert spent <= cost
+    assert different <= changed
