@@ -45,15 +45,16 @@ class Linear:
         """Return what it comes to, as a cost."""
         return float(self.of(vector))
 
-    def least(self, quantities: Sequence[Quantity]) -> float:
-        """Return what it comes to at least, none below zero, where each amount keeps to its bounds."""
-        total = self.constant
+    def bounds(self, quantities: Sequence[Quantity]) -> tuple[float | Exact, float | Exact]:
+        """Return what it comes to at least and at most, where each amount keeps to its bounds."""
+        least: float | Exact = self.constant
+        most = least
         for place, factor in self.terms:
-            limit = quantities[place].least if factor > 0 else quantities[place].most
-            if limit is None:
-                return 0.0
-            total += factor * limit
-        return max(float(total), 0.0)
+            quantity = quantities[place]
+            low, high = (quantity.least, quantity.most) if factor > 0 else (quantity.most, quantity.least)
+            least += -inf if low is None else low * factor
+            most += inf if high is None else high * factor
+        return least, most
 
     def plus(self, other: Linear, times: Exact = 1) -> Linear:
         """Return the sum with another, that one multiplied."""
@@ -177,13 +178,7 @@ class AmountTable:
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
         """Return whether a difference is always, or never, so whatever its amounts can be; None if that depends on them."""
-        least: float | Exact = difference.constant
-        most = least
-        for place, factor in difference.terms:
-            quantity = self.quantities[place]
-            low, high = (quantity.least, quantity.most) if factor > 0 else (quantity.most, quantity.least)
-            least += -inf if low is None else low * factor
-            most += inf if high is None else high * factor
+        least, most = difference.bounds(self.quantities)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
         if sign != "=" and (least > 0 or (least == 0 and sign == ">=")):

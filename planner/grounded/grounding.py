@@ -32,7 +32,6 @@ from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
 from planner.plan import Reason
-from reasoner.amounts import Quantity
 from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
@@ -365,12 +364,11 @@ class _Assembly:
                 found += [replace(move, when=when) for move in moves[relaxed]]
             return tuple(sorted(found, key=lambda move: move.position))
 
-        quantities = [reached.problem.domain.situations[symbol.situation].quantity for symbol in table.place]
         amounts = (
             Amounts(
                 tuple(table.place),
                 table.first,
-                [quantity for quantity in quantities if quantity is not None],
+                table.quantities,
                 table.bits,
                 formulas.size,
                 moved,
@@ -415,7 +413,7 @@ class _Assembly:
             more = zip(schema.terms[parameters:], words[parameters:], strict=True)
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
-        costs, prices = self._costs(bases, rows, first, [one for one in quantities if one is not None])
+        costs, prices = self._costs(bases, rows, first)
         # Derived bits in the relaxed task: an operator of no cost per alternative, owned by nobody.
         need, add, owner = _with_derived(need, add, owner, cases)
         return Task(
@@ -439,7 +437,7 @@ class _Assembly:
         )
 
     def _costs(
-        self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int], quantities: Sequence[Quantity]
+        self, bases: Sequence[int], rows: Mapping[int, Ints], first: Mapping[int, int]
     ) -> tuple[list[float], dict[int, Linear]]:
         """Return what each operator costs, at least, and what those do whose cost depends on amounts."""
         costs: list[float] = []
@@ -457,7 +455,7 @@ class _Assembly:
                 assert found is not None  # which the preconditions ask
                 if found.terms:
                     prices[operator] = found
-                costs.append(found.least(quantities))
+                costs.append(max(float(found.bounds(self.reached.amounts.quantities)[0]), 0.0))
         return costs, prices
 
     def _initial_bits(self) -> Iterator[int]:
