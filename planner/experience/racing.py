@@ -17,17 +17,11 @@ from planner.experience.chaining import ASKED
 from planner.experience.leading import Guide, by_rules
 from planner.hierarchical import planner as fast
 from planner.hierarchical.serialization import Call, Compiled
-from planner.hierarchical.subproblem import Width
 from planner.plan import LimitError, Limits, Outcome, Status
 from reasoner.symbols import Problem
 
 LEAST = 4
 """So many expansions the first try has, and the next one twice as many."""
-
-
-def nowhere(level: int) -> tuple[Width, ...]:
-    """Return the small world in which nothing is searched, on whatever level."""
-    return (Width(0, spares=0, work=0),)
 
 
 class _Led(Exception):  # noqa: N818 - no error: rules have reached the goals
@@ -71,8 +65,7 @@ def raced(
         most = LEAST << len(tries)
         if not base or (spent + most + 1) * share > base[0].segments.counts[base[0].program.levels[0]].expanded:
             return
-        call = Call(problem, using, base[0].segments.deadline, most)
-        call.refiner.worlds = nowhere  # type: ignore[method-assign]
+        call = Call(problem, using, base[0].segments.deadline, most, searching=False)
         tries.append(call)
         rules = guide(call)
         rules.chains.most_asked = most * ASKED
@@ -103,5 +96,5 @@ def raced(
     if done is not None and improve:
         with suppress(LimitError):
             fast.shorten(done, improve, leave_levels)
-        return replace(outcome, plan=fast.levelled(done), search=search)
+        return replace(outcome, plan=fast.levelled(done), search=search, given_up=tuple(done.given_up))
     return outcome
