@@ -36,9 +36,9 @@ def planned() -> Plan:
     return found
 
 
-def after(state: State, steps: tuple[Step, ...]) -> State:
-    for step in Plan(steps).primitives:
-        following = successor(serving(), serving().domain.behaviors[step.behavior], step.arguments, state)
+def carried_out(problem: Problem, state: State, steps: Sequence[Step]) -> State:
+    for step in Plan(tuple(steps)).primitives:
+        following = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
         assert following is not None, step
         state = following
     return state
@@ -53,7 +53,7 @@ def test_what_comes_out_leads_to_the_goal_from_the_situation_as_it_is(changes: S
     now = replace(serving(), initial={**serving().initial, **changes})
     mended = mend(now, planned().steps, serving(), using=using())
     assert mended.steps is not None
-    end = after(now.initial, mended.steps)
+    end = carried_out(now, now.initial, mended.steps)
     assert all(end[symbol] == value for symbol, value in now.goal.items())
 
 
@@ -133,7 +133,7 @@ def test_who_is_touched_by_a_change_is_named_by_it_before_or_after() -> None:
 def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
     first, *others = planned().steps
     pick, place = first.steps
-    begun = replace(serving(), initial=after(serving().initial, (pick,)))
+    begun = replace(serving(), initial=carried_out(serving(), serving().initial, (pick,)))
     rest = (replace(first, steps=(place,)), *others)
     mended = mend(begun, rest, begun, using=using())
     assert (mended.kind, mended.steps is not None) == ("repair", True)
@@ -141,7 +141,7 @@ def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
     assert difference(rest, mended.steps) == (0, 0)
     anew = mend(begun, rest, begun, using=using(), in_progress=False)
     assert anew.steps is not None
-    end = after(begun.initial, anew.steps)
+    end = carried_out(begun, begun.initial, anew.steps)
     assert all(end[symbol] == value for symbol, value in begun.goal.items())
     assert 0 <= mended.seconds < 60
     assert mended.cost == cost_of(begun, Plan(mended.steps))
@@ -155,7 +155,7 @@ def test_a_limit_of_time_is_kept_to() -> None:
     assert late.outcome.status is Status.GAVE_UP
     assert late.cost == 0
     assert 0 <= late.seconds < 60
-    begun = replace(serving(), initial=after(serving().initial, planned().steps[0].steps[:1]))
+    begun = replace(serving(), initial=carried_out(serving(), serving().initial, planned().steps[0].steps[:1]))
     assert mend(begun, (), begun, using=using(), limits=Limits(seconds=-1.0)).steps is None
     assert mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None
 
@@ -169,14 +169,6 @@ def rest_of(steps: Sequence[Step], done: int) -> tuple[Step, ...]:
             found.append(replace(step, steps=rest_of(step.steps, done)) if done else step)
         done = max(done - many, 0)
     return tuple(found)
-
-
-def carried_out(problem: Problem, state: State, steps: Sequence[Step]) -> State:
-    for step in Plan(tuple(steps)).primitives:
-        following = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
-        assert following is not None, step
-        state = following
-    return state
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_the_laboratory_in_updates_is_under_a_hundred_lines_and_plans_like_its_i
         assert outcome.plan is not None
         plans.append([str(step) for step in outcome.plan.walk()])
     assert plans[0] == plans[1]
-    assert len(plans[0]) <= 9 + 30 + 60
+    assert len(plans[0]) == 8 + 26 + 52
     assert validate([LABORATORY / "lab-scene.ttl"]) == []
 
 
