@@ -27,7 +27,8 @@ from reasoner.names import nearest
 from reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 if TYPE_CHECKING:
-    from reasoner.updates.compiling import Fault, Place
+    from reasoner.updates.compiling import Fault
+    from reasoner.updates.texts import Place
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")

@@ -13,7 +13,7 @@ import pyoxigraph as ox
 
 from reasoner.graph.knowledge import KnowledgeGraph, readable
 from reasoner.names import local_name
-from reasoner.updates.compiling import Place
+from reasoner.updates.texts import Place
 from reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"

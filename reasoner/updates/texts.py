@@ -1,0 +1,82 @@
+"""What an update is read with: its text with the prefixes of its file, its places, and the properties that it can speak of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from reasoner.names import local_name
+
+Ask = Callable[[str], Sequence[Sequence[Any]]]
+"""Returns the rows of a query."""
+
+VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
+  { ?term a/rdfs:subClassOf* :SituationType . BIND("situation" AS ?kind) OPTIONAL { ?term :valueProperty ?other } }
+  UNION { ?other a owl:FunctionalProperty . ?term :valueProperty ?other . BIND("functional" AS ?kind) }
+  UNION { ?term a/rdfs:subClassOf* :Relation . BIND("relation" AS ?kind) }
+  UNION { ?term a/rdfs:subClassOf* :Amount . BIND("amount" AS ?kind) }
+  UNION { ?term a/rdfs:subClassOf* :Relation . BIND("measure" AS ?kind)
+    { ?term a owl:DatatypeProperty } UNION { ?term :unit ?unit } UNION { ?fact :relation ?term ; :amount ?number } }
+}"""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something stands in the update of a behaviour; line and column count from 1."""
+
+    behavior: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        """Return it as messages have it."""
+        return f"line {self.line}, column {self.column} of the update of {local_name(self.behavior)}"
+
+
+@dataclass(frozen=True)
+class Update:
+    """The text of an update, with the prefixes that its file has."""
+
+    behavior: str
+    text: str
+    prefixes: Mapping[str, str]
+
+    def place(self, at: int) -> Place:
+        """Return line and column of a character."""
+        before = self.text[:at]
+        return Place(self.behavior, before.count("\n") + 1, at - (before.rfind("\n") + 1) + 1)
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """The properties that an update can speak of, as IRIs.
+
+    `properties` leads from a value property to its situation type; `functional` are those of one value at a time; `bare` are
+    the situation types without a property, which stand for one themselves; `amounts` are the situation types, and `measures`
+    the relations, that give numbers.
+    """
+
+    properties: Mapping[str, str]
+    functional: Collection[str]
+    bare: Collection[str]
+    relations: Collection[str]
+    amounts: Collection[str]
+    measures: Collection[str]
+
+    def numeric(self, prop: str) -> bool:
+        """Tell whether a property, or what stands for one, gives numbers."""
+        return prop in self.measures or self.properties.get(prop, prop) in self.amounts
+
+    @classmethod
+    def read(cls, ask: Ask) -> Vocabulary:
+        """Return that of a graph."""
+        rows = [[part.value if part is not None else "" for part in row] for row in ask(VOCABULARY)]
+        return cls(
+            properties={prop: term for kind, term, prop in rows if kind == "situation" and prop},
+            functional={prop for kind, _, prop in rows if kind == "functional"},
+            bare={term for kind, term, prop in rows if kind == "situation" and not prop},
+            relations={term for kind, term, _ in rows if kind == "relation"},
+            amounts={term for kind, term, _ in rows if kind == "amount"},
+            measures={term for kind, term, _ in rows if kind == "measure"},
+        )
