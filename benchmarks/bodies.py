@@ -5,7 +5,7 @@
     python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
 
 A line per rollout goes to confab-out/bodies.jsonl, with what tells its code from another; a run that was stopped goes on where
-it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 40000 are for reporting only.
+it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 70000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -30,9 +31,9 @@ from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
 
 KEPT = Path("confab-out/bodies.jsonl")
-DEVELOPMENT, REPORTING, COUNT = 7000, 40000, 100
-NOISE = (0, 4, 8)
-"""Millimetres of standard deviation on every perceived position."""
+DEVELOPMENT, REPORTING = 7000, 70000
+NOISE = {0: 100, 4: 100, 8: 20}
+"""Millimetres of standard deviation on every perceived position, and how many rollouts of each task are wanted with it."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
 """What a rollout depends on most: where one of these is another one, rollouts begin anew."""
 
@@ -134,11 +135,10 @@ def kept() -> list[dict[str, Any]]:
 def missing(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
     """Yield task, noise and seed of what isn't rolled out yet, ten seeds of everything before the next ten of anything."""
     done = {(one["task"], one["noise"], one["seed"]) for one in kept()}
-    for first in range(REPORTING, REPORTING + COUNT, 10):
-        for noise in NOISE:
-            for name in names:
-                seeds = range(first, first + 10)
-                yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
+    for first in range(0, max(NOISE.values()), 10):
+        for name, (noise, count) in product(names, NOISE.items()):
+            seeds = range(REPORTING + first, REPORTING + min(first + 10, count))
+            yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
 
 
 def run(names: Sequence[str]) -> None:
