@@ -2,7 +2,8 @@
 
 Rule 1: an intervention acts on bodies: a cup that is moved is taken out of the hand, and what is in it goes with it.
 Rule 2: a primitive is stopped where it is as soon as something happens to what it concerns.
-Rule 3: a hand that stands where no fact names its position stands upright and is lifted before anything is reported.
+Rule 3: a hand that stands where no fact names its position, or is empty and lies on its side, stands upright and is lifted
+before anything is reported.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from sim.world import World
 
 STOPPED = 0.02
 """Radians by which a joint stays behind its command if something stops it."""
+
+UPRIGHT = 0.1
+"""Radians by which a hand that stands upright may be tilted."""
 
 PAUSE = 60
 """Simulation steps in which what was moved comes to rest."""
@@ -63,6 +67,7 @@ class LiveWorld:
         """Return the facts that are perceived now."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
+        lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
         for hand in sorted(lost):
             self.retreat(hand)
         return self.world.observe() if lost else seen
@@ -123,15 +128,19 @@ class LiveWorld:
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a hand upright and up, as far as that is possible."""
+        """Bring a hand with a load upright and up, as far as that is possible, and an empty one home by whatever way there is."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
-        upright = tilt_of(self.world.hands[hand].frame()[0]) < 0.1
-        for name in ("lift",) if upright else ("stand_upright", "lift"):
+        loaded = self.world.held(hand) is not None
+        for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):
             try:
                 if name in uses:
-                    perform(self.world, uses[name], {"hand": hand})
+                    homewards = [phase for phase in uses[name].phases if phase.motion == "home" and not loaded]
+                    perform(self.world, replace(uses[name], phases=tuple(homewards) or uses[name].phases), {"hand": hand})
             except SkillError:
                 return
+
+    def _upright(self, hand: str) -> bool:
+        return tilt_of(self.world.hands[hand].frame()[0]) < UPRIGHT
 
     # ------------------------------------------------------------------------------------------------- interfering
 

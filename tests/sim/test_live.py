@@ -80,3 +80,16 @@ def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
     assert done.count("F3_OPEN") == 2
     assert done.count("F3_SHUT") == 1
     assert [change.kind for change in run.episode.replans] == ["repair"]
+
+
+def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
+    """It lies on its side around the handle, where it can't turn: it draws back first."""
+    scene = confab.load("kitchen-corner")
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        live, opening = LiveWorld(world, scene.problem.classes), Step((0,), 0, 3, "F3_OPEN", ("right_hand", "drawer"))
+        live.announce((Intervention(Change.WORLD, (Fact(Symbol("OPENED", ("drawer",)), "false"),), at=1.7),))
+        assert live.execute(opening).code == "interrupted"
+        assert live.observe()[Symbol("OPENED", ("drawer",))] == "false"
+        hand = world.hands["right_hand"]
+        assert abs(hand.measured() - hand.hand.home).max() < 0.03
+        assert live.execute(opening).ok
