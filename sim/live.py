@@ -132,10 +132,12 @@ class LiveWorld:
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):
+            use = uses.get(name)
+            if use is None:
+                continue
+            homewards = tuple(phase for phase in use.phases if phase.motion == "home" and not loaded)
             try:
-                if name in uses:
-                    homewards = [phase for phase in uses[name].phases if phase.motion == "home" and not loaded]
-                    perform(self.world, replace(uses[name], phases=tuple(homewards) or uses[name].phases), {"hand": hand})
+                perform(self.world, replace(use, phases=homewards or use.phases), {"hand": hand})
             except SkillError:
                 return
 
