@@ -12,7 +12,7 @@ Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
 class Definitions:
-    """What is defined, asked one symbol at a time.
+    """What is defined, asked one symbol at a time, and known until `forget`.
 
     Parameters
     ----------
@@ -25,13 +25,20 @@ class Definitions:
         self._given = given
         self._strata = {name: group for group in strata(rules) for name in group}
         self._asking: dict[tuple[str, ...], dict[Cell, bool]] = {}
+        self._known: dict[Cell, bool] = {}
+
+    def forget(self) -> None:
+        """Take notice that something has changed that rules may ask for."""
+        self._known.clear()
 
     def follows(self, cell: Cell) -> bool:
         """Return whether something that is defined holds: whether its rules give it, or what they ask for in turn.
 
         What is asked for while something else is being asked for is put down and counts as false, and all that was put down is
-        tried again until nothing more becomes true.
+        tried again until nothing more becomes true. What is true by then stays so, and all else that was asked for is false.
         """
+        if cell in self._known:
+            return self._known[cell]
         stratum = self._strata[cell[0]]
         asked = self._asking.get(stratum)
         if asked is not None:
@@ -45,6 +52,7 @@ class Definitions:
                 for one in fresh or [one for one in reversed(asked) if not asked[one]]:
                     asked[one] = self._given(*one)
                     grown |= asked[one]
+            self._known |= {one: holds for one, holds in asked.items() if holds or not asked[cell]}
             return asked[cell]
         finally:
             del self._asking[stratum]

@@ -241,6 +241,8 @@ class Facts:
             return
         self.log.append((situation, arguments, old))
         self._values[situation][arguments] = value
+        if self.problem.domain.rules:
+            self._definitions.forget()
         if situation in self._holders:
             self._holders[situation].get(old, {}).pop(arguments, None)
             self._holders[situation].setdefault(value, {})[arguments] = None

@@ -53,6 +53,10 @@ class Reached:
         boolean, of which only the true ones are listed).
     rows : list of Ints
         Per schema, the individuals put in for its terms.
+    changed : set of situation types
+        Those that behaviours change or rules define.
+    made : set of situation types
+        Those that stand for a part of a rule, which nobody has named.
     """
 
     def __init__(self, problem: Problem, level: int, initial: State, most: int, deadline: float | None) -> None:
@@ -65,14 +69,17 @@ class Reached:
         changed = frozenset[str]().union(*(behavior.changes for behavior in behaviors))
         situations, members = dict(problem.domain.situations), problem.members
         self.defined = self.situations.keys() & problem.domain.rules.keys()
+        self.made = frozenset[str]()
         rules = [rule.behavior for name in sorted(self.defined) for rule in problem.domain.rules[name]]
         if rules:
             changed |= self.defined
             rules, made = rules_apart(rules, changed)
             self.situations |= made
             situations |= made
+            self.made = frozenset(made)
             self.defined |= made.keys()
             changed |= made.keys()
+        self.changed = changed
         self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
         self.schemas += [replace(s, rule=True) for rule in rules for s in schemas(rule, situations, changed, members)]
         self.individuals = tuple(dict.fromkeys(self._individuals()))

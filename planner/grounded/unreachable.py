@@ -10,13 +10,27 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from planner.grounded.reachability import Reached
-from planner.grounded.schemas import Atom, Schema
+from planner.grounded.schemas import Atom, Schema, schemas
 from planner.grounded.task import Task
+from planner.levels import said
 from planner.plan import Reason, TooLargeError
-from reasoner.symbols import TRUE, Fact, Symbol
+from reasoner.symbols import (
+    TRUE,
+    Behavior,
+    Condition,
+    EqualityCondition,
+    Fact,
+    Parameter,
+    Symbol,
+    Witness,
+    substituted,
+)
 
 DEPTH = 6
 MOST_ROWS = 1_000_000
+ONE = "?one"
+"""Who is counted."""
+WORDS = ("none", "one", "two", "three", "four", "five")
 
 
 def unreachable(reached: Reached, goal: Fact) -> Reason:
@@ -39,21 +53,21 @@ def blocked(task: Task) -> Reason:
                 for bit in add:
                     reached |= 1 << bit
     wanted, seen = task.goal & ~reached, set()
-    said: list[str] = []
+    chain: list[str] = []
     terms: list[str] = []
-    while wanted and len(said) <= DEPTH:
+    while wanted and len(chain) <= DEPTH:
         bit = (wanted & -wanted).bit_length() - 1
         fact = task.facts[bit] if bit < len(task.facts) else task.complements.get(bit)
         if fact is not None:
-            said.append(str(fact) if bit < len(task.facts) else f"the end of {fact}")
+            chain.append(str(fact) if bit < len(task.facts) else f"the end of {fact}")
             terms += _words(fact)
         seen.add(bit)
         missing = [need & ~reached for need, add in ways if bit in add]
         wanted = min(missing, key=int.bit_count, default=0)
         if any(wanted >> other & 1 for other in seen):
             break
-    because = "".join(f", which needs {what}" for what in said[1:])
-    return Reason(f"{said[0] if said else 'the goal'} can't be reached{because}", tuple(dict.fromkeys(terms)))
+    because = "".join(f", which needs {what}" for what in chain[1:])
+    return Reason(f"{chain[0] if chain else 'the goal'} can't be reached{because}", tuple(dict.fromkeys(terms)))
 
 
 def _words(fact: Fact) -> tuple[str, ...]:
@@ -67,11 +81,14 @@ def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str,
     whole = not any(word.startswith("?") for word in _words(goal))
     if situation is None or (whole and not situation.boolean and goal.symbol not in reached.initial):
         return f"there is no {goal.symbol} on level {reached.level}", ()
+    if whole and (few := _too_few(reached, goal.symbol)):
+        return few
     found = []
     for schema in reached.schemas:
         for _, effect in schema.effects:
             if effect.situation != name:
                 continue
+            schema = _opened(reached, schema)
             terms = _unified(reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value))
             if terms is not None:
                 found.append((schema, _core(reached, schema, terms)))
@@ -89,6 +106,58 @@ def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str,
             more, others = _because(reached, deeper, above | {goal})
             return f"{text}: {more}", (schema.behavior.name, *words, *others)
     return text, (schema.behavior.name, *words)
+
+
+def _too_few(reached: Reached, goal: Symbol) -> tuple[str, tuple[str, ...]] | None:
+    """Return how many a rule of a goal asks for and how many there can be, where these are fewer."""
+    for rule in reached.problem.domain.rules.get(goal.situation, ()):
+        names = dict(zip((parameter.name for parameter in rule.parameters), goal.arguments, strict=True))
+        for condition in rule.conditions:
+            many, kind, own = _counted(substituted(condition, names))
+            if many < 2:
+                continue
+            one = Behavior("", reached.level, (Parameter(ONE, kind),), rule.variables, own, ())
+            (schema,) = schemas(one, reached.situations, reached.changed, reached.problem.members)
+            try:
+                there = {row[0] for rows in reached.joined(schema) for row in rows.tolist()}
+            except TooLargeError:
+                continue
+            if len(there) < many:
+                each = " and ".join(said(substituted(c, {ONE: "each"})) for c in own)
+                what = f"{goal.situation} asks for {WORDS[many]} {kind}, {each}; there can be {WORDS[len(there)]}"
+                return what, (goal.situation, kind)
+    return None
+
+
+def _counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
+    """Return how many individuals of a class a condition asks for, each told apart from the others, and what of each."""
+    before: list[str] = []
+    found: tuple[str, tuple[Condition, ...]] = ("", ())
+    while isinstance(condition, Witness) and not condition.negated and len(before) < len(WORDS) - 1:
+        apart = {EqualityCondition(condition.variable, other, negated=True) for other in before}
+        own = [c for c in condition.conditions if c not in apart]
+        nested = own.pop() if own and isinstance(own[-1], Witness) and own[-1].kind == condition.kind else None
+        one = condition.kind, tuple(substituted(c, {condition.variable: ONE}) for c in own)
+        if before and (one != found or not apart <= {*condition.conditions}):
+            break
+        found = one
+        before.append(condition.variable)
+        condition = nested
+    return len(before), *found
+
+
+def _opened(reached: Reached, schema: Schema) -> Schema:
+    """Return a schema with what its rule says in the place of parts of the rule that have a name of their own."""
+    atoms, kinds = list(schema.atoms), dict(schema.kinds)
+    for atom in atoms:  # which grows
+        if atom.table[1] in reached.made:
+            part = next(s for s in reached.schemas if s.behavior.name == atom.table[1])
+            names = dict(zip(part.effects[0][1].arguments, atom.terms, strict=True))
+            names = {t: names.get(t, f"{t}/{len(atoms)}") for t in part.kinds}
+            kinds |= {names[t]: kind for t, kind in part.kinds.items() if names[t] not in kinds}
+            atoms += [replace(a, terms=tuple(names.get(t, t) for t in a.terms)) for a in part.atoms]
+    own = tuple(atom for atom in atoms if atom.table[1] not in reached.made)
+    return replace(schema, atoms=own, kinds=kinds)
 
 
 def _unified(reached: Reached, schema: Schema, terms: Sequence[str], words: Sequence[str]) -> dict[str, str] | None:
@@ -144,8 +213,8 @@ def _said(schema: Schema, core: Sequence[Atom]) -> str:
         if right.startswith("?"):
             return f"{left} {relation} no {schema.kinds[right]}"
         return f"{relation}({left}, {right}) doesn't hold"
-    said = " and ".join(f"{a.table[1]}({', '.join(_term(schema, t) for t in a.terms)})" for a in core)
-    return f"{said} can't be" if len(core) == 1 else f"nothing satisfies {said}"
+    facts = " and ".join(f"{a.table[1]}({', '.join(_term(schema, t) for t in a.terms)})" for a in core)
+    return f"{facts} can't be" if len(core) == 1 else f"nothing satisfies {facts}"
 
 
 def _term(schema: Schema, term: str) -> str:

@@ -535,11 +535,13 @@ def _facts(
         else:
             stated[Symbol(situation, pair[:1])].add(pair[1])
     facts = Parts(tuples, names, set(), set(), Definitions({}, {}, names))
+    of_tuples: dict[str, tuple[str, tuple[str, ...]]] = {}
     for iri, node in tuples.items():
         if CORE + "relation" in node:
             individuals = (*facts.arguments(iri), *(names.short(v) for v in facts.values(iri, "value")))
             relation, amount = names.short(facts.one(iri, "relation")), facts.decimal(iri, "amount")
             if amount is None:
+                of_tuples[iri] = relation, individuals
                 relations[relation].add(individuals)
             else:
                 numbered[relation].add((*individuals, written(amount)))
@@ -563,7 +565,8 @@ def _facts(
                 others = "conditions" if relation in asked else "others"
                 raise KnowledgeError(
                     f"{relation} of {', '.join(row)} names {len(row)} individuals; {others} name {many}; state what is lacking, "
-                    "or drop what is too much"
+                    "or drop what is too much",
+                    next((iri for iri, said in of_tuples.items() if said == (relation, row)), ""),
                 )
     return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
 

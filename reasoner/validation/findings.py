@@ -103,7 +103,7 @@ class Places:
         """Return a finding on a node, with its file, line and label filled in; of one that an update says, its place in that."""
         if node in self.graph.written:
             return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
-        file = self._files.get(node) or self.graph.path
+        file = self._files.get(node) or self._naming(node) or self.graph.path
         return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
 
     def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
@@ -126,6 +126,11 @@ class Places:
         found = [quad.object for quad in quads if isinstance(quad.object, ox.Literal)]
         found.sort(key=lambda literal: (literal.language != "en", literal.value))
         return found[0].value if found else local_name(node)
+
+    def _naming(self, node: str) -> Path | None:
+        """Return a file that names a node of which no file says anything."""
+        texts = (file for file in self.graph.files.values() if file.suffix == ".ttl")
+        return next((file for file in texts if f"<{node}>" in file.read_text(encoding="utf-8")), None)
 
     @cached_property
     def _files(self) -> Mapping[str, Path]:

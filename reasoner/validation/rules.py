@@ -5,6 +5,7 @@ Each rule is a function from a `Case` to findings, written as (node, what, why, 
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -43,6 +44,10 @@ Fault = tuple[str, str, str, str]
 """Node, what, why, remedy."""
 
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"))
+ATOMS = (SWRL + "argument1", SWRL + "argument2")
+EVERY_OTHER = re.compile(r"\?each\d")
+"""Who a class stands for where another one stands for somebody already (`reasoner.reading.parts`)."""
+OF_A_RULE = "a variable or an individual of a SWRL rule"
 PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
 
 
@@ -89,7 +94,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
             subject.value if isinstance(subject, ox.NamedNode) else iri,
             f"{name} is used as {wanted}, but isn't declared as one{nearest(name, known)}",
             "an unknown name is read as a new one, without a warning; what was meant by it is lost",
-            f"mend the name, or declare <{iri}>",
+            f"mend the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )
 
 
@@ -122,6 +127,8 @@ def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str
         return
     if predicate in (RDF + "type", RDFS + "subClassOf", OWL + "disjointWith", OWL + "someValuesFrom"):
         yield value.value, "a class", {OWL + "Class", RDFS + "Datatype"}
+    elif predicate in ATOMS:
+        yield value.value, OF_A_RULE, set()
     elif OWL + "ObjectProperty" in kinds_of_predicate or predicate in (RDF + "first", OWL + "hasValue"):
         yield value.value, "a term", set()
     elif predicate in (OWL + "onProperty", RDFS + "subPropertyOf", OWL + "inverseOf"):
@@ -265,6 +272,26 @@ def _terms(condition: Condition) -> set[str]:
     values = [value for name, value in vars(condition).items() if name != "negated"]
     flat = [term for value in values for term in (value if isinstance(value, tuple) else (value,))]
     return {term for term in flat if term.startswith("?")}
+
+
+def other_kinds_in_when(case: Case) -> Iterator[Fault]:
+    """Find effects on all of a class whose `when` asks something of all of another one that shares individuals with it."""
+    if case.reading is None:
+        return
+    problem = case.reading.problem
+    for name, behavior in problem.domain.behaviors.items():
+        for effect in behavior.every_effect:
+            for condition in effect.when:
+                if not isinstance(condition, Witness) or not EVERY_OTHER.match(condition.variable):
+                    continue
+                kind = condition.kind
+                if problem.members(kind) & {*effect.arguments}:
+                    yield (
+                        case.reading.names.iri(name),
+                        f"{name} changes {effect.situation} of each of a class where something is so of every {kind}",
+                        f"in :when only the effect's own class means the same individual; {kind} means all of its individuals",
+                        f"name the effect's class there, and ask by a class condition that it is a {kind}",
+                    )
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
@@ -727,6 +754,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "missing-all-different": individuals_not_different,
     "file-name-and-iri": files_and_iris,
     "undetermined-variable": undetermined_variables,
+    "other-kind": other_kinds_in_when,
     "unreachable": unreachable_behaviors,
     "value-gap": gaps_of_values,
     "crowded": crowded_places,
@@ -736,7 +764,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "number-missing": numbers_missing,
     "defined": defined,
 }
-WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing"})
+WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing", "other-kind"})
 """Rules of what can be planned with all the same."""
 REMARKS = frozenset({"defined"})
 """Rules that tell of what isn't wrong."""

@@ -145,3 +145,17 @@ def test_each_defined_situation_type_is_told_to_be_derived_or_static(tmp_path: P
         "STOWED is derived: in every state it follows from LADEN",
         "HUNG is static: no behaviour changes what it follows from",
     }
+
+
+def test_what_a_swrl_rule_names_is_a_declared_variable_or_an_individual(tmp_path: Path) -> None:
+    rule = SWRL + implies(":Stowed ?prop", ":Prop ?prop", "different ?prop ?porp")
+    (said,) = theatre_with(tmp_path, "", "", rule.replace("<urn:swrl:var#porp> a swrl:Variable .", ""))
+    assert (said.rule, Path(said.file).stem) == ("undeclared-term", "theatre")
+    assert "porp is used as a variable or an individual of a SWRL rule, but isn't declared as one" in said.what
+    assert said.remedy == "mend the name, or declare <urn:swrl:var#porp> a swrl:Variable"
+    assert "urn:swrl:var#porp" in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
+
+
+def test_a_cost_in_quotes_is_no_negative_one(tmp_path: Path) -> None:
+    (said,) = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ':PUSH c:cost "2" ; a owl:NamedIndividual,', "")
+    assert (said.rule, local_name(said.node)) == ("not-a-number", "PUSH")

@@ -18,10 +18,13 @@ from reasoner.symbols import (
     TRUE,
     Behavior,
     ClassCondition,
+    Condition,
     EqualityCondition,
     Fact,
+    Parameter,
     Problem,
     RelationCondition,
+    Rule,
     SituationType,
     Symbol,
     Witness,
@@ -412,3 +415,24 @@ def test_no_proof_is_wrong_in_random_worlds_and_many_are_found(part: int) -> Non
 
 FOUND = [(8, 3), (7, 4)]
 """How many of forty random worlds each of the proofs refutes."""
+
+
+def test_what_counts_says_how_many_there_can_be_and_parts_of_rules_have_no_names() -> None:
+    def dry(cup: str, *more: Condition) -> Witness:
+        return Witness(cup, "Cup", (has("DRY", cup, TRUE), *more))
+
+    two = dry("?a", dry("?b", EqualityCondition("?b", "?a", negated=True)))
+    clean = Witness("?a", "Cup", (has("CLEAN", "?a", TRUE), Witness("?b", "Cup", (has("AT", "?b", "attic"),))))
+    for rule, why_not in (
+        (two, "PAIR asks for two Cup, each DRY true; there can be one"),
+        (
+            clean,
+            "PAIR could make it so, but AT(some Cup, attic) can't be: PUT could make it so, but no Hand canReach attic",
+        ),
+    ):
+        dry1 = behavior("DRY", 1, "", [has("CLEAN", "cup1", TRUE)], [becomes("DRY", "cup1", TRUE)])
+        problem = kitchen({"PAIR tray": TRUE}, behaviors=[PUT, WASH, dry1])
+        pair = SituationType("PAIR", ("Tray",), "Truth", boolean=True)
+        rules = {"PAIR": (Rule("PAIR", (Parameter("?t", "Tray"),), (), (rule,)),)}
+        domain = replace(problem.domain, situations={**problem.domain.situations, "PAIR": pair}, rules=rules)
+        assert why_grounded(replace(problem, domain=domain)) == f"tray PAIR true can't be reached: {why_not}"

@@ -301,5 +301,6 @@ def test_a_tuple_that_lacks_an_individual_is_refused(tmp_path: Path) -> None:
             )
             file.write(f":n{number} a owl:NamedIndividual, c:SituatedObjectInstance ; c:relation :near ; {roles} .\n")
         file.write(":near a owl:NamedIndividual, c:Relation .\n")
-    with pytest.raises(KnowledgeError, match="names 2 individuals; others name 3"):
+    with pytest.raises(KnowledgeError, match="names 2 individuals; others name 3") as said:
         read(load(scene))
+    assert said.value.node.endswith("#n1")
