@@ -15,6 +15,7 @@ variables and its changes, or None if it isn't applicable now. A new kind of con
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from typing import Any, TypeAlias
 
 from planner.amount_transitions import amount, change, comparison, settled
@@ -285,18 +286,23 @@ class Writer:
         """Return the test that a term is of a class."""
         return f"{written(term)} in {self.kind(kind)}"
 
-    def adjacent(self, relation: str, arguments: Sequence[str], term: str) -> tuple[str, float]:
-        """Return an iterable expression for those that stand in a relation to the other arguments, and how many these are."""
+    def adjacent(
+        self, relation: str, arguments: Sequence[str], term: str, unbound: AbstractSet[str] = frozenset()
+    ) -> tuple[str, float]:
+        """Return an iterable expression for those that stand in a relation to the other arguments, and how many these are.
+
+        Of the others those that are unbound may be any.
+        """
         position = list(arguments).index(term)
-        name = identifier("adjacent", relation) + f"_{position}"
+        known = [i for i, other in enumerate(arguments) if i != position and other not in unbound]
+        name = "_".join(map(str, (identifier("adjacent", relation), position, *known)))
         if name not in self.constants:
-            table: dict[tuple[str, ...], list[str]] = {}
+            table: dict[tuple[str, ...], dict[str, None]] = {}
             for row in sorted(self.problem.relations.get(relation, ())):
-                table.setdefault(row[:position] + row[position + 1 :], []).append(row[position])
+                table.setdefault(tuple([row[i] for i in known]), {})[row[position]] = None
             self.constants[name] = {others: tuple(found) for others, found in table.items()}
             self._fan[name] = sum(map(len, table.values())) / max(len(table), 1)
-        others = [*arguments[:position], *arguments[position + 1 :]]
-        return f"{name}.get({tuple_written(map(written, others))}, ())", self._fan[name]
+        return f"{name}.get({tuple_written(written(arguments[i]) for i in known)}, ())", self._fan[name]
 
     def kind(self, kind: str) -> str:
         """Return the name of a class's individuals as a set."""

@@ -263,9 +263,10 @@ class Program:
             match condition:
                 case RelationCondition(relation, arguments, False):
                     unbound = {a for a in arguments if a.startswith("?")} - hard
-                    if len(unbound) == 1 and arguments.count(term := unbound.pop()) == 1 and term in free:
-                        text, fan = self.writer.adjacent(relation, arguments, term)
-                        found.append((fan, term, self._pick(text, term, behavior)))
+                    for term in free if len(unbound) == 1 or len(unbound) < len(arguments) else ():
+                        if term in unbound and arguments.count(term) == 1:
+                            text, fan = self.writer.adjacent(relation, arguments, term, unbound)
+                            found.append((fan, term, self._pick(text, term, behavior)))
                 case ValueCondition(situation, (term,), value, False) if term.startswith("?") and term not in hard:
                     constant = self.writer.listed(situation, value) and (not value.startswith("?") or value in hard)
                     if constant and not self.changeable(situation, (term,), kinds, behavior):

@@ -64,8 +64,13 @@ class Alike:
         Of a large group the first and the last few are looked at: what is used up is used up from one end.
         """
         found = list(known)
+        states: dict[int | None, set[tuple[str | None, ...]]] = {}
+        for one in known:
+            states.setdefault(self.sort.get(one), set()).add(self._state(one, now))
         for group in self.groups(members):
-            seen = {self._state(one, now) for one in found if self.sort.get(one) == self.sort.get(group[0])}
+            seen = states.setdefault(self.sort.get(group[0]), set())
+            if seen and len(group) == 1:
+                continue
             for one in group if len(group) <= 2 * ENDS else (*group[:ENDS], *group[-ENDS:]):
                 state = self._state(one, now)
                 if state not in seen:

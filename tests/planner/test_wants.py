@@ -1,15 +1,18 @@
 """What is read off a state once holds as long as the state does, and what is asked of one individual holds of its likes."""
 
 import random
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.serialization import Call, Compiled
 from planner.hierarchical.subgoals import Env, Wants
-from reasoner.symbols import Condition, Problem
+from reasoner.symbols import Condition, Problem, RelationCondition, SituationType
 from worlds.families import family, random_table
 from worlds.rooms import rooms
+from worlds.writing import becomes, behavior, has, world
 
 CASES = [("served", family("served", 6)), ("full", family("full", 6)), ("handover", family("handover", 8))]
 CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_006)] + [("rooms", rooms(6, 1))]
@@ -57,3 +60,30 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
                 assert done is not None
                 field.segments.apply(done[1])
     assert asked or not problem.goal
+
+
+def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A turntable has four of many spots: nobody asks of any four spots whether they are its."""
+    spots = tuple(f"spot{i}" for i in range(40))
+    tables = tuple(f"table{i}" for i in range(10))
+    rings = frozenset((table, *spots[4 * i : 4 * i + 4]) for i, table in enumerate(tables))
+    at = SituationType("AT", ("Piece",), "Spot")
+    turn = behavior(
+        "TURN", 1, "?piece:Piece ?table:Table ?a:Spot ?b:Spot ?c:Spot ?d:Spot",
+        [has("AT", "?piece", "?a"), RelationCondition("RING", ("?table", "?a", "?b", "?c", "?d"))],
+        [becomes("AT", "?piece", "?b")],
+    )  # fmt: skip
+    classes = {"Piece": ("piece",), "Spot": spots, "Table": tables}
+    problem = world([at], [turn], classes, {"AT piece": spots[8]}, {"AT piece": spots[9]}, relations={"RING": rings})
+    asked: list[tuple[str, ...]] = []
+    picked = Program._picked
+
+    def counted(program: Program, candidates: tuple[str, ...], *how: Any) -> Sequence[str]:
+        asked.append(candidates)
+        return picked(program, candidates, *how)
+
+    monkeypatch.setattr(Program, "_picked", counted)
+    call = Call(problem, Compiled(Program(problem)), None, 100)
+    found = list(call.segments.achieve["TURN", 0]("piece", spots[9]))
+    assert [arguments for arguments, _, _ in found] == [("piece", "table2", *spots[8:12])]
+    assert len(asked) < len(spots)
