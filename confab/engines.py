@@ -28,6 +28,7 @@ from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Reason, Status
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import Deadline
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import Problem, Symbol
 
@@ -51,20 +52,22 @@ def plan_by_engine(
         As unified-planning calls it, e.g. ``fast-downward``; any installed one that takes the problem if left out.
     level : int, optional
     seconds : float, optional
-        What the engine may take, where it can be told.
+        What exporting and the engine may take, where it can be told.
 
     Raises
     ------
     KnowledgeError
         There is no such engine or level, or something is defined or an amount, which this engine doesn't take.
     """
-    began = perf_counter()
+    began, deadline = perf_counter(), Deadline.after(seconds)  # exporting and importing are slow, too
     level = problem.domain.levels[-1] if level is None else level
     if level not in problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
     wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
     exported = to_pddl(wanted, level)
-    name, said, lines = answer(exported.domain, exported.problem, engine, seconds)
+    if deadline.left == 0:  # importing unified-planning takes a second
+        return Outcome(Status.GAVE_UP, None, Reason("timeout"), seconds=perf_counter() - began)
+    name, said, lines = answer(exported.domain, exported.problem, engine, deadline)
 
     def outcome(status: Status, plan: Plan | None = None, reason: str = "") -> Outcome:
         why = Reason(f"{name}: {reason}") if reason else None
@@ -104,7 +107,7 @@ def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
 
-def answer(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
+def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
     """Ask unified-planning for a plan.
 
     Raises
@@ -141,7 +144,7 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
         )
     first = engine or next((name for name in factory.preference_list if name in factory.engines), None)
     if first and issubclass(factory.engine(first), PDDLPlanner) and ":numeric-fluents" not in domain:
-        return first, *_directly(factory.engine(first)(), domain, problem, seconds)
+        return first, *_directly(factory.engine(first)(), domain, problem, deadline)
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
         raise KnowledgeError(f"{said} derived predicates, as what is defined would be; plan without --engine")
@@ -161,7 +164,7 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
                 planner.skip_checks = True  # some say no to action costs, which they take
-                result = planner.solve(task, timeout=seconds)
+                result = planner.solve(task, timeout=deadline.left)
                 name = engine or planner.name
         except UPException as error:
             raise KnowledgeError(f"no engine takes this problem: {' '.join(str(error).split())}") from None
@@ -170,7 +173,7 @@ def answer(domain: str, problem: str, engine: str | None, seconds: float | None)
     return name, result.status.name, lines
 
 
-def _directly(planner: Any, domain: str, problem: str, seconds: float | None) -> tuple[str, list[str]]:
+def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
     """Give the files to an engine that reads PDDL itself; return what became of it, and the steps of its plan.
 
     unified-planning would read and write them anew first: that takes minutes where relations are large, and no derived predicates.
@@ -185,7 +188,7 @@ def _directly(planner: Any, domain: str, problem: str, seconds: float | None) ->
             planner._get_cmd(*map(str, files)), cwd=folder, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True
         )
         try:
-            code = process.wait(seconds)
+            code = process.wait(deadline.left)
         except TimeoutExpired:
             return "TIMEOUT", []
         finally:

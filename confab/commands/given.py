@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,14 +28,17 @@ def load_scene(source: str, iri: str | None = None, deadline: Deadline | None = 
     return with_current_reach(scene, remark)
 
 
-def doubt(scene: Scene) -> None:
-    """Say in one line if `confab validate` would find errors in a scene of the user's own."""
+def doubt(scene: Scene, deadline: Deadline) -> None:
+    """Say in one line if `confab validate` would find errors in a scene of the user's own, as far as there is time to look."""
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT):
         return
+    from reasoner.limits import LimitError
     from reasoner.validation.validate import quick_errors
 
-    errors = quick_errors(scene.knowledge)
+    errors = []
+    with suppress(LimitError), scene.knowledge.until(deadline):
+        errors = quick_errors(scene.knowledge)
     if errors:
         more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
         remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")

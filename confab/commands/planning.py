@@ -113,7 +113,7 @@ def plan(
         show_result(f"{result.save(out)}: {summary(result.outcome)}")
     else:
         show_result(result.json() if as_json else result)
-    doubt(loaded)
+    doubt(loaded, deadline)
     raise Exit(EXIT[result.outcome.status.value])
 
 

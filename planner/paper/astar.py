@@ -15,10 +15,9 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from time import perf_counter
 
 from planner.paper.transitions import Applied, Values
-from planner.plan import Counts, Limits, Status
+from planner.plan import Counts, Limits, OutOfTimeError, Status
 from reasoner.amounts import meets
 
 Goal = Mapping[int, str]
@@ -48,7 +47,6 @@ def a_star(
     rank: Callable[[Values], Callable[[Applied], float]] | None = None,
     bonus: Callable[[float, int], float] = lambda c, n: 0.0,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-    deadline: float | None = None,
 ) -> Found:
     """Search a path from `start` to a state with the values of `goal`.
 
@@ -56,13 +54,11 @@ def a_star(
     ----------
     start : Values
     goal : Goal
-    successors : function of a state to what can be done there
+    successors : function of a state to what can be done there; raises `OutOfTimeError` to end the search
     cost : function of a state and one of them to its cost
     rank : function of a state to the ranking scores of what can be done there (eq. 4), in [0, 1]; None leaves c at 0
     bonus : function of ranking score and depth to the term c of eq. (3)
     limits : Limits
-    deadline : float, optional
-        `time.perf_counter` at which to give up.
 
     Returns
     -------
@@ -80,22 +76,27 @@ def a_star(
             continue  # reached by a cheaper path since
         if not mismatches(state, goal):
             return _reconstruct(came_from, state, counts)
-        if counts.expanded >= limits.expansions or (deadline is not None and perf_counter() > deadline):
+        if counts.expanded >= limits.expansions:
             return Found(Status.GAVE_UP, (), (), counts)
         counts.expanded += 1
         n = depth[state] + 1
         score = rank(state) if rank else None
-        for applied in successors(state):
-            counts.generated += 1
-            next_state, next_g = applied.after, g_state + cost(state, applied)
-            if next_g >= g.get(next_state, float("inf")):
-                continue
-            counts.evaluated += 1
-            c_m = score(applied) if score else None
-            c = bonus(c_m, n) if c_m is not None else 0.0
-            g[next_state], depth[next_state] = next_g, n
-            came_from[next_state] = (state, applied, c_m)
-            heapq.heappush(open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g))
+        try:
+            for applied in successors(state):
+                counts.generated += 1
+                next_state, next_g = applied.after, g_state + cost(state, applied)
+                if next_g >= g.get(next_state, float("inf")):
+                    continue
+                counts.evaluated += 1
+                c_m = score(applied) if score else None
+                c = bonus(c_m, n) if c_m is not None else 0.0
+                g[next_state], depth[next_state] = next_g, n
+                came_from[next_state] = (state, applied, c_m)
+                heapq.heappush(
+                    open_set, (next_g + mismatches(next_state, goal) + c, counts.generated, next_state, next_g)
+                )
+        except OutOfTimeError:
+            return Found(Status.GAVE_UP, (), (), counts)
     return Found(Status.UNSOLVABLE, (), (), counts)
 
 

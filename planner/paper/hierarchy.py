@@ -9,7 +9,7 @@ given the goal itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TypeAlias
@@ -17,7 +17,18 @@ from typing import TypeAlias
 from planner.paper.astar import Found, Goal, a_star, mismatches
 from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
+from planner.plan import (
+    Counts,
+    Limits,
+    Outcome,
+    OutOfTimeError,
+    Plan,
+    Reason,
+    Status,
+    Step,
+    UnsolvableError,
+    renumbered,
+)
 from reasoner.memory.links import Links
 from reasoner.symbols import Fact, GroundBehavior, Problem
 
@@ -245,7 +256,7 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
             if reason := call.proof(call.model.problem, call.expanded - DOUBT, call.deadline):
                 raise UnsolvableError(reason)
         base, marks = state[:size], state[size:]
-        for applied in call.model.successors(grounds, base):
+        for applied in call.model.successors(timely(grounds, call.deadline), base):
             after = applied.after
             if (base, applied.ground) in call.known:
                 refined = call.known[base, applied.ground]
@@ -262,10 +273,17 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
         rank=lambda state: rank(state[:size]),
         bonus=call.constants.bonus,
         limits=call.limits,
-        deadline=call.deadline,
     )
     call.counts[level].add(found.counts)
     return found
+
+
+def timely(grounds: Iterable[GroundBehavior], deadline: float | None) -> Iterator[GroundBehavior]:
+    """Yield quantified behaviours until a deadline: of a thousand things there are so many that one state takes minutes."""
+    for one in grounds:
+        if deadline is not None and perf_counter() > deadline:
+            raise OutOfTimeError("the time limit")
+        yield one
 
 
 def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -97,7 +97,7 @@ class Model:
         variables = [applied.bindings[variable] for variable in self.writer.variables[name]]
         return float(self.prices[name](*applied.ground.arguments, *variables))
 
-    def successors(self, grounds: Sequence[GroundBehavior], values: Values) -> Iterator[Applied]:
+    def successors(self, grounds: Iterable[GroundBehavior], values: Values) -> Iterator[Applied]:
         """Yield what each applicable one of the ground behaviours does, in their order."""
         for ground in grounds:
             applied = self.apply(ground, values)

@@ -21,7 +21,7 @@ from ontology import ROOT
 from ontology import scenes as shipped_scenes
 from reasoner.files import alone, write_whole
 from reasoner.generate import write_scene
-from reasoner.graph.knowledge import KnowledgeError
+from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.limits import Deadline, LimitError
 from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
@@ -640,6 +640,18 @@ def test_the_time_limit_holds_from_the_first_step_on(tmp_path: Path, ask: Ask, m
     code, out, err = ask("plan", tmp_path / "s.ttl", "--time-limit", "0.05", "--mode", mode)
     assert (code, out, err.count("\n")) == (GAVE_UP, "", 1)
     assert re.search("gave up after 0.05 s while .*--time-limit", err)
+
+
+def test_no_look_for_faults_outlasts_the_time_limit(tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked = []
+
+    def slowly(graph: KnowledgeGraph) -> NoReturn:
+        looked.append(graph.deadline.seconds)
+        raise LimitError("gave up")
+
+    monkeypatch.setattr("reasoner.validation.validate.quick_errors", slowly)
+    assert ask("plan", tearoom, "--time-limit", "60")[0] == YES
+    assert looked == [60.0]
 
 
 def test_a_deadline_ends_with_the_call_that_it_was_given_to(tearoom: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from time import sleep
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -19,13 +20,15 @@ from planner.grounded.task import Task
 from planner.plan import Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import Deadline
+from reasoner.pddl.exporting import to_pddl
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse
 
 SCENE = "beverage-serving-moved"
 
 
-def stand_in(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
+def stand_in(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
     """Plan the PDDL that an engine would get, with what is at hand."""
     read = imported(parse(domain, problem))
     task = ground(read.problem)
@@ -131,14 +134,14 @@ def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_
      (:action a :parameters () :effect (and (p) (increase (total-cost) 3))))"""
     problem = "(define (problem x) (:domain d) (:init (= (total-cost) 0)) (:goal (p)) (:metric minimize (total-cost)))"
     try:
-        assert answer(domain, problem, None, 10.0)[1].startswith("SOLVED")
+        assert answer(domain, problem, None, Deadline.after(10.0))[1].startswith("SOLVED")
     except KnowledgeError as error:  # where no engine is installed
         assert "no engine takes this problem" in str(error)
     with pytest.raises(KnowledgeError, match="unified-planning can't read this level"):
-        answer("(define (domain d) (:requirements :numeric-fluents) (:predicates", problem, None, 10.0)
+        answer("(define (domain d) (:requirements :numeric-fluents) (:predicates", problem, None, Deadline.after(10.0))
     with pytest.raises(KnowledgeError, match="no installed engine takes derived predicates"):
         monkeypatch.setattr("unified_planning.engines.factory.Factory.preference_list", [])
-        answer("(define (domain d) (:derived (p) (q)))", problem, None, 10.0)
+        answer("(define (domain d) (:derived (p) (q)))", problem, None, Deadline.after(10.0))
 
 
 def test_what_no_engine_takes_is_said_and_no_time_is_kept_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,6 +168,26 @@ def test_an_engine_is_stopped_at_the_time_limit_with_all_its_processes(tmp_path:
     pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
     late = tmp_path / "late"
     slow = SimpleNamespace(_get_cmd=lambda *_: ["sh", "-c", f"(sleep 1; touch {late}) & wait"])
-    assert engines._directly(slow, "", "", 0.1) == ("TIMEOUT", [])
+    assert engines._directly(slow, "", "", Deadline.after(0.1)) == ("TIMEOUT", [])
     sleep(1.1)
     assert not late.exists()
+
+
+def test_what_exporting_takes_is_taken_from_the_engines_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, left = confab.load(SCENE), list[float | None]()
+    exporting = to_pddl
+
+    def slowly(*given: Any) -> Any:
+        sleep(0.05)
+        return exporting(*given)
+
+    def late(domain: str, problem: str, engine: str | None, deadline: Deadline) -> Answer:
+        left.append(deadline.left)
+        return "e", "TIMEOUT", []
+
+    monkeypatch.setattr(engines, "to_pddl", slowly)
+    monkeypatch.setattr(engines, "answer", late)
+    assert plan_by_engine(scene.problem, None, seconds=0.04).status is Status.GAVE_UP
+    assert left == []
+    assert plan_by_engine(scene.problem, None, seconds=10.0).status is Status.GAVE_UP
+    assert 0 < (left[0] or 0) <= 9.95

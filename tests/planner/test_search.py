@@ -1,12 +1,17 @@
 """A* on toy worlds: states are one-tuples of a digit string, so neither ontology nor physics is needed."""
 
 from collections.abc import Callable, Iterable
+from itertools import count
+
+import pytest
 
 from planner.paper.astar import a_star
 from planner.paper.cogency import PaperConstants
+from planner.paper.hierarchy import plan
 from planner.paper.transitions import Applied, Values
 from planner.plan import Limits, Status
 from reasoner.symbols import GroundBehavior
+from worlds.families import tabletop
 
 
 def graph(
@@ -47,6 +52,15 @@ def test_cycles_end_and_exhaustion_is_unsolvable() -> None:
 def test_the_limit_of_expansions_gives_up_instead_of_claiming_anything() -> None:
     successors, cost = graph({"a": {"b": 1}, "b": {"c": 1}, "c": {"d": 1}})
     assert a_star(("a",), {0: "d"}, successors, cost, limits=Limits(expansions=2)).status is Status.GAVE_UP
+
+
+def test_the_time_limit_ends_a_search_within_one_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = count()
+    for module in ("hierarchy", "astar"):
+        monkeypatch.setattr(f"planner.paper.{module}.perf_counter", lambda: float(next(clock)), raising=False)
+    outcome = plan(tabletop(), limits=Limits(seconds=4.0))
+    assert outcome.status is Status.GAVE_UP
+    assert sum(counts.generated for counts in outcome.search.values()) <= 5
 
 
 def test_a_start_that_is_the_goal_needs_no_step() -> None:
