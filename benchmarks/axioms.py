@@ -1,11 +1,14 @@
 """What follows inside planning beside Fast Downward, which knows axioms: solvability and the least number of steps.
 
 python -m benchmarks axioms
-CONFAB_PROBLEMS=200 …        how many random problems, half of nested boxes, half of rooms that open doors join
+CONFAB_PROBLEMS=200 …        how many random problems of each kind
+CONFAB_KINDS=packing …       only some kinds: packing, gallery, random
+CONFAB_SEED=0 …              the first one's seed
 CONFAB_PEERS=PYTHON …        a Python that has up-fast-downward
 
-The problems are those of the shipped worlds packing and gallery with other individuals, states and goals; Fast Downward gets what
-`confab export` writes of them, and searches by A* without a heuristic.
+The first two kinds are nested boxes and rooms that open doors join: the shipped worlds packing and gallery with other individuals,
+states and goals, of which Fast Downward gets what `confab export` writes. The third is random PDDL (`worlds.axioms`), read by both,
+and by a plain reading that tries everything. Fast Downward searches by A* without a heuristic.
 """
 
 from __future__ import annotations
@@ -23,12 +26,18 @@ from benchmarks.pddl import peers, planners, run
 from planner.plan import Limits, Status
 from planner.solve import Request, solve
 from planner.validation import Facts
+from reasoner.derivation import circular
 from reasoner.graph.knowledge import load
 from reasoner.pddl.exporting import to_pddl
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
 from reasoner.reading.problem import read
 from reasoner.symbols import TRUE, Problem, Symbol
+from worlds.axioms import Plain, axioms
 
 SECONDS = 60.0
+GOAL = "REACH_GOAL"
+"""The behaviour that an imported goal becomes which is no conjunction of facts that change; it costs nothing."""
 
 
 def boxes(problem: Problem, rng: Random) -> Problem:
@@ -83,14 +92,13 @@ def _with(
     return replace(problem, classes=classes, relations=static, initial=initial, goal=goal)
 
 
-def downward(problem: Problem, command: list[str]) -> int | None:
+def downward(domain: str, problem: str, command: list[str]) -> int | None:
     """Return the length of Fast Downward's shortest plan, None if it proves that there is none."""
-    written = to_pddl(problem)
     with TemporaryDirectory() as folder:
-        domain, task = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
-        domain.write_text(written.domain)
-        task.write_text(written.problem)
-        done = run(command, domain, task, cap=int(SECONDS))
+        files = Path(folder) / "domain.pddl", Path(folder) / "problem.pddl"
+        for file, text in zip(files, (domain, problem), strict=True):
+            file.write_text(text)
+        done = run(command, *files, cap=int(SECONDS))
     if done.plan is None and "unsolvable" not in done.output and "no solution" not in done.output:
         raise RuntimeError(done.output[-1500:])
     return None if done.plan is None else len(done.plan)
@@ -103,33 +111,56 @@ def deepest(problem: Problem) -> int:
     return max(sum(facts.value(name, (a, b)) == TRUE for b in problem.classes[other]) for a in problem.classes[one])
 
 
+def made(kind: str, seed: int) -> tuple[Problem, str, str]:
+    """Return a random problem of a kind, and as PDDL."""
+    if kind == "random":
+        domain, text = axioms(Random(seed))
+        return imported(parse(domain, text)).problem, domain, text
+    world = read(load(f"{kind}-small")).problem
+    problem = KINDS[kind](world, Random(seed))
+    written = to_pddl(problem)
+    return problem, written.domain, written.problem
+
+
+KINDS = {"packing": boxes, "gallery": rooms}
+
+
 def main() -> None:
     """Print how many problems agree."""
-    half = int(os.environ.get("CONFAB_PROBLEMS", "200")) // 2
+    count, first = int(os.environ.get("CONFAB_PROBLEMS", "200")), int(os.environ.get("CONFAB_SEED", "0"))
+    kinds = os.environ.get("CONFAB_KINDS", "packing,gallery,random").split(",")
     command = planners(peers())["lama-first"]
     place = command.index("--alias")
     command = [*command[:place], *command[place + 2 :], "--search", "astar(blind())"]
     counts, wrong, seconds = Counter[str](), list[str](), dict.fromkeys(("optimal", "guarded"), 0.0)
-    for name, make in (("packing", boxes), ("gallery", rooms)):
-        world = read(load(f"{name}-small")).problem
-        for seed in range(half):
-            problem = make(world, Random(seed))
-            theirs = downward(problem, command)
-            counts[f"{name}: solvable"] += theirs is not None
-            counts[f"{name}: chains of three and more"] += deepest(problem) >= 3
-            counts[f"{name}: steps"] += theirs or 0
+    for kind in kinds:
+        for seed in range(first, first + count):
+            problem, domain, text = made(kind, seed)
+            theirs = downward(domain, text, command)
+            counts[f"{kind}: solvable"] += theirs is not None
+            counts[f"{kind}: steps"] += theirs or 0
+            if kind == "random":
+                plainly = Plain(domain).shortest(text)
+                counts[f"{kind}: solvable in at least one step"] += bool(theirs)
+                counts[f"{kind}: of defined predicates, those that need themselves"] += len(
+                    circular(problem.domain.rules)
+                )
+                if plainly != theirs:
+                    wrong.append(f"{kind} {seed}: plainly {plainly}, Fast Downward: {theirs}")
+            else:
+                counts[f"{kind}: chains of three and more"] += deepest(problem) >= 3
             for mode in seconds:
                 begin = process_time()
                 found = solve(Request(problem, mode, Limits(10_000_000, SECONDS)))
                 seconds[mode] += process_time() - begin
-                solved = found.status is Status.SOLVED
+                solved, steps = found.status is Status.SOLVED, found.plan.steps if found.plan else ()
+                length = sum(step.behavior != GOAL for step in steps)
+                counts[f"{kind}: steps of {mode}"] += length
                 if solved is not (theirs is not None) or found.status is Status.GAVE_UP:
-                    wrong.append(f"{name} {seed} {mode}: {found.status.name}, Fast Downward: {theirs}")
-                elif solved and found.plan is not None:
-                    counts[f"{name}: steps of {mode}"] += len(found.plan.steps)
-                    if mode == "optimal" and len(found.plan.steps) != theirs:
-                        wrong.append(f"{name} {seed}: {len(found.plan.steps)} steps, Fast Downward: {theirs}")
-    print("| of each world's " + str(half) + " | |\n|---|---|")
+                    wrong.append(f"{kind} {seed} {mode}: {found.status.name}, Fast Downward: {theirs}")
+                elif length < (theirs or 0) or (mode == "optimal" and length != (theirs or 0)):
+                    wrong.append(f"{kind} {seed} {mode}: {length} steps, Fast Downward: {theirs}")
+    print(f"| of each kind's {count} | |\n|---|---|")
     for what, many in sorted(counts.items()):
         print(f"| {what} | {many} |")
     print("\nCPU s:", ", ".join(f"{mode} {spent:.1f}" for mode, spent in seconds.items()))

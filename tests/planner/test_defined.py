@@ -21,6 +21,8 @@ from planner.transitions import Table, key_of
 from planner.validation import Facts
 from reasoner.amounts import Quantity
 from reasoner.graph.knowledge import load
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
 from reasoner.reading.problem import read
 from reasoner.symbols import (
     FALSE,
@@ -38,6 +40,7 @@ from reasoner.symbols import (
 )
 from reasoner.validation.validate import validate
 from tests.planner import naive
+from worlds.axioms import Plain, axioms
 from worlds.language import DEFINED, language
 from worlds.writing import becomes, has, world
 
@@ -181,6 +184,17 @@ def test_a_plan_to_what_is_defined_is_found_where_there_is_one(seed: int, mode: 
         if there or whole:
             found = solve(Request(replace(problem, goal={wanted: value}), mode, Limits(100_000, 20)))
             assert (found.status is Status.SOLVED) is there
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_plans_with_random_axioms_of_pddl_are_as_long_as_trying_everything_finds(seed: int) -> None:
+    domain, text = axioms(Random(seed))
+    least, problem = Plain(domain).shortest(text), imported(parse(domain, text)).problem
+    for mode in ("optimal", "guarded"):
+        found = solve(Request(problem, mode, Limits(1_000_000, 30.0)))
+        steps = [step for step in found.plan.steps if step.behavior != "REACH_GOAL"] if found.plan else None
+        assert (steps is None) is (least is None)
+        assert steps is None or least is None or (len(steps) == least if mode == "optimal" else len(steps) >= least)
 
 
 def test_a_chain_of_a_thousand_is_followed_to_its_end_by_all() -> None:
