@@ -13,7 +13,7 @@ from __future__ import annotations
 import heapq
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
 from typing import TypeAlias
@@ -250,7 +250,11 @@ def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return bits, by number, in parts that need each other, each behind what it needs (Tarjan, SIAM J. Computing 1, 1972)."""
+    """Return bits, by number, in parts that need each other, each behind what it needs (Tarjan, SIAM J. Computing 1, 1972).
+
+    A way to a bit that needs the bit itself is none: left in, a part of one bit would stay set for no other reason than that it was.
+    """
+    bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}
     needs = {
         number: [numbers[low] for low in _single(_union(bit.alternatives)) if low in numbers]
@@ -293,6 +297,10 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
                             break
                     parts.append(tuple(part))
     return Derived(tuple(_joined(parts)))
+
+
+def _grounded(bit: Bit) -> Bit:
+    return replace(bit, alternatives=tuple(way for way in bit.alternatives if not way & bit.mask))
 
 
 def _joined(parts: Sequence[tuple[Bit, ...]]) -> list[tuple[Bit, ...]]:

@@ -186,7 +186,11 @@ def test_a_plan_to_what_is_defined_is_found_where_there_is_one(seed: int, mode: 
             assert (found.status is Status.SOLVED) is there
 
 
-@pytest.mark.parametrize("seed", range(12))
+def test_what_nothing_but_itself_would_make_true_ends_with_what_made_it_true() -> None:
+    assert in_parts({0: Bit(1, (1 | 4, 2))}).after(1 | 4, 1 | 2 | 4) == 4
+
+
+@pytest.mark.parametrize("seed", [*range(12), 7062, 7099])
 def test_plans_with_random_axioms_of_pddl_are_as_long_as_trying_everything_finds(seed: int) -> None:
     domain, text = axioms(Random(seed))
     least, problem = Plain(domain).shortest(text), imported(parse(domain, text)).problem
