@@ -252,7 +252,7 @@ def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
     """Return bits, by number, in parts that need each other, each behind what it needs (Tarjan, SIAM J. Computing 1, 1972).
 
-    A way to a bit that needs the bit itself is none: left in, a part of one bit would stay set for no other reason than that it was.
+    A way to a bit that needs the bit itself is none: left in, a part of one bit would stay set only because it was.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}
