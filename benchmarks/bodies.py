@@ -69,6 +69,7 @@ CASES = {
     "serving": Case("Panda", "panda-serving", beads=True),
     "driving and serving": Case("two arms that drive", "two-tables", beads=True),
     "cup and bottle": Case("iiwa", "iiwa-serving", beads=True),
+    "cup and bottle, six joints": Case("xArm 6", "xarm-serving", beads=True),
     "handing over and serving": Case("Panda pair", "panda-pair-serving", beads=True),
     "moving": Case("Panda", "panda-serving", goals=("cup1 LOCATION place2", "cup2 LOCATION place1")),
 }

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from reasoner.embodiment.values import Fixture
-from sim.kinematics import Arm, Flags, link_transforms, turn
+from sim.arms import Arm, Flags, link_transforms, turn
 from sim.urdf import Array, Model, Spheres
 
 POINTS = 1000
@@ -106,7 +106,7 @@ class Mover:
     carrier: Array
 
     def at(self, q: Array) -> Array:
-        """Return sphere centres (n, m, 3) at postures (n, 7)."""
+        """Return sphere centres (n, m, 3) at postures (n, k)."""
         r, t = link_transforms(self.arm, q)
         centers: Array = np.einsum("nmij,mj->nmi", r[:, self.carrier], self.spheres.centers) + t[:, self.carrier]
         return centers
@@ -117,7 +117,9 @@ class Mover:
         together = Spheres(
             np.concatenate([self.spheres.centers, world]), np.concatenate([self.spheres.radii, spheres.radii])
         )
-        return Mover(self.arm, together, np.concatenate([self.carrier, np.full(len(spheres.radii), 6)]))
+        return Mover(
+            self.arm, together, np.concatenate([self.carrier, np.full(len(spheres.radii), len(self.arm.joints) - 1)])
+        )
 
     def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
         """Return, for everything that is near, its distance (n,) from the arm at each posture."""

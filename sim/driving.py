@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.arms import Flags, read_arm
 from sim.assembly import read_robot
 from sim.base import Base
 from sim.collision import Surroundings, clearances, fixed_spheres, free
 from sim.engine import Engine
-from sim.kinematics import Flags, read_arm
 from sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
 from sim.urdf import Array, Spheres
 from sim.verdict import SkillError, named
@@ -61,7 +61,7 @@ class Roller:
         shift = np.stack([q[:, 0], q[:, 1], zero], -1)
         return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
-    def solve(self, poses: Array) -> tuple[Array, Array]:
+    def solve(self, poses: Array) -> tuple[Array, Flags]:
         """Return where the base is at poses: it gets everywhere."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
@@ -162,5 +162,5 @@ def take_up(engine: Engine, base: Base) -> None:
     model = read_robot(robot, base.pose())
     hands = [hand for hand in engine.hands.values() if hand.robot == robot]
     for hand in hands:
-        hand.model, hand.arm = model, read_arm(model, hand.hand.arm, hand.hand.tip, hand.hand.turned)
+        hand.model, hand.arm = model, read_arm(model, hand.hand.arm, hand.hand.tip, hand.hand.turned, hand.hand.home)
     engine.standing[robot.name] = fixed_spheres(model, [hand.arm for hand in hands])

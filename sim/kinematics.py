@@ -1,189 +1,31 @@
-"""Arms in closed form: where a posture puts the hand, and which posture puts the hand where it should be.
+"""Which posture puts the hand where it should be: in closed form for arms that have one, else numerically.
 
-An arm here has three axes through the shoulder, one at the elbow and three at the wrist. A hand pose then leaves one freedom,
-the *swivel*. There are two kinds. Where all three axes of the wrist meet, as a human's do (KUKA's iiwa), the swivel is that of
-the elbow around the line from shoulder to wrist (0: the elbow hangs down, or is up if the arm rises from its shoulder at zero,
-as one does that is mounted on a table; positive turns it about that line). Where the last
-axis passes the point in which the two before it meet (Franka's Panda), it is the angle of the last joint from the middle of its
-limits, less the hand's roll, which that joint makes: with it given, the other six have a closed form as well. Everything is
-computed for many postures at once.
+An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A hand pose then leaves
+one freedom, the *swivel*. There are two kinds. Where all three axes of the wrist meet, as a human's do (KUKA's iiwa), the swivel is
+that of the elbow around the line from shoulder to wrist (0: the elbow hangs down, or is up if the arm rises from its shoulder at
+zero, as one does that is mounted on a table; positive turns it about that line). Where the last axis passes the point in which the
+two before it meet (Franka's Panda), it is the angle of the last joint from the middle of its limits, less the hand's roll, which
+that joint makes: with it given, the other six have a closed form as well. All other arms of seven joints or six are solved by
+`sim.numeric`: of seven the swivel is that of the third joint, of six there is none but 0.
 
-``q`` postures (n, 7) in radians · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W shoulder,
-elbow, wrist.
+``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
+shoulder, elbow, wrist.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 
-from sim.urdf import Array, Model, rotation
-
-Flags: TypeAlias = NDArray[np.bool_]
+from sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn
+from sim.numeric import REDUNDANT, solved
+from sim.urdf import Array
 
 STRETCHED = 0.9999
 """Cosine of the angle between where a joint is and where its two solutions meet, up to which they are told apart."""
 
-DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
 
-
-@dataclass(frozen=True)
-class Arm:
-    """An arm with its hand, at the zero posture in world coordinates. `wrist` is where the two axes before the last one meet."""
-
-    joints: tuple[str, ...]
-    origins: Array
-    axes: Array
-    lower: Array
-    upper: Array
-    velocity: Array
-    tip_rotation: Array
-    tip: Array
-    shoulder: Array
-    elbow: Array
-    wrist: Array
-
-    @property
-    def upper_length(self) -> float:
-        """Metres from shoulder to elbow."""
-        return float(np.linalg.norm(self.elbow - self.shoulder))
-
-    @property
-    def lower_length(self) -> float:
-        """Metres from elbow to wrist."""
-        return float(np.linalg.norm(self.wrist - self.elbow))
-
-    @cached_property
-    def spherical(self) -> bool:
-        """Whether the last axis, too, goes through the wrist."""
-        return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
-
-    @cached_property
-    def hang(self) -> Array:
-        """Where the elbow is at swivel 0: below, but above in an arm whose upper arm stands up at the zero posture."""
-        return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
-
-    @cached_property
-    def middle(self) -> Array:
-        """The middle (7,) of each joint's limits in radians."""
-        return np.asarray((self.lower + self.upper) / 2)
-
-    @cached_property
-    def crosses(self) -> Array:
-        """Cross-product matrices (7, 3, 3) of the axes."""
-        return np.stack([cross_matrix(axis) for axis in self.axes])
-
-
-def read_arm(model: Model, joints: Sequence[str], tip: str, turned: Sequence[float] = (0.0, 0.0, 0.0)) -> Arm:
-    """Return the arm of `joints` that ends in link `tip`, in which the hand's frame is `turned` by roll, pitch and yaw.
-
-    Raises
-    ------
-    ValueError
-        The robot has no such joint or tip; the axes don't meet in a shoulder and a wrist, or neighbouring axes aren't at right
-        angles. The message says which.
-    """
-    if missing := [
-        *(f"joint '{name}'" for name in joints if name not in model.joints),
-        *([] if tip in model.frames else [f"link '{tip}'"]),
-    ]:
-        raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; mend the name")
-    chain = [model.joints[name] for name in joints]
-    if len(chain) != 7:
-        raise ValueError(
-            f"arm of '{tip}' has {len(chain)} joints; the closed form needs 7 (3 at the shoulder, 1 at the elbow, 3 at the wrist)"
-        )
-    origins = np.array([joint.origin for joint in chain])
-    axes = np.array([joint.axis for joint in chain])
-    for i, j in ((0, 1), (1, 2), (4, 5), (5, 6)):
-        if abs(axes[i] @ axes[j]) > 1e-6:
-            raise ValueError(f"joints {joints[i]} and {joints[j]} aren't at right angles")
-    shoulder = _meeting(origins[:3], axes[:3], "shoulder", joints[:3])
-    wrist = _meeting(origins[4:6], axes[4:6], "wrist", joints[4:6])
-    elbow = origins[3] + axes[3] * (axes[3] @ (shoulder - origins[3]))
-    if abs(axes[3] @ (wrist - elbow)) > 1e-6:
-        raise ValueError(f"shoulder, elbow and wrist don't lie in one plane across {joints[3]}")
-    frame, point = model.frames[tip]
-    return Arm(
-        tuple(joints),
-        origins,
-        axes,
-        np.array([joint.lower for joint in chain]),
-        np.array([joint.upper for joint in chain]),
-        np.array([joint.velocity for joint in chain]),
-        frame @ rotation(*turned),
-        point,
-        shoulder,
-        elbow,
-        wrist,
-    )
-
-
-def _meeting(origins: Array, axes: Array, what: str, joints: Sequence[str]) -> Array:
-    """Return the point where three axes meet (least squares), or raise."""
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    point = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, origins))
-    if np.abs(np.einsum("nij,nj->ni", across, point - origins)).max() > 1e-6:
-        raise ValueError(f"the axes of {', '.join(joints)} don't meet in one point: no {what}")
-    return point
-
-
-def cross_matrix(axis: Array) -> Array:
-    """Return the matrix (3, 3) that takes a vector to its product ``axis x vector``."""
-    x, y, z = axis
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Return vector products (..., 3); `numpy.cross` takes four times as long over a few of them."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], -1)
-
-
-def turn(axis: Array, angle: Array) -> Array:
-    """Return rotation matrices (n, 3, 3) about a unit `axis` (3,) by `angle` (n,) radians."""
-    return _turned(cross_matrix(axis), angle)
-
-
-def _turned(crosses: Array, angle: Array) -> Array:
-    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given by their cross-product matrices."""
-    sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    matrices: Array = EYE + sin * crosses + (1 - cos) * (crosses @ crosses)
-    return matrices
-
-
-def link_transforms(arm: Arm, q: Array) -> tuple[Array, Array]:
-    """Return rotation (n, 7, 3, 3) and shift (n, 7, 3) of what hangs on each joint, against the zero posture.
-
-    A point x of link i at the zero posture is at ``R[:, i] @ x + t[:, i]``.
-    """
-    count = len(q)
-    rotations, shifts = np.empty((count, 7, 3, 3)), np.empty((count, 7, 3))
-    local = _turned(arm.crosses, q)
-    offset = arm.origins - np.einsum("nkij,kj->nki", local, arm.origins)
-    r, t = local[:, 0], offset[:, 0]
-    rotations[:, 0], shifts[:, 0] = r, t
-    for i in range(1, 7):
-        t = t + np.einsum("nij,nj->ni", r, offset[:, i])
-        r = r @ local[:, i]
-        rotations[:, i], shifts[:, i] = r, t
-    return rotations, shifts
-
-
-def hand_frames(arm: Arm, q: Array) -> tuple[Array, Array]:
-    """Return rotation (n, 3, 3) and position (n, 3) of the hand's tip."""
-    r, t = link_transforms(arm, q)
-    return r[:, 6] @ arm.tip_rotation, np.einsum("nij,j->ni", r[:, 6], arm.tip) + t[:, 6]
-
-
-def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Array]:
-    """Return postures (n, 7) that put the hand at rotations `r`, points `p` with elbow `swivel`, and which are valid.
+def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Flags]:
+    """Return postures (n, k) that put the hand at rotations `r`, points `p` with the arm's `swivel`, and which are valid.
 
     Parameters
     ----------
@@ -196,13 +38,15 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
 
     Returns
     -------
-    q : array (n, 7), radians
+    q : array (n, k), radians
         Meaningless where not valid.
     valid : array (n,) of bool
         The point is in reach and every joint within its limits. Of the two postures of a sphere only the one that has the
-        middle joint within ±90° is considered, about parallel axes the one that is farther from the limits, so neighbouring
-        poses give neighbouring postures.
+        middle joint within ±90° is considered, about parallel axes the one that is farther from the limits, without a closed form
+        the one to which the arm is led from rest, so neighbouring poses give neighbouring postures.
     """
+    if not arm.closed:
+        return solved(arm, r, p, swivel, margin, fold)
     most = min(STRETCHED, float(np.cos(fold)))
     q, valid = (_by_elbow if arm.spherical else _by_last_joint)(arm, r, p, swivel, most)
     return q, valid & np.all((q >= arm.lower + margin) & (q <= arm.upper - margin), axis=-1)
@@ -348,6 +192,8 @@ def three_angles(r: Array, axes: Array) -> Array:
 
 def swivel_of(arm: Arm, q: Array) -> Array:
     """Return the swivel (n,) of postures: the inverse of what `inverse` was given."""
+    if not arm.closed:
+        return q[:, REDUNDANT] - arm.middle[REDUNDANT] if arm.swivels else np.zeros(len(q))
     if not arm.spherical:
         return _wrapped(q[:, 6] - arm.middle[6] - _rolled(arm, hand_frames(arm, q)[0]))
     r, t = link_transforms(arm, q)

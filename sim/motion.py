@@ -1,11 +1,11 @@
 """Collision-free motion of a hand, planned in the hand's own coordinates and timed within the joints' limits.
 
 A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres, the heading of its level pointing direction, the roll about
-it (0: upright; this is what pours), and the elbow's swivel, in radians. The closed form of `sim.kinematics` turns a pose
-into a posture, so a path that keeps a cup upright is simply one whose roll is 0: a straight line where it's free, else a short
-RRT-Connect over the same six numbers.
+it (0: upright; this is what pours), and the elbow's swivel, in radians. `sim.kinematics` turns a pose into a posture, so a path
+that keeps a cup upright is simply one whose roll is 0: a straight line where it's free, else a short RRT-Connect over the same six
+numbers.
 
-``poses`` (n, 6) · ``q`` postures (n, 7).
+``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from typing import Protocol
 
 import numpy as np
 
+from sim.arms import Arm, Flags, hand_frames, turn
 from sim.collision import Mover, Surroundings, free
-from sim.kinematics import Arm, Flags, hand_frames, inverse, swivel_of, turn
+from sim.kinematics import inverse, swivel_of
 from sim.urdf import Array
 
 STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
@@ -59,7 +60,7 @@ class Traveller(Protocol):
     def spread(self) -> Array:
         """How far beyond start and goal poses are tried (6,)."""
 
-    def solve(self, poses: Array) -> tuple[Array, Array]:
+    def solve(self, poses: Array) -> tuple[Array, Flags]:
         """Return the joints' values at poses, and which are within reach."""
 
     def free(self, q: Array) -> Flags:
@@ -93,9 +94,9 @@ class Reacher:
     @property
     def spread(self) -> Array:
         """How far beyond start and goal a path is searched."""
-        return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8])
+        return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
-    def solve(self, poses: Array) -> tuple[Array, Array]:
+    def solve(self, poses: Array) -> tuple[Array, Flags]:
         """Return postures of the poses and which are within reach and limits."""
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
@@ -161,11 +162,11 @@ def beyond(arm: Arm, poses: Array) -> float:
     """Return by how many metres the nearest of some poses exceeds the arm's length; 0 if only joint limits forbid it."""
     wrists = poses[:, :3] + (rotations(poses) @ arm.tip_rotation.T) @ (arm.wrist - arm.tip)
     distance = float(np.linalg.norm(wrists - arm.shoulder, axis=-1).min())
-    return max(distance - arm.upper_length - arm.lower_length, 0.0)
+    return max(distance - arm.length, 0.0)
 
 
 def pose_of(arm: Arm, q: Array) -> Array:
-    """Return the pose (6,) of one posture (7,) whose hand points level."""
+    """Return the pose (6,) of one posture (k,) whose hand points level."""
     r, p = hand_frames(arm, q[None])
     yaw = np.arctan2(r[0, 1, 0], r[0, 0, 0])
     roll = np.arctan2(r[0, 2, 1], r[0, 2, 2])
@@ -308,7 +309,7 @@ def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, atte
 
 @dataclass(frozen=True)
 class Limits:
-    """How fast a motion may be: joint speeds (7,) and accelerations in radians, the hand's speed and acceleration in metres."""
+    """How fast a motion may be: joint speeds (k,) and accelerations in radians, the hand's speed and acceleration in metres."""
 
     velocity: Array
     acceleration: float
@@ -326,19 +327,19 @@ def smooth(q: Array, window: int = 3) -> Array:
 
 
 def timed(arm: Arm, q: Array, limits: Limits, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities (m, 7) at `rate` hertz along postures (n, 7), as fast as the limits allow.
+    """Return positions and velocities (m, k) at `rate` hertz along postures (n, k), as fast as the limits allow.
 
     Time-optimal along the path but for one simplification: a joint gives half of its acceleration to the path's curvature and
     half to speeding up, so that both can be bounded apart.
     """
     if len(q) < 2 or np.abs(q - q[0]).max() < 1e-9:
-        return q[-1:], np.zeros((1, 7))
+        return q[-1:], np.zeros((1, q.shape[1]))
     if len(q) < FEWEST:  # between two samples that are both at rest nothing could ever move
         spread = np.linspace(0, len(q) - 1, FEWEST)
         q = np.stack([np.interp(spread, np.arange(len(q)), joint) for joint in q.T], -1)
     rows = np.concatenate([q, hand_frames(arm, q)[1]], -1)
     top = np.concatenate([limits.velocity, np.full(3, limits.hand_velocity)])
-    push = np.concatenate([np.full(7, limits.acceleration), np.full(3, limits.hand_acceleration)])
+    push = np.concatenate([np.full(q.shape[1], limits.acceleration), np.full(3, limits.hand_acceleration)])
     return scheduled(q, rows, top, push, rate)
 
 
@@ -375,7 +376,7 @@ def _sampled(q: Array, speed: Array, clock: Array, rate: float) -> tuple[Array, 
 
 
 def comfort(arm: Arm, q: Array) -> Array:
-    """Return how far postures (n, 7) are from the middle of the joints' ranges, growing steeply near the limits."""
+    """Return how far postures (n, k) are from the middle of the joints' ranges, growing steeply near the limits."""
     middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
     cost: Array = np.sum(((q - middle) / half) ** 8, -1)
     return cost

@@ -18,11 +18,11 @@ import pybullet
 from numpy.typing import NDArray
 
 from reasoner.embodiment.values import Embodiment, Shape
+from sim.arms import read_arm
 from sim.assembly import read_robot
 from sim.bodies import outline, wall
 from sim.collision import fixed_spheres, read_mover
 from sim.engine import Engine
-from sim.kinematics import read_arm
 from sim.linkage import with_open_mechanisms
 from sim.urdf import Array, Spheres
 from sim.urdf import rotation as rotated
@@ -155,7 +155,7 @@ def _seen(embodiment: Embodiment) -> Array:
         points.append(np.array([(x, y, z), (x, y, z + TALL)]))
     for robot in embodiment.robots:
         model = read_robot(robot)
-        arms = [read_arm(model, hand.arm, hand.tip, hand.turned) for hand in robot.hands]
+        arms = [read_arm(model, hand.arm, hand.tip, hand.turned, hand.home) for hand in robot.hands]
         covers = [fixed_spheres(model, arms)]
         for hand, arm in zip(robot.hands, arms, strict=True):
             mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))

@@ -166,7 +166,7 @@ def _poses(
 
 @dataclass(frozen=True)
 class _Way:
-    """Postures (n, 7) by tilt angle (n,), ascending."""
+    """Postures (n, k) by tilt angle (n,), ascending."""
 
     angles: Array
     q: Array

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
+from sim.arms import read_arm
 from sim.assembly import read_robot
 from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
-from sim.kinematics import read_arm
 from sim.linkage import with_open_mechanisms
 from sim.motion import Reacher
 from sim.stages import MARGIN, Numbers, grip_stages
@@ -115,7 +115,7 @@ def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:
 
 def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, solids: Sequence[Solid]) -> Reacher:
     """Return an open hand among the furniture and the robot's own trunk."""
-    arms = [read_arm(model, other.arm, other.tip, other.turned) for other in robot.hands]
+    arms = [read_arm(model, other.arm, other.tip, other.turned, other.home) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
     around = Surroundings((*map(box, embodiment.fixtures), *solids))
     around = around.plus(robot.name, fixed_spheres(model, arms))

@@ -12,17 +12,17 @@ import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Hand, Robot
+from sim.arms import Arm, hand_frames, read_arm
 from sim.assembly import assembled, plain, read_robot
 from sim.collision import Mover, fixed_spheres, read_mover
-from sim.kinematics import Arm, hand_frames, read_arm
 from sim.motion import Limits, pose_of
 from sim.urdf import Array, Model, Spheres
 
 CENTERING = 400.0
 """Newtons per metre by which a finger that is ahead of the other one yields, as the gear of a parallel gripper does."""
 
-STILL, POSITION_GAINS, VELOCITY_GAINS = (0.0,) * 7, (0.4,) * 7, (1.0,) * 7
-"""Target velocities of an arm at rest, and the gains of its motors."""
+POSITION_GAIN, VELOCITY_GAIN = 0.4, 1.0
+"""Gains of an arm's motors."""
 
 CLOSING = 0.12
 """Metres per second at which fingers close."""
@@ -73,7 +73,7 @@ class Manipulator:
         return r[0], p[0]
 
     def measured(self) -> Array:
-        """Return the arm's joint angles (7,) as they are."""
+        """Return the arm's joint angles (k,) as they are."""
         states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
         return np.array([state[0] for state in states])
 
@@ -95,10 +95,10 @@ class Manipulator:
             self.joints,
             pybullet.POSITION_CONTROL,
             targetPositions=q.tolist(),
-            targetVelocities=STILL if velocity is None else velocity.tolist(),
+            targetVelocities=[0.0] * len(q) if velocity is None else velocity.tolist(),
             forces=self.efforts,
-            positionGains=POSITION_GAINS,
-            velocityGains=VELOCITY_GAINS,
+            positionGains=[POSITION_GAIN] * len(q),
+            velocityGains=[VELOCITY_GAIN] * len(q),
             physicsClientId=self.client,
         )
 
@@ -211,7 +211,7 @@ def _manipulator(
     links: Mapping[int, str],
     efforts: Mapping[str, float],
 ) -> Manipulator:
-    arm = read_arm(model, hand.arm, hand.tip, hand.turned)
+    arm = read_arm(model, hand.arm, hand.tip, hand.turned, hand.home)
     tip = next(number for number, link in links.items() if link == hand.tip)
     return Manipulator(
         client,

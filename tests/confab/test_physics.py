@@ -117,7 +117,15 @@ def test_a_behaviour_without_a_skill_is_refused_by_name(tmp_path: Path) -> None:
 
 def test_the_committed_reach_facts_fit_the_geometry() -> None:
     computed = ("beverage-serving", "beverage-serving-moved", "one-arm-serving", "panda-serving", "two-cups")
-    for name in (*computed, "panda-pair-serving", "iiwa-serving", "two-tables", "kitchen-corner", "spice-drawer"):
+    for name in (
+        *computed,
+        "panda-pair-serving",
+        "iiwa-serving",
+        "xarm-serving",
+        "two-tables",
+        "kitchen-corner",
+        "spice-drawer",
+    ):
         shipped = confab.load(name)
         assert reach_hash(shipped.knowledge) == fingerprint(shipped.embodiment)
         if name in computed:

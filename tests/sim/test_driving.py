@@ -7,8 +7,8 @@ import pybullet
 import pytest
 
 from reasoner.embodiment.values import Embodiment, Fixture
+from sim.arms import hand_frames
 from sim.driving import drive
-from sim.kinematics import hand_frames
 from sim.staging import Perturbation
 from sim.verdict import SkillError
 from sim.verify import verify

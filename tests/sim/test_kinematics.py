@@ -1,4 +1,5 @@
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -6,12 +7,14 @@ import pytest
 
 import ontology
 from confab import load
+from sim.arms import Arm, hand_frames, link_transforms, read_arm, turn
 from sim.assembly import read_robot
-from sim.kinematics import Arm, hand_frames, inverse, link_transforms, read_arm, swivel_of, three_angles, turn
+from sim.kinematics import inverse, swivel_of, three_angles
 from sim.urdf import Array, read_urdf
 
 URDF = str(ontology.ROOT / "robots" / "two-arms.urdf")
 JOINTS = ("shoulder_pitch", "shoulder_yaw", "shoulder_roll", "elbow", "wrist_yaw", "wrist_pitch", "wrist_roll")
+HOME = (-0.3, 0.3, 0.3, -1.2, 0.3, 0.3, 0.0)
 X, Y, Z = np.eye(3)
 
 
@@ -104,19 +107,60 @@ def test_three_angles_rebuild_any_rotation(axes: tuple[Array, Array, Array]) -> 
     np.testing.assert_allclose(turn(axes[0], x) @ turn(axes[1], y) @ turn(axes[2], z), r, atol=1e-9)
 
 
-def test_an_arm_whose_axes_do_not_meet_is_refused(tmp_path: Path) -> None:
+def bent(folder: Path) -> Arm:
+    """An arm of seven joints, one axis of whose wrist passes the others by 3 cm."""
+    file, joint = folder / "bent.urdf", '<child link="left_wrist_pitch_link"/>\n    <origin xyz="'
     text = Path(URDF).read_text(encoding="utf-8")
-    bent = tmp_path / "bent.urdf"
-    bent.write_text(text.replace('<origin xyz=".30 0 0"', '<origin xyz=".30 0 .05"', 1), encoding="utf-8")
-    read_arm(read_urdf(str(bent)), [f"left_{joint}" for joint in JOINTS], "left_tool")  # the elbow still bends it so
-    bent.write_text(
-        text.replace(
-            '<child link="left_wrist_pitch_link"/>\n    <origin xyz="0 0 0"',
-            '<child link="left_wrist_pitch_link"/>\n    <origin xyz=".03 0 0"',
-        )
-    )
-    with pytest.raises(ValueError, match="no wrist"):
-        read_arm(read_urdf(str(bent)), [f"left_{joint}" for joint in JOINTS], "left_tool")
+    assert joint in text
+    file.write_text(text.replace(f"{joint}0 0 0", f"{joint}.03 0 0"))
+    return read_arm(read_urdf(str(file)), [f"left_{joint}" for joint in JOINTS], "left_tool", home=HOME)
+
+
+def xarm(folder: Path) -> Arm:
+    """The xArm of six joints that PyBullet has, with a gripper."""
+    (robot,) = load("xarm-serving").embodiment.robots
+    (hand,) = robot.hands
+    return read_arm(read_robot(robot), hand.arm, hand.tip, hand.turned, hand.home)
+
+
+@pytest.mark.parametrize("made", [bent, xarm])
+def test_arms_whose_axes_do_not_meet_are_solved_numerically(made: Callable[[Path], Arm], tmp_path: Path) -> None:
+    arm = made(tmp_path)
+    assert not arm.closed
+    q = arm.home + np.random.default_rng(0).uniform(-0.6, 0.6, (200, len(arm.joints)))
+    q = np.clip(q, arm.lower + 0.05, arm.upper - 0.05)
+    r, p = hand_frames(arm, q)
+    swivel = swivel_of(arm, q)
+    found, valid = inverse(arm, r, p, swivel, 0.03)
+    assert valid.mean() > 0.97
+    again, there = hand_frames(arm, found[valid])
+    np.testing.assert_allclose(again, r[valid], atol=1e-6)
+    np.testing.assert_allclose(there, p[valid], atol=1e-6)
+    np.testing.assert_allclose(swivel_of(arm, found[valid]), swivel[valid], atol=1e-9)
+    assert ((found[valid] >= arm.lower + 0.03) & (found[valid] <= arm.upper - 0.03)).all()
+    assert not inverse(arm, r, p + np.array([2.0, 0.0, 0.0]), swivel)[1].any()
+    anywhere = np.random.default_rng(0).uniform(arm.lower / 2, arm.upper / 2, (200, len(arm.joints)))
+    given = (*hand_frames(arm, anywhere), swivel_of(arm, anywhere))
+    assert inverse(arm, *given, fold=0.3)[1].sum() < inverse(arm, *given)[1].sum()  # some are nearly stretched
+
+
+def test_numeric_postures_of_neighbouring_poses_are_neighbours_and_always_the_same(tmp_path: Path) -> None:
+    arm = xarm(tmp_path)
+    level, zero = np.broadcast_to(np.eye(3), (60, 3, 3)), np.zeros(60)
+    draw = np.random.default_rng(1)
+    for _ in range(5):
+        begin, end = draw.uniform([0.25, -0.3, 0.8], [0.5, 0.3, 1.1], (2, 3))
+        points = np.linspace(begin, end, 60)
+        q, valid = inverse(arm, level, points, zero)
+        assert valid.all()
+        assert np.abs(np.diff(q, axis=0)).max() < 0.1
+        np.testing.assert_array_equal(q[30:31], inverse(arm, level[:1], points[30:31], zero[:1])[0])
+    assert not inverse(arm, level, points, zero + 0.2)[1].any()  # six joints leave nothing to turn
+
+
+def test_an_arm_of_too_few_joints_is_refused() -> None:
+    with pytest.raises(ValueError, match="has 5 joints; 6 or 7 are needed"):
+        read_arm(read_urdf(URDF), [f"left_{joint}" for joint in JOINTS[:5]], "left_tool")
 
 
 def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from reasoner.embodiment.values import Embodiment
+from sim.arms import read_arm
 from sim.collision import Solid, Surroundings, box, free, read_mover
-from sim.kinematics import read_arm
 from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from sim.stages import MARGIN
 from sim.urdf import Spheres, read_urdf
@@ -17,7 +17,7 @@ GOAL = np.array([0.50, 0.05, 0.90, -0.3, 0.0, 0.6])
 def reacher(embodiment: Embodiment, *solids: Solid) -> Reacher:
     robot, hand = embodiment.hand("left_hand")
     model = read_urdf(robot.urdf)
-    arm = read_arm(model, hand.arm, hand.tip, hand.turned)
+    arm = read_arm(model, hand.arm, hand.tip, hand.turned, hand.home)
     mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))
     return Reacher(mover, Surroundings((*map(box, embodiment.fixtures), *solids)), MARGIN)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from sim.arms import link_transforms, read_arm
 from sim.assembly import read_robot
 from sim.faults import hidden_wall
 from sim.film import BAR, DOING, DONE, Film
-from sim.kinematics import link_transforms, read_arm
 from sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
 from sim.verify import verify
 from sim.world import World
@@ -66,6 +66,12 @@ def test_an_iiwa_serves_with_a_gripper_that_turtle_mounts_on_its_flange() -> Non
     rollout = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False)
     assert rollout.failure is None
     assert rollout.clock.planning <= 3  # with its wrist the other way round, paths were searched for twenty seconds
+
+
+def test_an_arm_of_six_joints_with_an_offset_wrist_brings_a_cup_and_pours() -> None:
+    one = case("xarm-serving")
+    rollout = verify(one.embodiment, one.initial, one.steps, one.expected, beads=False, noise=0.004)
+    assert rollout.failure is None
 
 
 def test_a_bottle_of_three_servings_fills_two_cups() -> None:
@@ -183,7 +189,7 @@ def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(se
     assert (again == behind).all()
 
 
-@pytest.mark.parametrize("scene", ["panda-pair-serving", "iiwa-serving", "two-tables"])
+@pytest.mark.parametrize("scene", ["panda-pair-serving", "iiwa-serving", "xarm-serving", "two-tables"])
 def test_robots_at_rest_are_wholly_in_the_picture(scene: str) -> None:
     """An arm that is all there is of a robot, too, and one of several robots."""
     embodiment = case(scene).embodiment

@@ -1,0 +1,207 @@
+"""Arms: read from a URDF, and where a posture puts the hand.
+
+Everything is computed for many postures at once.
+
+``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.urdf import Array, Model, rotation
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+DOWN, EYE = np.array([0.0, 0.0, -1.0]), np.eye(3)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An arm with its hand, at the zero posture in world coordinates, and its posture at rest.
+
+    `wrist` is where the two axes before the last one meet; in an arm without a closed form it is a point of the last joint.
+    """
+
+    joints: tuple[str, ...]
+    origins: Array
+    axes: Array
+    lower: Array
+    upper: Array
+    velocity: Array
+    tip_rotation: Array
+    tip: Array
+    shoulder: Array
+    elbow: Array
+    wrist: Array
+    home: Array
+    closed: bool = True
+
+    @property
+    def upper_length(self) -> float:
+        """Metres from shoulder to elbow."""
+        return float(np.linalg.norm(self.elbow - self.shoulder))
+
+    @property
+    def lower_length(self) -> float:
+        """Metres from elbow to wrist."""
+        return float(np.linalg.norm(self.wrist - self.elbow))
+
+    @cached_property
+    def length(self) -> float:
+        """Metres from shoulder to wrist at most."""
+        bends = [self.elbow] if self.closed else list(self.origins[1:-1])
+        return float(sum(np.linalg.norm(b - a) for a, b in pairwise([self.shoulder, *bends, self.wrist])))
+
+    @cached_property
+    def spherical(self) -> bool:
+        """Whether the last axis, too, goes through the wrist."""
+        return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
+
+    @property
+    def swivels(self) -> bool:
+        """Whether the arm can move while the hand doesn't."""
+        return len(self.joints) > 6
+
+    @cached_property
+    def hang(self) -> Array:
+        """Where the elbow is at swivel 0: below, but above in an arm whose upper arm stands up at the zero posture."""
+        return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
+
+    @cached_property
+    def middle(self) -> Array:
+        """The middle (k,) of each joint's limits in radians."""
+        return np.asarray((self.lower + self.upper) / 2)
+
+    @cached_property
+    def crosses(self) -> Array:
+        """Cross-product matrices (k, 3, 3) of the axes."""
+        return np.stack([cross_matrix(axis) for axis in self.axes])
+
+
+def read_arm(
+    model: Model,
+    joints: Sequence[str],
+    tip: str,
+    turned: Sequence[float] = (0.0, 0.0, 0.0),
+    home: Sequence[float] | None = None,
+) -> Arm:
+    """Return the arm of `joints` that ends in link `tip`, in which the hand's frame is `turned` by roll, pitch and yaw.
+
+    Its posture at rest is `home`, else the middle of the joints' limits.
+
+    Raises
+    ------
+    ValueError
+        The robot has no such joint or tip, or the arm has too few or too many joints. The message says which.
+    """
+    if missing := [
+        *(f"joint '{name}'" for name in joints if name not in model.joints),
+        *([] if tip in model.frames else [f"link '{tip}'"]),
+    ]:
+        raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; mend the name")
+    chain = [model.joints[name] for name in joints]
+    if len(chain) not in (6, 7):
+        raise ValueError(f"arm of '{tip}' has {len(chain)} joints; 6 or 7 are needed for a hand to be anywhere")
+    origins, axes = np.array([joint.origin for joint in chain]), np.array([joint.axis for joint in chain])
+    closed = _closed(origins, axes)
+    shoulder, elbow, wrist = closed or (origins[1], origins[len(chain) // 2], origins[-1])
+    lower, upper = np.array([joint.lower for joint in chain]), np.array([joint.upper for joint in chain])
+    frame, point = model.frames[tip]
+    return Arm(
+        tuple(joints),
+        origins,
+        axes,
+        lower,
+        upper,
+        np.array([joint.velocity for joint in chain]),
+        frame @ rotation(*turned),
+        point,
+        shoulder,
+        elbow,
+        wrist,
+        (lower + upper) / 2 if home is None else np.array(home),
+        closed is not None,
+    )
+
+
+def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
+    """Return shoulder, elbow and wrist of an arm with a closed form: neighbouring axes at right angles that meet; else None."""
+    if len(axes) != 7 or any(abs(axes[i] @ axes[j]) > 1e-6 for i, j in ((0, 1), (1, 2), (4, 5), (5, 6))):
+        return None
+    shoulder, wrist = _meeting(origins[:3], axes[:3]), _meeting(origins[4:6], axes[4:6])
+    if shoulder is None or wrist is None:
+        return None
+    elbow = origins[3] + axes[3] * (axes[3] @ (shoulder - origins[3]))
+    return (shoulder, elbow, wrist) if abs(axes[3] @ (wrist - elbow)) < 1e-6 else None
+
+
+def _meeting(origins: Array, axes: Array) -> Array | None:
+    """Return the point where axes meet (least squares), if they do."""
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    point = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, origins))
+    gap = np.abs(np.einsum("nij,nj->ni", across, point - origins)).max()
+    return point if gap < 1e-6 else None
+
+
+def cross_matrix(axis: Array) -> Array:
+    """Return the matrix (3, 3) that takes a vector to its product ``axis x vector``."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return vector products (..., 3); `numpy.cross` takes four times as long over a few of them."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    u, v, w = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], -1)
+
+
+def turn(axis: Array, angle: Array) -> Array:
+    """Return rotation matrices (n, 3, 3) about a unit `axis` (3,) by `angle` (n,) radians."""
+    return _turned(cross_matrix(axis), angle)
+
+
+def turn_about(vectors: Array) -> Array:
+    """Return rotation matrices (n, 3, 3) about axes times angles (n, 3)."""
+    angle = np.linalg.norm(vectors, axis=-1)
+    x, y, z = (vectors / np.maximum(angle, 1e-12)[:, None]).T
+    zero = np.zeros(len(angle))
+    return _turned(np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3), angle)
+
+
+def _turned(crosses: Array, angle: Array) -> Array:
+    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given by their cross-product matrices."""
+    sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    matrices: Array = EYE + sin * crosses + (1 - cos) * (crosses @ crosses)
+    return matrices
+
+
+def link_transforms(arm: Arm, q: Array) -> tuple[Array, Array]:
+    """Return rotation (n, k, 3, 3) and shift (n, k, 3) of what hangs on each joint, against the zero posture.
+
+    A point x of link i at the zero posture is at ``R[:, i] @ x + t[:, i]``.
+    """
+    rotations, shifts = np.empty((*q.shape, 3, 3)), np.empty((*q.shape, 3))
+    local = _turned(arm.crosses, q)
+    offset = arm.origins - np.einsum("nkij,kj->nki", local, arm.origins)
+    r, t = local[:, 0], offset[:, 0]
+    rotations[:, 0], shifts[:, 0] = r, t
+    for i in range(1, q.shape[1]):
+        t = t + np.einsum("nij,nj->ni", r, offset[:, i])
+        r = r @ local[:, i]
+        rotations[:, i], shifts[:, i] = r, t
+    return rotations, shifts
+
+
+def hand_frames(arm: Arm, q: Array) -> tuple[Array, Array]:
+    """Return rotation (n, 3, 3) and position (n, 3) of the hand's tip."""
+    r, t = link_transforms(arm, q)
+    return r[:, -1] @ arm.tip_rotation, np.einsum("nij,j->ni", r[:, -1], arm.tip) + t[:, -1]
