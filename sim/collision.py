@@ -16,6 +16,9 @@ from reasoner.embodiment.values import Fixture
 from sim.arms import Arm, Flags, link_transforms, turn
 from sim.urdf import Array, Model, Spheres
 
+EDGE, BETWEEN = 0.004, 0.02
+"""Radius of the spheres along the lower edge of what is held, and metres from one to the next."""
+
 POINTS = 1000
 """Points whose distances from everything are worked out at once: more at a time would have to wait for memory."""
 
@@ -227,3 +230,11 @@ def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     first, last = bottom + ends[0], max(top - ends[1], bottom + ends[0])
     z = np.linspace(first, last, 1 + int(np.ceil((last - first) / (0.8 * float(np.min(radii))))))
     return Spheres(np.stack([0 * z, 0 * z, z], -1), np.interp(z, heights, radii))
+
+
+def rim(heights: Array, radii: Array) -> Spheres:
+    """Return small spheres along the lower edge of an upright body of revolution, which `column` leaves out."""
+    wide = float(radii[0]) - EDGE
+    around = np.linspace(0.0, 2 * np.pi, max(int(np.ceil(2 * np.pi * wide / BETWEEN)), 3), endpoint=False)
+    centers = np.stack([wide * np.cos(around), wide * np.sin(around), 0 * around + heights[0] + EDGE], -1)
+    return Spheres(centers, np.full(len(around), EDGE))

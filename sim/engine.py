@@ -19,7 +19,7 @@ import pybullet
 from reasoner.embodiment.values import Embodiment, Shape
 from sim.base import Base
 from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
-from sim.collision import Solid, Surroundings, box, column
+from sim.collision import Solid, Surroundings, box, column, rim
 from sim.mechanisms import Mechanic
 from sim.robot import Manipulator
 from sim.urdf import Array, Spheres
@@ -407,4 +407,8 @@ class Engine:
         shape = self.bodies[body].shape
         rotation, base = self.in_hand(hand, body)
         spheres = column(*outline(shape), bottom=outer_radius(shape) / 3 if whole else min(0.03, height_of(shape) / 3))
-        return Spheres(spheres.centers @ rotation.T + base, spheres.radii)
+        centers, radii = spheres.centers, spheres.radii
+        if whole:
+            edge = rim(*outline(shape))
+            centers, radii = np.concatenate([centers, edge.centers]), np.concatenate([radii, edge.radii])
+        return Spheres(centers @ rotation.T + base, radii)

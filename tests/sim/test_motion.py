@@ -3,12 +3,14 @@ import pytest
 
 from reasoner.embodiment.values import Embodiment
 from sim.arms import read_arm
+from sim.bodies import outline
 from sim.collision import Solid, Surroundings, box, free, read_mover
 from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from sim.stages import MARGIN
 from sim.urdf import Spheres, read_urdf
+from sim.world import World
 
-from .conftest import Case
+from .conftest import Case, case
 
 START = np.array([0.40, 0.40, 0.90, 0.0, 0.0, 0.6])
 GOAL = np.array([0.50, 0.05, 0.90, -0.3, 0.0, 0.6])
@@ -132,3 +134,19 @@ def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
     bent[:3] = (0.25, 0.22, 0.85)  # so near to the shoulder that the elbow would fold beyond its limit
     assert not blocked.solve(bent[None])[1].any()
     assert connect(blocked, START, [bent], np.random.default_rng(0), attempts=300) is None
+
+
+def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
+    one = case("beverage-serving")
+    with World(one.embodiment, one.initial, beads=False) as world:
+        hand = world.hands["left_hand"]
+        turned, tip = hand.frame()
+        for name in ("cup1", "bottle1"):
+            spheres = world.load_spheres(hand, name, whole=True)
+            _, radii = outline(world.bodies[name].shape)
+            around = np.linspace(0.0, 2 * np.pi, 100)
+            edge = world.truth(name)[1] + np.stack(
+                [radii[0] * np.cos(around), radii[0] * np.sin(around), 0 * around], -1
+            )
+            gaps = np.linalg.norm(edge[:, None] - (spheres.centers @ turned.T + tip), axis=-1) - spheres.radii
+            assert gaps.min(1).max() < MARGIN
