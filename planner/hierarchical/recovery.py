@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
+from planner.hierarchical.subproblem import MAKING
 from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, looked_at, proved
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell
@@ -112,19 +113,31 @@ class Recovery:
                 if call.achieve(level, cell, attempt):
                     return True
                 call.failed.setdefault(cell, set()).add((level, attempt))
-                if not isinstance(attempt, Effort):
-                    if not self.solvable:
-                        self._prove()
-                    if not self.forward:
-                        self.forward = True
-                        if self.retreat() or self.anew(call.program.levels[:1]):
-                            call.restarts += 1
-                            return True
+                if not isinstance(attempt, Effort) and not self.solvable:
+                    self._prove()
+                if self._astray(not isinstance(attempt, Effort)):
+                    call.restarts += 1
+                    return True
         if call.moved:  # something was done since some of these attempts failed
             call.failed.clear()
             call.moved = False
             return self.harder(asleep, before)
         return False
+
+    def _astray(self, at_once: bool) -> bool:
+        """Go back to where steps led astray, if they did; as soon as as much was searched in vain as asking takes.
+
+        At once, and where all goals at once are planned anew, too, if asked to.
+        """
+        call = self.call
+        if self.forward or not (at_once or call.vain >= MAKING * call.program.size(call.program.levels[-1])):
+            return False
+        call.vain = 0
+        self.forward = self.retreat()
+        if at_once and not self.forward:
+            self.forward = True
+            return self.anew(call.program.levels[:1])
+        return self.forward
 
     def advised(self, cell: Cell) -> bool:
         """Achieve a goal as advised, if there is advice now that wasn't tried; whether that succeeded."""

@@ -95,6 +95,8 @@ class Refiner:
         self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
         """What search found, by the state: steps after which another can't be refined are done again on the next way."""
+        self.long: set[str] = set()
+        """Behaviours whose last refinement was too long for a few relevant steps, which are tried last then."""
         self.advice: Advice | None = None
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
@@ -199,8 +201,9 @@ class Refiner:
         mark = len(self.table.trail)
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
-            found = self.achieve(below, targets, keep, SHORT)
-            found = found or self.achieve(below, targets, keep, widths)
+            attempts: list[Effort | Sequence[Width]] = [SHORT, widths]
+            for attempt in reversed(attempts) if name in self.long else attempts:
+                found = found or self.achieve(below, targets, keep, attempt)
             if found and self.advice is not None:
                 self.advice.learn(below, mark, targets, keep, found)
         if found is None:
@@ -208,6 +211,7 @@ class Refiner:
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
             self.failed.setdefault(question, []).append(facts)
             return None
+        (self.long.add if len(found) > SHORT.depth else self.long.discard)(name)
         self.found[here] = tuple(found)
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
         known.sort(key=lambda template: len(template.steps))

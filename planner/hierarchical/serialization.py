@@ -96,6 +96,8 @@ class Call:
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.moved = False
+        self.vain = 0
+        """Work of small worlds that came to nothing since it was last asked whether steps led astray."""
         self.restarts = 0
         self.at_once = False
         """Whether the first steps are to all goals at once."""
@@ -187,7 +189,7 @@ class Call:
         hidden = self.unseen if first else {}  # seldom any: no copy of all goals for each of them
         kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
         keep = self.segments.keeping(kept)
-        mark = len(self.table.trail)
+        mark, worked = len(self.table.trail), self.segments.worked
         if attempt is ADVISED:
             steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
         else:
@@ -198,6 +200,7 @@ class Call:
         if steps is not None and self.wary is not None:
             steps = self.wary(steps, mark, lambda: self.refiner.achieve(level, targets, keep, attempt))
         if steps is None:
+            self.vain += self.segments.worked - worked
             return False
         self.steps.extend(steps)
         self.moved = True

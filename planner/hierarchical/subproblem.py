@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from planner.hierarchical.subplans import Ground, Keep, Segments
 from planner.language import walk
-from planner.plan import Limits, OutOfTimeError, Reason, Status, TooLargeError
+from planner.plan import Counts, Limits, OutOfTimeError, Reason, Status, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets
 from reasoner.symbols import (
@@ -94,6 +94,7 @@ class World:
         from planner.grounded.best_first import WORLD, search
 
         if self.task is None:
+            self.segments.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
         limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
