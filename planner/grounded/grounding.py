@@ -414,8 +414,12 @@ class _Assembly:
             return schema.behavior.name, tuple(words[:parameters]), {n[1:]: w for n, w in more if n in declared}
 
         costs, prices = self._costs(bases, rows, first)
-        # Derived bits in the relaxed task: an operator of no cost per alternative, owned by nobody.
-        need, add, owner = _with_derived(need, add, owner, cases)
+        # In the relaxed task a conditional effect that sets no bit tells nothing. An alternative of a derived bit is an
+        # operator of no cost there, owned by nobody.
+        telling = (np.arange(count) < operators) | (np.diff(add.starts) > 0)
+        relaxed_needs, relaxed_adds, owner = _with_derived(
+            _only(need, telling), _only(add, telling), owner[telling], cases
+        )
         return Task(
             problem=reached.problem,
             level=reached.level,
@@ -427,8 +431,8 @@ class _Assembly:
             constants=self.constants,
             costs=costs,
             owners=owner.tolist(),
-            needs=need,
-            adds=add,
+            needs=relaxed_needs,
+            adds=relaxed_adds,
             derived=derived,
             change=change,
             describe=describe,
@@ -553,6 +557,13 @@ class _Assembly:
                         extra_bit.append(complements[value])
             pairs.append((np.array(extra_row, np.int64), np.array(extra_bit, np.int64)))
         return _grouped(np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs]), count)
+
+
+def _only(groups: Grouped, wanted: Flags) -> Grouped:
+    """Return the groups that are wanted."""
+    sizes = np.diff(groups.starts)
+    items = groups.items[np.repeat(wanted, sizes)]
+    return Grouped(np.concatenate([[0], np.cumsum(sizes[wanted])]), items)
 
 
 def _with_derived(

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import prod
 from typing import TypeAlias
 
 from reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
 
 Atom = tuple[str, ...]
 """A predicate and its terms."""
+MOST_CONJUNCTS = 10_000
+"""Objects for each of which a goal that is wanted for all is one of its own, at most."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,64 @@ def conjuncts(form: Form | None) -> Iterator[Form]:
             yield from conjuncts(item)
     elif form.items:
         yield form
+
+
+def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[[Atom], bool | None]) -> Iterator[Form]:
+    """Yield what a conjunction consists of, one conjunct for all objects with one for each, without what always holds.
+
+    Parameters
+    ----------
+    form : Form
+        Without free variables.
+    objects : function of a type
+    holds : function of an atom
+        Whether it holds, or None where that may change.
+    """
+    rest = [item for item in form.items[1:] if isinstance(item, Form)]
+    if form.head == "and":
+        for item in rest:
+            yield from spread(item, objects, holds)
+    elif form.head == "forall":
+        typed = typed_in(rest[0])
+        things = [objects(one.type) for one in typed]
+        if prod(map(len, things)) > MOST_CONJUNCTS:
+            yield form
+            return
+        for row in product(*things):
+            yield from spread(_with(rest[1], dict(zip((one.name for one in typed), row, strict=True))), objects, holds)
+    elif form.head == "imply" and (known := _known(rest[0], holds)) is not None:
+        if known:
+            yield from spread(rest[1], objects, holds)
+    elif form.items and _known(form, holds) is not True:
+        yield form
+
+
+def _with(form: Form, terms: Mapping[str, str]) -> Form:
+    """Return a form with terms in the places of variables, but for those that it quantifies again."""
+    if form.head in ("exists", "forall"):
+        assert isinstance(form.items[1], Form)
+        own = {one.name for one in typed_in(form.items[1])}
+        terms = {name: term for name, term in terms.items() if name not in own}
+    return replace(
+        form,
+        items=tuple(
+            _with(item, terms) if isinstance(item, Form) else replace(item, text=terms.get(item.text, item.text))
+            for item in form.items
+        ),
+    )
+
+
+def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
+    """Return whether a condition without variables holds, or None where that may change."""
+    rest = [item for item in form.items[1:] if isinstance(item, Form)]
+    if form.head in ("and", "or"):
+        found = {_known(item, holds) for item in rest}
+        sure = form.head == "or"
+        return sure if sure in found else None if None in found else not sure
+    if form.head == "not":
+        inner = _known(rest[0], holds)
+        return None if inner is None else not inner
+    return None if rest or not form.items else holds(words_of(form))
 
 
 def effects_of(form: Form | None) -> Iterator[Effect]:

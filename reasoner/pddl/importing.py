@@ -13,7 +13,7 @@ action                          behaviour on level 1, all of whose variables are
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, its number behind the arguments
 any other function              situation type whose values are amounts, unless it only counts costs
-goal that is no conjunction     the behaviour ``REACH_GOAL``, whose effect is the goal
+goal that is no fact            asked by the behaviour ``REACH_GOAL``, whose effect is a goal
 ==============================  ================================================================
 
 Which predicates exclude one another is found by invariant synthesis: an action that adds one of them for an object
@@ -43,6 +43,7 @@ from reasoner.pddl.forms import (
     effects_of,
     functions_read,
     numeric_of,
+    spread,
     typed_in,
     words_in,
     words_of,
@@ -210,7 +211,7 @@ class _Import:
         goal, reach = self.goal(situations)
         if reach:
             behaviors[reach.name] = reach
-        elif not list(conjuncts(self.pddl.goal)):
+        elif ("situation", "goal reached") in self.names:
             initial |= goal
         rules = self.rules()
         if any(s.arguments == (WORLD,) for s in situations.values()):
@@ -309,21 +310,28 @@ class _Import:
         return found
 
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal, and the behaviour that reaches it if it isn't a conjunction of facts: none if it is empty."""
+        """Return the goal, and the behaviour that reaches what of it is no fact: none if all of it is, or it always holds."""
         found: dict[Symbol, str] = {}
         parts = list(conjuncts(self.pddl.goal))
-        plain = all(self.plain(part, situations, found) for part in parts)
-        if parts and plain:
+        single = [one for part in parts for one in spread(part, self.pddl.of_type, self.holds)]
+        if single and not [one for one in single if not self.plain(one, situations, found)]:
             return found, None
         name = self.name("situation", "goal reached", "GOAL_REACHED")
         situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
-        goal, variables = {Symbol(name, (THE_WORLD,)): TRUE}, _Variables(self)
-        if not parts:
+        goal, variables = {**found, Symbol(name, (THE_WORLD,)): TRUE}, _Variables(self)
+        if not single:
             return goal, None
         conditions = tuple(c for part in parts for c in variables.condition(part))
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
         reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
         return goal, reach
+
+    def holds(self, atom: Atom) -> bool | None:
+        """Return whether an atom holds, or None where that may change."""
+        if atom[0] == "=":
+            return atom[1] == atom[2]
+        known = atom[0] in self.pddl.predicates and atom[0] not in self.changing
+        return atom in self.facts if known else None
 
     def plain(self, part: Form, situations: Mapping[str, SituationType], found: dict[Symbol, str]) -> bool:
         """Add a conjunct of the goal to what was found, if it is a fact or a negated boolean one that agrees with the rest.

@@ -497,3 +497,25 @@ def test_types_that_can_not_be_are_refused_with_their_place(domain: str, message
     with pytest.raises(PddlError) as refused:
         parse(f"(define (domain d) {domain})", "(define (problem e) (:domain d) (:init) (:goal ()))")
     assert str(refused.value) == message
+
+
+def test_of_a_goal_all_facts_are_goals_of_their_own_also_those_for_all_objects() -> None:
+    domain = """(define (domain d) (:requirements :adl) (:types a b)
+     (:predicates (p ?x - a) (q ?x - a ?y - b) (heavy ?x - a))
+     (:action f :parameters (?x - a) :precondition (not (p ?x)) :effect (p ?x))
+     (:action g :parameters (?x - a ?y - b) :precondition (p ?x) :effect (and (q ?x ?y) (not (p ?x)))))"""
+    goal = """(and (forall (?x - a) (and (not (p ?x)) (imply (heavy ?x) (forall (?y - b) (q ?x ?y)))))
+      (forall (?x ?y - a) (or (= ?x ?y) (exists (?z - b) (q ?x ?z)))))"""
+    problem = f"(define (problem e) (:domain d) (:objects m n - a u v - b) (:init (p m) (heavy m)) (:goal {goal}))"
+    found = imported(parse(domain, problem)).problem
+    facts = {(symbol.situation, *symbol.arguments, value) for symbol, value in found.goal.items()}
+    assert facts == {
+        ("P", "m", "false"),
+        ("P", "n", "false"),
+        ("Q", "m", "u", "true"),
+        ("Q", "m", "v", "true"),
+        ("GOAL_REACHED", "the_world", "true"),
+    }
+    outcome = plan_level(found)
+    assert outcome.plan is not None
+    assert sorted(step.behavior for step in outcome.plan.steps) == ["F", "F", "G", "G", "G", "REACH_GOAL"]
