@@ -35,7 +35,16 @@ LONGEST = 2400
 """Steps after which turning gives up."""
 
 PATIENCE = 6
-"""Steps between looks at the arm's lag and at the flow."""
+"""Steps between looks at the arm's lag."""
+
+LOOK = 4
+"""Steps between looks at the flow."""
+
+FLOWING = 0.1
+"""Seconds of which the flow is told."""
+
+NEARLY = 0.9
+"""Of what is wanted, what a pour has to give."""
 
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
@@ -65,14 +74,22 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
     had, got = world.inside(source), world.inside(target)
     enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
+    least = (numbers["least_poured"] + 1 / serving) / NEARLY  # a bead may go astray
+    enough += numbers["along"] * max(had / serving - round(had / serving), least - enough)
+
+    def poured() -> float:
+        return (had - world.inside(source)) / serving
+
     servo.turn(numbers["hold_back"], numbers["fast"])
-    if world.beads:
-        servo.meter(numbers, enough, lambda: (had - world.inside(source)) / serving)
-    else:
-        servo.turn(numbers["pour_angle"], numbers["fast"])
-    steepest = servo.angle
-    servo.turn(numbers["hold_back"], numbers["fast"])
-    world.run(round(numbers["settle"] * world.rate))
+    steepest, more = 0.0, True
+    while more:
+        more = bool(world.beads) and servo.meter(numbers, enough, poured)
+        if not world.beads:
+            servo.turn(numbers["pour_angle"], numbers["fast"])
+        steepest = max(steepest, servo.angle)
+        servo.turn(numbers["hold_back"], numbers["fast"])
+        world.run(round(numbers["settle"] * world.rate))
+        more = more and poured() < NEARLY * enough  # less was on its way than it looked like
     measured = {"steepest_rad": steepest, "tilt_rad": tilt_of(attempt.hand.frame()[0])} | attempt.check_grip(numbers)
     if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
         raise SkillError("tracking error", world.touching(attempt.hand), **measured)
@@ -240,15 +257,23 @@ class _Servo:
                 self.world.check_course(self.hand)
         raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
-    def meter(self, numbers: Numbers, enough: float, poured: Callable[[], float]) -> None:
-        """Turn on slowly while nothing flows and wait while it does, until `enough` is `poured` or patience ends."""
-        before, flowing, still = 0.0, 0, 0
+    def meter(self, numbers: Numbers, enough: float, poured: Callable[[], float]) -> bool:
+        """Turn on slowly while nothing flows and wait while it does; return whether `enough` is `poured`, or patience ends.
+
+        What flows while the hand turns back, `lag` seconds long, counts as poured.
+        """
+        before, flowing, still = poured(), 0, 0
+        looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))
         for step in range(LONGEST):
-            now = poured() if step % 4 == 3 else before
+            if step % LOOK == LOOK - 1:
+                looks = [*looks[1:], poured()]
+            now, rate = looks[-1], (looks[-1] - looks[0]) / FLOWING
             flowing = round(numbers["flow"] / self.tick) if now > before else flowing - 1
             before, still = now, still + 1 if flowing <= 0 and self.angle == numbers["pour_angle"] else 0
-            if now >= enough or still > numbers["wait"] / self.tick:
-                return
+            if now + numbers["lag"] * rate >= enough:
+                return True
+            if still > numbers["wait"] / self.tick:
+                return False
             self._approach(numbers["pour_angle"], numbers["slow"] if flowing <= 0 else 0.0)
             if step % PATIENCE == 0:
                 self.world.check_course(self.hand)
