@@ -58,6 +58,12 @@ def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Pl
     return plan
 
 
+def regrouped(problem: Problem, plan: Plan) -> Plan:
+    """Return a plan of the lowest level under the levels above wherever these say what it does; as it is if that isn't one."""
+    found = under_the_levels_above(problem, plan)
+    return plan if validate(problem, found) else found
+
+
 def shortest_known(
     problem: Problem, steps: Sequence[RefinedStep], deadline: float | None = None
 ) -> list[tuple[str, tuple[str, ...]]]:

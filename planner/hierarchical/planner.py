@@ -128,10 +128,14 @@ def _plan(
         text = f"goals in series found no plan, and {recovery.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
     from planner.grounded.best_first import plan_level
+    from planner.hierarchical.flattened import regrouped
 
     left = None if deadline is None else max(deadline - perf_counter(), 0.0)
     flat = plan_level(problem, limits=Limits(limits.expansions, left))
-    return outcome(flat.status, flat.plan, flat.reason)
+    found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
+    if found and upper and all(step.level == upper[0] for step in found.steps):
+        call.given_up.clear()  # there are steps of it after all
+    return outcome(flat.status, found, flat.reason)
 
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from planner.hierarchical.planner import plan as default_plan
 from planner.hierarchical.regrouping import under_the_levels_above
+from planner.hierarchical.serialization import Call
 from planner.paper.hierarchy import plan as paper_plan
 from planner.plan import Limits, Plan
 from planner.validation import validate
@@ -62,3 +63,17 @@ def test_primitives_stand_under_the_levels_above_wherever_these_say_what_a_run_o
         assert by_themselves <= sum(not step.steps for step in found.plan.steps)
         kept += 1
     assert kept > 15
+
+
+def test_what_the_last_resort_finds_keeps_the_levels_where_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Call, "serialise", lambda call, harder: False)
+    tops = []
+    for seed in range(700_000, 700_030):
+        problem = hierarchy(seed)
+        found = default_plan(problem, limits=LIMITS)
+        if found.plan is not None and found.plan.steps:
+            assert not validate(problem, found.plan)
+            on_top = all(step.level == problem.domain.levels[0] for step in found.plan.steps)
+            assert on_top is not bool(found.given_up)
+            tops.append(on_top)
+    assert sum(tops) > len(tops) / 2 > 5
