@@ -80,6 +80,11 @@ AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
       FILTER(?property = owl:inverseOf && isBlank(?node)) }"""
 """The part of a SPARQL query that yields what axioms say of value properties, as (node, property, value)."""
 
+_DEFINED = OWL + "equivalentClass"
+CLOSED = {OWL + name for name in ("complementOf", "allValuesFrom", "oneOf", "hasSelf")}
+CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinality")}
+CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
+"""What OWL 2 RL concludes no class from; what is stated of a scene is all there is in planning, so that it follows there."""
 MOST = 5
 """How far a cardinality counts: trying who is who of more would take longer than any plan."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
@@ -109,33 +114,61 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Tell whether a class is defined by situations, so that its individuals change."""
+        """Tell whether a class is tested by its definition: its individuals change, or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
 
     @cached_property
     def _changing(self) -> frozenset[str]:
-        """The named classes whose definition speaks of a value property, or of a class that does."""
-        defined = {iri for iri, node in self.nodes.items() if not _blank(iri) and OWL + "equivalentClass" in node}
-        found: set[str] = set(self.concluded)
-        while True:
-            more = {iri for iri in defined - found if self._mentioned(iri) & (found | self.situations.keys())}
-            if not more:
-                return frozenset(found)
+        return self._spread({*self.concluded, *self._closed})
+
+    @cached_property
+    def _situated(self) -> frozenset[str]:
+        return self._spread(set(self.concluded))
+
+    def _spread(self, found: set[str]) -> frozenset[str]:
+        """Return named classes with all whose definition speaks of a value property, or of a class that does or is among them."""
+        defined = {
+            iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node
+        }
+        while more := {iri for iri in defined.keys() - found if defined[iri] & (found | self.situations.keys())}:
             found |= more
+        return frozenset(found)
+
+    @cached_property
+    def _closed(self) -> frozenset[str]:
+        """The classes of which OWL 2 RL finds nobody, since they are defined by what nobody is or has only (`CLOSED`).
+
+        Those are meant that are *Base and …*, where planning knows all that the definition speaks of.
+        """
+        known = self.situations.keys() | self.kinds.keys() | self.numbers
+        found = set()
+        for iri in (iri for iri, node in self.nodes.items() if not _blank(iri) and len(node.get(_DEFINED, ())) == 1):
+            parts = self._list(self._definitions(iri)[0], "intersectionOf")
+            inside = [self.nodes.get(node, {}) for node in self._expressions(iri)]
+            properties = {self._named(prop)[0] for said in inside for prop in said.get(OWL + "onProperty", ())}
+            if (
+                any(not _blank(part) for part in parts)
+                and properties <= known
+                and any(CLOSED & said.keys() for said in inside)
+            ):
+                found.add(iri)
+        return frozenset(found)
 
     def _mentioned(self, iri: str) -> set[str]:
         """Return the properties and classes that a definition names."""
-        waiting = list(self._definitions(iri))
-        seen: set[str] = set()
-        found: set[str] = set()
+        inside = [self.nodes.get(node, {}) for node in self._expressions(iri)]
+        named = [*self._definitions(iri), *(value for said in inside for values in said.values() for value in values)]
+        return {value for value in named if not _blank(value)}
+
+    def _expressions(self, iri: str) -> list[str]:
+        """Return the expressions of a definition, those inside of others as well."""
+        found = dict.fromkeys(node for node in self._definitions(iri) if _blank(node))
+        waiting = list(found)
         while waiting:
-            node = waiting.pop()
-            if not _blank(node):
-                found.add(node)
-            elif node not in seen:
-                seen.add(node)
-                waiting += [value for values in self.nodes.get(node, {}).values() for value in values]
-        return found
+            more = [value for values in self.nodes.get(waiting.pop(), {}).values() for value in values if _blank(value)]
+            waiting += (more := [node for node in dict.fromkeys(more) if node not in found])
+            found |= dict.fromkeys(more)
+        return list(found)
 
     def _definitions(self, iri: str) -> Sequence[str]:
         return self.nodes.get(iri, {}).get(OWL + "equivalentClass", [])
@@ -169,6 +202,8 @@ class Definitions:
         if iri in self.concluded:
             return (ValueCondition(self.names.short(self.concluded[iri][0]), (term,), TRUE, negated),)
         found = tuple(self.expression(term, self._one_definition(iri)))
+        if iri not in self._situated:  # a scene may state who is in a class that doesn't change
+            found = (AnyOf(((ClassCondition(term, self.names.short(iri)),), found)),)
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:

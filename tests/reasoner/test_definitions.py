@@ -22,6 +22,7 @@ from reasoner.symbols import (
     Witness,
 )
 from reasoner.validation.validate import validate
+from reasoner.vocabulary import XSD
 from tests.ontology.faults import skeleton
 
 DIRTY = "c:about :B1_WASH.item ; c:situationType :CLEANLINESS ; c:value :dirty"
@@ -214,3 +215,31 @@ def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_pa
     plan = solve(Request(replace(problem, goal={Symbol("SEALED", ("box1",)): "false"}))).plan
     assert plan is not None
     assert [step.behavior for step in plan.steps] == ["PAY"]
+
+
+@pytest.mark.parametrize(
+    ("expression", "members"),
+    [
+        (both(":Place", "[ a owl:Class ; owl:complementOf :Sink ]"), {"shelf", "table"}),
+        (both(":Place", "[ a owl:Class ; owl:oneOf ( :hook :sink ) ]"), {"sink"}),
+        (both(":Place", restriction(":near", "owl:allValuesFrom :Sink")), {"shelf", "table", "sink"}),
+        (both(":Place", restriction(":near", f'owl:minCardinality "2"^^<{XSD}nonNegativeInteger>')), set()),
+        (both(":Place", both("[ a owl:Class ; owl:complementOf :Sink ]", "[ a owl:Class ; owl:complementOf :Old ]")), {"table"}),
+        (both(":Place", ":Sink"), {"sink"}),
+    ],
+)  # fmt: skip
+def test_a_class_that_never_changes_is_closed_where_owl_rl_finds_nobody(
+    tmp_path: Path, expression: str, members: set[str]
+) -> None:
+    """So is one that names it, and who is stated to be in it is."""
+    old = (
+        defined(both(":Place", "[ a owl:Class ; owl:oneOf ( :hook ) ]"), "Old")
+        + " :hook a owl:NamedIndividual, :Sink . <https://example.org/washing-scene#shelf> a :Old ."
+    )
+    near = ":near a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; rdfs:range :Place ."
+    odd = ":ODD a owl:NamedIndividual, c:SituationType ; c:holdsOf :Special . :Place c:hasSituationType :ODD ."
+    path = scene(tmp_path, defined(expression), old, near, odd, asked="Item")
+    infer(graph := load(path))
+    problem = read(graph).problem
+    facts = Facts(problem, problem.initial)
+    assert {place for place in problem.classes["Place"] if facts.value("ODD", (place,)) == "true"} - {"hook"} == members
