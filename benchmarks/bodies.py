@@ -2,7 +2,7 @@
 
     python -m benchmarks.bodies            the table of what was rolled out so far, of the code as it is
     python -m benchmarks.bodies run [TASK …]   roll out what is missing of the reporting seeds, ten of everything at a time
-    python -m benchmarks.bodies carry      let older rollouts count, of tasks whose first two come out bit for bit the same now
+    python -m benchmarks.bodies carry [TASK …]   let older rollouts count, of tasks whose first two come out the same, bit by bit
     python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
 
 A line per rollout goes to confab-out/bodies.jsonl, with what tells its code and its course from others; a run that was stopped
@@ -140,10 +140,10 @@ def kept() -> list[dict[str, Any]]:
     return [one for one in read() if one["code"] == now]
 
 
-def carry() -> None:
+def carry(names: Sequence[str]) -> None:
     """Let rollouts of older code count for the code as it is, of tasks and noises of which the first ones come out the same."""
     rows, now = read(), code()
-    for name, noise in product(CASES, NOISE):
+    for name, noise in product(names, NOISE):
         older = [one for one in rows if (one["task"], one["noise"]) == (name, noise) and one["code"] != now]
         again = [row(name, noise, trial(name, noise).run(one["seed"]))["course"] for one in older[:AGAIN]]
         same = bool(older) and again == [one["course"] for one in older[:AGAIN]]
@@ -156,7 +156,7 @@ def missing(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
     """Yield task, noise and seed of what isn't rolled out yet, ten seeds of everything before the next ten of anything."""
     done = {(one["task"], one["noise"], one["seed"]) for one in kept()}
     for first in range(0, max(NOISE.values()), 10):
-        for (noise, count), name in product(NOISE.items(), names):
+        for name, (noise, count) in product(names, NOISE.items()):
             seeds = range(REPORTING + first, REPORTING + min(first + 10, count))
             yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
 
@@ -211,8 +211,8 @@ if __name__ == "__main__":
             main()
         case ["run", *names]:
             run(names or list(CASES))
-        case ["carry"]:
-            carry()
+        case ["carry", *names]:
+            carry(names or list(CASES))
         case ["try", name, *numbers]:
             noise, first, last = (*map(int, numbers), *(0, DEVELOPMENT, DEVELOPMENT + 10)[len(numbers) :])
             tried(name, noise, range(first, last))
