@@ -27,7 +27,8 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
     if failure is None:
         return ()
     chain = chain_to(report.plan, failure.step.path)
-    return refuted_by(scene.problem, chain, failure.verdict.facts, failure.verdict.code or "")
+    why = ": ".join(filter(None, (failure.verdict.code, ", ".join(failure.verdict.objects))))
+    return refuted_by(scene.problem, chain, failure.verdict.facts, why)
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:

@@ -45,6 +45,7 @@ def test_what_a_planner_of_motions_refutes_has_the_facts_as_long_as_which_it_hol
         (name, ("left_hand", "door")) for name in ("F2_OPEN", "F3_OPEN")
     ]
     assert all(set(one.facts) == set(facts) for one in refuted)
+    assert {one.why for one in refuted} == {"no path: door, bottle"}
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
