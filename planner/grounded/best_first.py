@@ -43,7 +43,8 @@ from reasoner.symbols import Problem, State
 BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
 ENABLING = 8  # bits, at most, that are tried to have set where a relaxed plan is stuck
-SHORTEN, SHORTENING = 200_000, 50  # work on the finished plan: operators, and a fiftieth of the bits of the search's
+SHORTEN, STEP = 200_000, 1_000  # operators looked at for the finished plan, and more for each of its steps
+SHORTENING = 50  # and a fiftieth of the bits of the search's work
 
 Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""
@@ -233,7 +234,7 @@ def search(
             plan = _path(*end.value)
             if found:
                 found(plan)
-            shortening = SHORTEN + total // SHORTENING
+            shortening = SHORTEN + STEP * len(plan) + total // SHORTENING
             best = shorter(task, plan, shortening, deadline, portfolio.restarts)
             return Flat(Status.SOLVED, tuple(best), None, counts, total)
         if total >= most_work:

@@ -308,7 +308,10 @@ class _Windows:
         return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
 
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
-        """Return the operators nearest to a window, in ascending order, its own among them."""
+        """Return the operators nearest to a window, in ascending order, its own among them.
+
+        What ends a bit that is wanted behind the window and that no step of it ends is left out: it would have to be undone.
+        """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
         self.work -= len(owners) // LOOK
@@ -344,10 +347,11 @@ class _Windows:
         order = np.argsort(score, kind="stable")
         order = order[score[order] < far]
         chosen = dict.fromkeys(steps)
+        kept = wanted & state & ~lost
         for operator in owners[order].tolist():
             if len(chosen) >= OPERATORS:
                 break
-            if operator >= 0:
+            if operator >= 0 and not any(cleared & kept and not when for when, cleared, _ in task.known(operator)[1]):
                 chosen[operator] = None
         return sorted(chosen)
 

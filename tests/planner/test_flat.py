@@ -205,6 +205,21 @@ def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
     assert shorter(task, first, work=0) == shortened(task, first)
 
 
+def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> None:
+    task = ground(carrier(40))
+    assert isinstance(task, Task)
+    number = {task.describe(operator)[:2]: operator for operator in range(len(task))}
+    go, back = number["MOVE", ("here", "there")], number["MOVE", ("there", "here")]
+    first = [
+        step
+        for i in range(40)
+        for step in (number["PICK", (f"x{i}", "here", "left")], go, number["DROP", (f"x{i}", "there", "left")], back)
+    ]
+    assert (
+        len(shorter(task, first, work=400_000)) == 6 * 20 - 1
+    )  # two at a time; picking another parcel meanwhile is no use
+
+
 def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
     task = ground(tabletop, goal=tabletop.goal_on(3))
     assert isinstance(task, Task)
