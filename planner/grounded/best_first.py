@@ -43,7 +43,7 @@ from reasoner.symbols import Problem, State
 BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
 ENABLING = 8  # bits, at most, that are tried to have set where a relaxed plan is stuck
-SHORTEN, STEP = 200_000, 1_000  # operators looked at for the finished plan, and more for each of its steps
+SHORTEN, STEP, STEPS = 200_000, 1_000, 400  # operators looked at for the finished plan, and for each of its first steps
 SHORTENING = 50  # and a fiftieth of the bits of the search's work
 
 Path: TypeAlias = "tuple[int, list[int]]"
@@ -234,7 +234,7 @@ def search(
             plan = _path(*end.value)
             if found:
                 found(plan)
-            shortening = SHORTEN + STEP * len(plan) + total // SHORTENING
+            shortening = SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING
             best = shorter(task, plan, shortening, deadline, portfolio.restarts)
             return Flat(Status.SOLVED, tuple(best), None, counts, total)
         if total >= most_work:
