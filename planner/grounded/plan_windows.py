@@ -80,7 +80,7 @@ def shorter(
 
 def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
     """Return a cheapest plan or, if few states don't tell one, the given one; and whether no plan is cheaper."""
-    looked = (1 + len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
+    looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
     found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
     return plan if found.plan is None else list(found.plan), found.plan is not None or found.bound >= cost

@@ -19,8 +19,8 @@ from planner.plan import Plan, TooLargeError
 from planner.validation import validate
 from reasoner.symbols import Problem
 
-MOST_ROWS = 20_000
-"""The largest level that is searched as a whole, in rows of a join on the way to its operators."""
+MOST_ROWS, OF_A_STEP = 20_000, 500
+"""The largest level that is searched as a whole, in rows of a join on the way to operators: at all, and for each step of a plan."""
 
 WORK = 1_000_000
 """Operators that are looked at to make a plan of the lowest level shorter."""
@@ -37,8 +37,8 @@ def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Pl
     deadline : float, optional
         On the clock of `time.perf_counter`.
     """
-    task = small(problem, problem.domain.levels[-1], deadline)
     old = plan.primitives
+    task = small(problem, problem.domain.levels[-1], deadline, OF_A_STEP * len(old))
     operators = task.operators_of([(s.behavior, s.arguments) for s in old]) if task is not None else None
     if task is None or operators is None:
         return plan
@@ -83,11 +83,11 @@ def shortest_known(
     return [task.describe(operator)[:2] for operator in shorter(task, operators, SHORTEN, deadline)]
 
 
-def small(problem: Problem, level: int, deadline: float | None) -> Task | None:
+def small(problem: Problem, level: int, deadline: float | None, most: int = MOST_ROWS) -> Task | None:
     """Return the task of a level, with what it sees of the goal and of what is at rest; None if it is large."""
     goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
     try:
-        task = ground(problem, level, goal=goal, most=MOST_ROWS, deadline=deadline)
+        task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=deadline)
     except TooLargeError:
         return None
     return task if isinstance(task, Task) else None
