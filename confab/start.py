@@ -1,4 +1,4 @@
-"""Where the command `confab` begins: until everything is imported, Ctrl-C ends it in one line, too."""
+"""Where the command `confab` begins: Ctrl-C ends it in one line, too, until all is imported, and changes nothing after the end."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ def main() -> NoReturn:
     signal.signal(signal.SIGINT, _interrupted)
     from confab.cli import main as answer
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    answer()
+    try:
+        answer()
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said and done
 
 
 def _interrupted(*_: object) -> None:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from threading import current_thread, main_thread
 from typing import Any, NoReturn
 
 import click
@@ -36,7 +38,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
 
     _open_streams()
     try:
-        code = call() or YES  # None where a command decides nothing
+        code = _interruptible(call) or YES  # None where a command decides nothing
         sys.stdout.flush()
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
@@ -65,6 +67,26 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
             f"a fault of Confab, not yours ({what[:200]}); please open an issue (CONTRIBUTING.md) with {_log(error)}",
         )
     sys.exit(code)
+
+
+def _interruptible(call: Callable[[], int | None]) -> int | None:
+    """Call something that Ctrl-C interrupts, even where a library makes another error of that, as imports in C do."""
+    came = []
+
+    def interrupt(sign: int, _: object) -> NoReturn:
+        came.append(sign)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt) if current_thread() is main_thread() else None
+    try:
+        return call()
+    except BaseException as error:
+        if came:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
 
 
 def show_result(what: Any) -> None:

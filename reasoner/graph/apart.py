@@ -123,7 +123,11 @@ class Apart:
     def _answer(self, query: str, graphs: Sequence[str]) -> Answer:
         if self._process is None:
             self._process = subprocess.Popen(
-                [sys.executable, str(PROCESS)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+                [sys.executable, str(PROCESS)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,  # Ctrl-C is for us, who end it
             )
             self._send(self._setup)
         process, late = self._process, False

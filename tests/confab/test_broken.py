@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -16,7 +17,7 @@ import confab
 from confab.authoring import migrate, new_domain
 from confab.cli import main
 from confab.memory import Memory
-from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES
+from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, run_to_end
 from ontology import ROOT
 from ontology import scenes as shipped_scenes
 from reasoner.files import alone, write_whole
@@ -743,6 +744,70 @@ main()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (INTERRUPTED, "")
     assert done.stderr == "confab: interrupted; every file is as it was before, or whole\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "moment"),
+    [
+        ("run one-arm-serving --no-video --out . --memory m.ttl", "sim.world:World.execute"),
+        ("run towers-small --no-video --out . --memory m.ttl", "reasoner.files:os.fsync"),
+        ("plan living-room -o p.json", "planner.validation:validate"),
+        ("plan living-room -o p.json", "reasoner.files:os.fsync"),
+        ("learn living-room --memory m.ttl", "reasoner.files:os.fsync"),
+        ("query living-room ASK{?s?p?o}", "reasoner.graph.apart:Apart._send"),
+        ("serve living-room --port 0", "socketserver:BaseServer.serve_forever"),
+    ],
+)
+def test_ctrl_c_is_one_line_and_leaves_nothing_half_done(tmp_path: Path, command: str, moment: str) -> None:
+    code = """
+import os, pkgutil, signal, sys
+owner, _, name = sys.argv.pop(1).replace(":", ".").rpartition(".")
+owner = pkgutil.resolve_name(owner)
+def impatient(*_, **__):
+    os.kill(os.getpid(), signal.SIGINT)
+setattr(owner, name, impatient)
+from confab.start import main
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, moment, *command.split()],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(confab.__file__).parents[1])},
+    )
+    assert done.returncode == INTERRUPTED, done.stderr
+    assert done.stderr.splitlines()[-1] == "confab: interrupted; every file is as it was before, or whole"
+    assert all(line.startswith("confab: ") for line in done.stderr.splitlines() if line)  # click ends the line of ^C
+    assert not list(tmp_path.rglob("*.*"))
+
+
+def test_ctrl_c_is_one_though_a_library_makes_another_error_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+    def call() -> NoReturn:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("numpy's arrays") from None
+        raise AssertionError
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(SystemExit) as end:
+        run_to_end(call)
+    assert end.value.code == INTERRUPTED
+    assert capsys.readouterr().err == "confab: interrupted; every file is as it was before, or whole\n"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_after_the_end_changes_nothing(tmp_path: Path) -> None:
+    code = """
+import atexit, os, signal
+atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))
+from confab.start import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code, "--version"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (YES, "")
 
 
 def test_a_clock_that_goes_backwards_loses_no_episode(tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
