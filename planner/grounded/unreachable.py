@@ -6,7 +6,7 @@ stays so, those that change first: what is left is the reason. A fact among it t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from planner.grounded.reachability import Reached
@@ -74,8 +74,10 @@ def _words(fact: Fact) -> tuple[str, ...]:
     return (*fact.symbol.arguments, fact.symbol.situation, fact.value)
 
 
-def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str, tuple[str, ...]]:
-    """Return the reason as half a sentence, and the terms that it names."""
+def _because(
+    reached: Reached, goal: Fact, above: frozenset[Fact], kinds: Mapping[str, str] = {}
+) -> tuple[str, tuple[str, ...]]:
+    """Return the reason as half a sentence, and the terms that it names; the variables of the goal are of some kinds."""
     name = goal.symbol.situation
     situation = reached.situations.get(name)
     whole = not any(word.startswith("?") for word in _words(goal))
@@ -89,7 +91,9 @@ def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str,
             if effect.situation != name:
                 continue
             schema = _opened(reached, schema)
-            terms = _unified(reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value))
+            terms = _unified(
+                reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value), kinds
+            )
             if terms is not None:
                 found.append((schema, _core(reached, schema, terms)))
     if not found:
@@ -103,7 +107,7 @@ def _because(reached: Reached, goal: Fact, above: frozenset[Fact]) -> tuple[str,
     if len(core) == 1 and core[0].fluent and len(above) < DEPTH:
         deeper = _fact(reached, core[0])
         if deeper not in above | {goal}:
-            more, others = _because(reached, deeper, above | {goal})
+            more, others = _because(reached, deeper, above | {goal}, schema.kinds)
             return f"{text}: {more}", (schema.behavior.name, *words, *others)
     return text, (schema.behavior.name, *words)
 
@@ -160,11 +164,16 @@ def _opened(reached: Reached, schema: Schema) -> Schema:
     return replace(schema, atoms=own, kinds=kinds)
 
 
-def _unified(reached: Reached, schema: Schema, terms: Sequence[str], words: Sequence[str]) -> dict[str, str] | None:
-    """Return what to put in for variables so that the terms become the words, or None; a word may be a variable itself."""
+def _unified(
+    reached: Reached, schema: Schema, terms: Sequence[str], words: Sequence[str], kinds: Mapping[str, str]
+) -> dict[str, str] | None:
+    """Return what to put in for variables so that the terms become the words, or None; a word may be a variable of some kind."""
     found: dict[str, str] = {}
     for term, word in zip(terms, words, strict=True):
         if word.startswith("?"):
+            could = reached.problem.members(schema.kinds[term]) if term.startswith("?") else {term}
+            if word in kinds and reached.problem.members(kinds[word]).isdisjoint(could):
+                return None
             continue
         if (found.setdefault(term, word) if term.startswith("?") else term) != word:
             return None

@@ -217,6 +217,29 @@ def test_a_chain_of_reasons_is_said_to_its_end() -> None:
     assert said.terms == ("cup1", "DRY", "true", "CLEAN", "WASH", "AT", "sink", "PUT", "canReach")
 
 
+def test_who_moves_something_else_is_not_the_reason() -> None:
+    """Maids go, trolleys are pushed: that no trolley comes to the attic isn't because of how maids go."""
+    at = SituationType("AT", ("Mobile",), "Place")
+    from_here = RelationCondition("path", ("?from", "?to"))
+    go = behavior("GO", 1, "?m:Maid ?to:Place ?from:Place", [has("AT", "?m", "?from"), from_here],
+                  [becomes("AT", "?m", "?to")])  # fmt: skip
+    together = [has("AT", "?m", "?from"), has("AT", "?t", "?from"), from_here]
+    push = behavior("PUSH", 1, "?m:Maid ?t:Trolley ?to:Place ?from:Place", together,
+                    [becomes("AT", "?m", "?to"), becomes("AT", "?t", "?to")])  # fmt: skip
+    clean = behavior("CLEAN", 1, "?p:Place ?t:Trolley", [has("AT", "?t", "?p")], [becomes("CLEAN", "?p", TRUE)])
+    problem = world(
+        [at, SituationType("CLEAN", ("Place",), "Truth", boolean=True)],
+        [go, push, clean],
+        {"Mobile": ("maid", "cart", "van"), "Maid": ("maid",), "Trolley": ("cart", "van"), "Place": ("hall", "attic")},
+        {"AT maid": "hall", "AT cart": "hall", "AT van": "hall", "CLEAN attic": FALSE},
+        {"CLEAN attic": TRUE},
+        relations={"path": ()},
+    )
+    said = why_grounded(problem)
+    assert "AT(some Trolley, attic) can't be: PUSH could make it so" in said
+    assert "GO" not in said
+
+
 def reason(conditions: Iterable[object], terms: str = "?c:Cup ?p:Place ?h:Hand") -> str:
     """Return what is said of why a cup can't come to the sink by a behaviour with these conditions."""
     make = behavior("MAKE", 1, terms, conditions, [becomes("AT", "?c", "?p")])  # type: ignore[arg-type]
