@@ -223,7 +223,7 @@ def test_who_moves_something_else_is_not_the_reason() -> None:
     from_here = RelationCondition("path", ("?from", "?to"))
     go = behavior("GO", 1, "?m:Maid ?to:Place ?from:Place", [has("AT", "?m", "?from"), from_here],
                   [becomes("AT", "?m", "?to")])  # fmt: skip
-    together = [has("AT", "?m", "?from"), has("AT", "?t", "?from"), from_here]
+    together: list[Condition] = [has("AT", "?m", "?from"), has("AT", "?t", "?from"), from_here]
     push = behavior("PUSH", 1, "?m:Maid ?t:Trolley ?to:Place ?from:Place", together,
                     [becomes("AT", "?m", "?to"), becomes("AT", "?t", "?to")])  # fmt: skip
     clean = behavior("CLEAN", 1, "?p:Place ?t:Trolley", [has("AT", "?t", "?p")], [becomes("CLEAN", "?p", TRUE)])
