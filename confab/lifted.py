@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from confab.labels import Labels, denied
 from planner.levels import said as plainly
+from reasoner.amounts import LESS, MORE
 from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
 from reasoner.symbols import (
     AnyOf,
@@ -108,6 +109,9 @@ class Sayings:
 
     def goal(self, rule: Rule) -> str:
         """Return what a rule is for."""
+        if rule.goal.value in (MORE, LESS):
+            who = " ".join(map(self.name, rule.goal.arguments))
+            return f"{self.name(rule.goal.situation)} of {who} becomes {rule.goal.value}"
         return self.fact(Fact(Symbol(rule.goal.situation, rule.goal.arguments), rule.goal.value))
 
     def rule(self, rule: Rule, beyond: Collection[Condition] = ()) -> str:

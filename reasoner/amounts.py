@@ -79,6 +79,8 @@ COMPARING: Mapping[str, Callable[[Number, Number], bool]] = {
     ">=": operator.ge,
     ">": operator.gt,
 }
+MORE, LESS = "more", "less"
+"""What an amount must become to be as wanted."""
 OPERATIONS = ("assign", "scale", "increase", "decrease")
 """What an effect does to an amount, in the order in which effects of one behaviour on one symbol are made."""
 
@@ -212,6 +214,19 @@ def meets(value: str | None, wanted: str) -> bool:
     if wanted[:1] not in ("<", ">") or value is None:
         return False
     return all(COMPARING[sign](number(value), limit) for sign, limit in bounds(wanted))
+
+
+def towards(amount: str | None, wanted: str) -> str:
+    """Return whether an amount must become more or less to be as wanted; what it is, if it is as wanted.
+
+    >>> towards("1.5", ">=2"), towards("3", "2"), towards("2", "2")
+    ('more', 'less', '2')
+    """
+    now = number(amount)
+    for sign, limit in bounds(wanted):
+        if not COMPARING[sign](now, limit):
+            return LESS if sign[0] == "<" or (sign == "=" and now > limit) else MORE
+    return wanted
 
 
 def nearer(before: str | None, after: Number, wanted: str) -> bool:

@@ -21,9 +21,8 @@ from planner.experience.matching import Bind, Find, finder, soft
 from planner.hierarchical.operators import FEW, Achiever
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
-from planner.plan import LimitError
 from planner.transitions import Cell, arguments_of, key_of
-from reasoner.amounts import meets, number
+from reasoner.amounts import meets, number, towards
 from reasoner.memory.experience import Ground, Rule
 from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition
 
@@ -33,8 +32,8 @@ SLACK = 2
 """By so much a chain may get longer while its conditions are brought about."""
 FARTHEST = 30
 """Longer chains aren't looked for."""
-ASKED = 60
-"""To ask so many rules takes as long as an expansion: .06 ms each in blocks worlds of 30 blocks, where an expansion takes 3.5."""
+ASKED, DONE = 5, 100
+"""To ask a rule takes about so many microseconds, and so many to do a step; that is, states times operators of a search."""
 
 Roles: TypeAlias = "tuple[str, ...]"
 Goal: TypeAlias = "tuple[Cell, str]"
@@ -69,6 +68,10 @@ class Budget:
     left: int
 
 
+class TooMuchError(Exception):
+    """Rules were asked for longer than they may be."""
+
+
 class Chains:
     """Chains of rules in one call.
 
@@ -97,7 +100,8 @@ class Chains:
         self.finds: dict[str, Find | None] = {}
         self.achievers: dict[str, Achiever] = {}
         self.age = -1
-        self.asked, self.most_asked = 0, inf
+        self.spent, self.most = 0, inf
+        """How much effort was made, and how much may be, in microseconds."""
         self.found: dict[tuple[int, Cell, str, bool], list[Candidate]] = {}
         self.near: dict[tuple[int, Cell, str, bool], int] = {}
         self.beyond: dict[tuple[int, Cell, str, bool], float] = {}
@@ -120,15 +124,19 @@ class Chains:
         (cell, value), key = goal, (level, *goal, everybody)
         if key not in self.found:
             rules = self.rules.get((level, cell[0]), ())
-            self.asked += len(rules)
-            if self.asked > self.most_asked:
-                raise LimitError("more rules were asked than a try may ask")
+            self.spend(ASKED * len(rules))
             self.found[key] = [
                 Candidate(rule, cell, *way)
                 for rule in rules
                 for way in islice(self.find(rule, cell, value, everybody), WAYS)
             ]
         return self.found[key]
+
+    def spend(self, effort: int) -> None:
+        """Count effort, and raise `TooMuchError` where that is more than there may be."""
+        self.spent += effort
+        if self.spent > self.most:
+            raise TooMuchError
 
     def find(self, rule: Rule, cell: Cell, value: str, everybody: bool) -> Iterator[tuple[Roles, tuple[int, ...]]]:
         """Return ways to fill the roles of a rule; it is compiled when it is first asked."""
@@ -141,10 +149,13 @@ class Chains:
             self.finds[name] = bind(self.call.table, self.pick) if bind is not None else None
             self.achievers[name] = Achiever(name, 0, asks, {}, dict(rule.kinds), deep=True)
         find = self.finds[name]
+        if program.domain.situations[cell[0]].quantity is not None:
+            value = towards(self.call.table.now[cell[0]].get(cell[1]), value)
         return find(*arguments_of(cell[1]), value, everybody) if find is not None else iter(())
 
     def pick(self, candidates: tuple[str, ...]) -> Sequence[str]:
         """Return of many candidates one of each sort and state."""
+        self.spent += 1 + len(candidates)
         found = self.picked.get(id(candidates))
         if found is None:
             alike, now = self.call.program.alike, self.call.table.now
@@ -298,6 +309,7 @@ class Chains:
             return None
         budget.left -= 1
         call.segments.expand(level)
+        self.spend(DONE)
         step = call.refiner.do(level, *ground)
         return None if step is None else [*steps, step]
 

@@ -3,8 +3,9 @@
 off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
 rank      how many rules must follow each other (`planner.experience.chaining`); what is nearest is brought about first
 promise   what came to be right must not go wrong again
-wasted    steps that were undone because a promise was broken; nothing is tried while more than a tenth of all effort was, or
-          went into asking rules in vain
+wasted    what was undone because a promise of the most abstract level was broken; nothing is tried there while that is more than a
+          tenth of all expansions
+vain      all that came to nothing, rules that were asked included; of all effort that is never more than a tenth, and a little
 
 The goals of a task, one by one in series, and the changes that a refinement must bring about are the same to rules: `Guide.follow`
 leaves the table as wanted, with all kept that must be, or as it was. So search goes on as if nobody had asked, and what it
@@ -16,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
-from planner.experience.chaining import ASKED, Budget, Candidate, Chains, fact
+from planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
 from planner.experience.evidence import told_apart
 from planner.experience.matching import Bind, known
 from planner.experience.regression import Course, ordered
@@ -34,15 +35,16 @@ from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol
 CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""
 WASTE = 10
-"""Of so many expansions one may have been for steps of rules that were undone."""
-FREE = 1_000
-"""Rules may be asked in vain as if so many expansions had been done before."""
-PATIENCE = 30
-"""So many steps are done for one thing that is wanted."""
+"""Of so many expansions, and of so much effort, one part may be for what comes to nothing."""
+FREE = 500_000
+"""That is counted as if so much had been done before, in microseconds: a promise in a world with locks takes 20,000."""
+PATIENCE, SLACK = 3, 2
+"""So many times as many steps are done as are promised, and so many more: each condition is promised by itself."""
 VAIN = 2
 """So often rules may lead nowhere for one kind of targets, until there are new ones."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
+Found = TypeVar("Found")
 
 
 class Guide:
@@ -72,8 +74,9 @@ class Guide:
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.names: set[str] = set()
         self.off: dict[Cell, str] = {}
-        self.wasted = self.heard = 0
-        self.vain: dict[object, int] = {}
+        self.first = call.program.levels[0]
+        self.wasted, self.vain = 0, 0.0
+        self.nowhere: dict[object, int] = {}
         """Of each kind of targets how often rules led nowhere."""
         self.taught: dict[object, tuple[int, int]] = {}
         """Of each kind of targets how many lessons in a row rules led nowhere after, and how many more are left out."""
@@ -83,8 +86,7 @@ class Guide:
         self.before = _before(call.goal, orders, call.program)
         self.chains = Chains(call, self.by_goal, {} if joins is None else joins, self.least, self.sooner)
         self.add(rules)
-        first = call.program.levels[0]
-        self.expects = all((first, situation) in self.by_goal for situation, _ in self.open())
+        self.expects = all((self.first, situation) in self.by_goal for situation, _ in self.open())
 
     def add(self, rules: Iterable[Rule]) -> None:
         """Follow more rules."""
@@ -127,33 +129,74 @@ class Guide:
         least = min((way.rule.steps for way in found), default=0)
         return [way for way in found if way.rule.steps == least]
 
+    def allowed(self) -> float:
+        """Return how much more may come to nothing."""
+        return (self.call.segments.effort + self.chains.spent + FREE) / WASTE - self.vain
+
     def ready(self) -> bool:
-        """Whether no more than a share of the effort was wasted so far, nor went into asking in vain since rules last led on."""
-        done, vain = self.call.segments.expanded, (self.chains.asked - self.heard) // ASKED
-        return self.wasted * WASTE <= done and vain * WASTE <= done + FREE
+        """Whether more may come to nothing."""
+        return self.wasted * WASTE <= self.call.segments.expanded and self.allowed() > 0
+
+    def bounded(self, level: int, ask: Callable[[], Found | None]) -> Found | None:
+        """Return what rules answer, None if they have none or asking them takes more than what may come to nothing."""
+        if not self.ready() if level == self.first else self.allowed() <= 0:
+            return None
+        chains = self.chains
+        outer, vain, began = chains.most, self.vain, chains.spent
+        chains.most = min(outer, began + self.allowed())
+        try:
+            found = ask()
+        except TooMuchError:
+            found = None
+        chains.most = outer + chains.spent - began  # what it is a part of isn't stopped by it
+        if not found:
+            self.vain = max(self.vain, vain + chains.spent - began)
+        return found
 
     def rank(self, cell: Cell) -> int:
         """Return how many steps rules promise for a goal; 0 if they promise nothing."""
-        if not self.ready():
-            return 0
-        found = self.chains.far(self.call.program.levels[0], (cell, self.call.goal[cell]))
-        return int(found) if found < inf else 0
+        goal = cell, self.call.goal[cell]
+        found = self.bounded(self.first, lambda: self.chains.far(self.first, goal))
+        return int(found) if found and found < inf else 0
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
-        return self.tried(level, targets, keep) if self.ready() else None
+        return self.bounded(level, lambda: self.tried(level, targets, keep))
 
     def tried(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
-        """Do the same, however much was wasted."""
+        """Do the same, however much comes to nothing."""
         call, kind = self.call, self.kind(level, targets)
-        if self.vain.get(kind, 0) >= VAIN:
+        if self.nowhere.get(kind, 0) >= VAIN:
             return None
-        table, segments = call.table, call.segments
-        start = mark = len(table.trail)
-        began = segments.expanded
-        origin: dict[Cell, str] = {}
+        start, vain = len(call.table.trail), self.vain
+        expanded, much = call.segments.expanded, False
+        began = call.segments.effort + self.chains.spent
         outer, self.off = self.off, {}
-        off = self.off
+        try:
+            steps = self.led(level, targets, keep)
+        except TooMuchError:
+            steps, much = None, True
+        finally:
+            self.off = outer
+        if steps is not None and call.refiner.left_as_it_must(start, targets, keep) is None:
+            self.taught.pop(kind, None)
+            self.nowhere.pop(kind, None)
+            if level == self.first:
+                return steps  # made shorter in the end
+            return list(call.refiner.lean(tuple(steps), start, targets, keep))
+        if much or call.segments.expanded > expanded:
+            self.nowhere[kind] = self.nowhere.get(kind, 0) + 1
+        if level == self.first:
+            self.wasted += call.segments.expanded - expanded
+        self.vain = max(self.vain, vain + call.segments.effort + self.chains.spent - began)
+        call.table.undo(start)
+        return None
+
+    def led(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
+        """Do steps until nothing is off; None where no rule leads on."""
+        table, segments, off = self.call.table, self.call.segments, self.off
+        mark = len(table.trail)
+        origin: dict[Cell, str] = {}
         for cell, value in targets.items():
             self._look(cell, value)
         closed: set[Cell] = set()
@@ -162,30 +205,20 @@ class Guide:
             among = sorted((self.chains.far(level, g), i, g) for i, g in enumerate(off.items()) if g[0] not in closed)
             done = None
             for far, _, goal in among:
-                done = self.chains.attain(level, goal, Budget(PATIENCE)) if far < inf else None
+                done = self.chains.attain(level, goal, Budget(int(PATIENCE * far + SLACK))) if far < inf else None
                 if done is not None:
                     steps += done
                     closed.add(goal[0])
                     break
             if done is None:
-                break
+                return None
             for situation, key, old in table.trail[mark:]:
                 first = origin.setdefault((situation, key), old)
                 self._look((situation, key), targets.get((situation, key)) or keep((situation, key), first))
             for cell in segments.defined:
                 self._look(cell, targets.get(cell) or keep(cell, ""))
             mark = len(table.trail)
-        failed, self.off = bool(off), outer
-        if not failed and call.refiner.left_as_it_must(start, targets, keep) is None:
-            self.taught.pop(kind, None)
-            self.vain.pop(kind, None)
-            self.heard = self.chains.asked
-            return steps
-        if segments.expanded > began:
-            self.vain[kind] = self.vain.get(kind, 0) + 1
-        self.wasted += segments.expanded - began
-        table.undo(start)
-        return None
+        return steps
 
     def _look(self, cell: Cell, wanted: str | None) -> None:
         if wanted is None or meets(self.call.table.now[cell[0]].get(cell[1], FALSE), wanted):
@@ -218,7 +251,7 @@ class Guide:
             return False
         self.taught[kind] = lessons + 1, 2**lessons
         known = len(self.names)
-        self.vain.pop(kind, None)
+        self.nowhere.pop(kind, None)
         done = [(step.behavior, step.arguments) for step in steps]
         self.add(course(self.call, mark, targets, keep, done).rules_of())
         return len(self.names) > known

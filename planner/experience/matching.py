@@ -92,11 +92,10 @@ class _Join:
         rule, depth = self.rule, 0
         given = (*rule.goal.arguments, rule.goal.value)
         lines = [f"def find({', '.join(f'i{i}' for i in range(len(given)))}, everybody):"]
-        amount = self.problem.domain.situations[rule.goal.situation].quantity is not None
         for i, term in enumerate(given):
             if term in self.kinds and term not in self.bound:
                 lines += [f"    {written(term)} = i{i}", f"    if not ({' and '.join(self.tests(term))}): return"]
-            elif not amount or i < len(given) - 1:  # by how much an amount changes is found out by doing it
+            else:
                 lines.append(f"    if i{i} != {written(term)}: return")
         lines.append(f"    if not ({' and '.join(self.ready()) or True}): return")
         while left := [role for role, _ in rule.kinds if role not in self.bound]:

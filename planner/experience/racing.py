@@ -13,10 +13,10 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.experience.chaining import ASKED
 from planner.experience.leading import Guide, by_rules
 from planner.hierarchical import planner as fast
 from planner.hierarchical.serialization import Call, Compiled
+from planner.hierarchical.subplans import EXPANSION
 from planner.plan import LimitError, Limits, Outcome, Status
 from reasoner.symbols import Problem
 
@@ -68,7 +68,7 @@ def raced(
         call = Call(problem, using, base[0].segments.deadline, most, searching=False)
         tries.append(call)
         rules = guide(call)
-        rules.chains.most_asked = most * ASKED
+        rules.chains.most = most * EXPANSION
         with suppress(LimitError):
             by_rules(rules)
         spent += call.segments.expanded

@@ -20,7 +20,7 @@ from planner.hierarchical.operators import named
 from planner.language import terms, walk
 from planner.paper.learning import LearningError
 from planner.validation import Facts, Rules
-from reasoner.amounts import meets
+from reasoner.amounts import meets, towards
 from reasoner.derivation import strata
 from reasoner.memory.experience import Ground, Order, Rule
 from reasoner.symbols import (
@@ -72,6 +72,8 @@ class Course:
     def __init__(self, problem: Problem, steps: Sequence[Ground]) -> None:
         self.problem, self.rules, self.facts = problem, Rules(problem), Facts(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
+        self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
+        """Who is asked for by name; all others, those with whom something rests included, become roles."""
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
         self.lost: dict[Fact, int] = {}
@@ -173,6 +175,7 @@ class Course:
         need: dict[Condition, None] = {wanted: None}
         order: dict[str, None] = dict.fromkeys((*wanted.arguments, wanted.value))
         steps, level = 0, self.problem.domain.behaviors[self.done[end].ground[0]].level
+        aim = self.aimed(wanted, facts)
         for position in range(end, start - 1, -1):
             done, after = self.done[position], need
             if self.problem.domain.behaviors[done.ground[0]].level != level:
@@ -190,7 +193,7 @@ class Course:
             order.update(dict.fromkeys(done.ground[1]))
             order.update((t, None) for c in need for inner in walk(c) for t in terms(inner) if not t.startswith("?"))
             yield from linked
-            rule = self.lifted(wanted, tuple(need), done.ground, steps, tuple(order))
+            rule = self.lifted(aim, tuple(need), done.ground, steps, tuple(order))
             if rule is not None:
                 yield rule
 
@@ -255,9 +258,15 @@ class Course:
             if own:
                 order = dict.fromkeys((*goal.arguments, goal.value, *done.ground[1]))
                 order.update((t, None) for c in need for i in walk(c) for t in terms(i) if not t.startswith("?"))
-                rule = self.lifted(goal, tuple(need), done.ground, 1, tuple(order))
+                rule = self.lifted(self.aimed(goal, facts), tuple(need), done.ground, 1, tuple(order))
                 if rule is not None:
                     yield rule
+
+    def aimed(self, goal: ValueCondition, facts: Facts) -> ValueCondition:
+        """Return a goal for rules: of an amount only whether it becomes more or less, since the same one seldom comes again."""
+        if self.problem.domain.situations[goal.situation].quantity is None:
+            return goal
+        return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
 
     def apart(self, condition: Witness, done: Done, facts: Facts) -> Iterator[Condition]:
         """Yield why a step doesn't bring about what nobody may be: what is static and doesn't hold of those whom it changes."""
@@ -308,7 +317,7 @@ class Course:
         kinds: dict[str, str] = {}
 
         def narrow(who: str, kind: str) -> None:
-            known = kind in self.problem.classes and who not in self.constants
+            known = kind in self.problem.classes and who not in self.written
             if known and (who not in kinds or len(members(kind)) < len(members(kinds[who]))):
                 kinds[who] = kind
 
@@ -344,7 +353,7 @@ class Course:
             if isinstance(c, ValueCondition) and c.negated and (c.situation, c.arguments) in known:
                 continue
             if isinstance(c, ClassCondition) and not c.negated:
-                known_already = c.term in self.constants or members(kinds[c.term]) <= members(c.kind)
+                known_already = c.term in self.written or members(kinds[c.term]) <= members(c.kind)
                 if known_already:
                     continue
             asks[ordered_inside(substituted(c, roles))] = None

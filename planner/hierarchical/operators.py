@@ -327,7 +327,7 @@ class Program:
         return found
 
 
-def named(problem: Problem) -> list[str]:
+def named(problem: Problem, rests: bool = True) -> list[str]:
     """Return the individuals that behaviours and rules mention by name, and the values that situation types start or rest with."""
     every: set[str] = set()
     rules = (rule.behavior for its in problem.domain.rules.values() for rule in its)
@@ -340,6 +340,6 @@ def named(problem: Problem) -> list[str]:
         for change in behavior.amounts:
             found.update(dict.fromkeys((*change.arguments, *terms_of(change.amount))))
         every |= found.keys() - behavior.spread
-    for situation in problem.domain.situations.values():
+    for situation in problem.domain.situations.values() if rests else ():
         every |= {value for value in (situation.rest, situation.default) if value is not None}
     return sorted(term for term in every if not term.startswith("?"))

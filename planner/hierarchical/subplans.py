@@ -34,6 +34,8 @@ Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
 """A quantified behaviour, and the changes since the segment began after which it is forbidden."""
 EXPANSIONS = 150
 """The most expansions of one search for a few steps."""
+EXPANSION = 100
+"""An expansion takes about as long as so many states times operators of a small world: a microsecond each."""
 Watch: TypeAlias = "Callable[[int | None], object]"
 """Told the level of each expansion, and `None` before what costs most begins."""
 
@@ -233,6 +235,11 @@ class Segments:
         if self.worked > self.most_work:
             raise LimitError(f"{self.most_work:.0f} states times operators")
         self.check_time()
+
+    @property
+    def effort(self) -> int:
+        """How much was searched so far, about in microseconds."""
+        return self.worked + EXPANSION * self.expanded
 
     def visible(self, level: int, cell: Cell) -> bool:
         """Whether a level knows a symbol: its situation type and its individuals exist there."""

@@ -8,7 +8,6 @@ import pytest
 
 import confab
 from planner.experience.advice import Memory, plan
-from planner.experience.chaining import ASKED
 from planner.experience.evidence import View
 from planner.experience.leading import FREE, Guide, rules_in
 from planner.experience.lessons import compared, live, teach
@@ -19,8 +18,11 @@ from planner.hierarchical import recovery
 from planner.hierarchical.operators import Program
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.serialization import Call, compiled
+from planner.hierarchical.subplans import EXPANSION
+from planner.language import terms
 from planner.plan import Outcome, Reason, Status
 from planner.validation import validate
+from reasoner.amounts import LESS, MORE
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Order, Rule, Tally
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse_files
@@ -377,27 +379,45 @@ def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_ha
     guide = Guide(call, inverted(taught()).rules)
     level, before = call.program.levels[0], call.table.state()
     for cell, value in guide.open().items():
-        if not guide.wasted and guide.follow(level, {cell: value}, call.segments.keeping(call.kept)) is None:
+        if not guide.vain and guide.follow(level, {cell: value}, call.segments.keeping(call.kept)) is None:
             assert call.table.state() == before
     assert guide.wasted > 0
+    assert guide.vain > EXPANSION * guide.wasted
     assert not guide.ready()
     call.segments.expanded = 10 * guide.wasted
     assert guide.ready()
 
 
-def test_rules_that_are_asked_in_vain_are_left_alone_until_search_has_done_ten_times_as_much() -> None:
+def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_too_much() -> None:
     within = problem("swap", 12, 1)
     call = Call(within, compiled(within), None, 100_000)
     guide = Guide(call, taught().rules)
     level, (cell, value) = call.program.levels[0], next(iter(guide.open().items()))
-    assert guide.rank(cell)
-    asked = guide.chains.asked
-    assert asked >= len(guide.by_goal[level, cell[0]])
-    guide.chains.asked += ASKED * FREE
+    targets, keep = {cell: value}, call.segments.keeping(call.kept)
+    before = call.table.state()
+    guide.vain = guide.allowed() - 1
+    assert guide.ready()
+    assert guide.follow(level, targets, keep) is None  # stopped after the first question
+    assert call.table.state() == before
     assert not guide.ready()
     assert not guide.rank(cell)
-    call.segments.expanded = 10 * FREE
+    call.segments.worked = 10 * FREE
     assert guide.rank(cell)
-    assert guide.follow(level, {cell: value}, call.segments.keeping(call.kept))
-    call.segments.expanded = 0
-    assert guide.ready()  # what led on wasn't asked in vain
+    assert guide.follow(level, targets, keep)
+
+
+def test_of_an_amount_rules_say_whether_it_becomes_more_or_less_not_how_much_there_was_once() -> None:
+    experience = Experience("robot")
+    teach(experience, confab.load("canteen-small").problem)
+    about = [rule for rule in rules_in(experience) if rule.goal.situation == "SERVINGS"]
+    assert {rule.goal.value for rule in about} == {MORE, LESS}
+    assert {rule.does[0] for rule in about if rule.goal.value == LESS} & {"L2_POUR"}
+    assert not {rule.does[0] for rule in about if rule.goal.value == LESS} & {"L1_REFILL", "L2_FILL"}
+
+
+def test_where_somebody_was_who_rests_there_becomes_a_role_like_any_other_place() -> None:
+    experience = Experience("robot")
+    teach(experience, confab.load("canteen-small").problem)
+    drives = [rule for rule in rules_in(experience) if rule.does[0] == "L2_DRIVE"]
+    assert drives
+    assert not any("dock" in terms(c) for rule in drives for c in (rule.goal, *rule.asks))
