@@ -294,7 +294,8 @@ def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
     alone, led = fast.plan(few, improve=0), plan(few, Memory(experience), improve=0)
     assert led.plan is not None
     assert validate(few, led.plan) == []
-    assert 3 * expanded(led, 2) < expanded(alone, 2)
+    assert led.misses < alone.misses
+    assert expanded(led, 2) <= led.plan.length[2]
     live(experience, few, led.plan)
     again = plan(few, Memory(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
