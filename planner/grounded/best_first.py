@@ -44,6 +44,8 @@ BOOST = 1000  # turns that the preferred operators get on a new best h
 FAR = 1 << 40  # more than any h
 ENABLING = 8  # bits, at most, that are tried to have set where a relaxed plan is stuck
 SHORTEN, STEP, STEPS = 200_000, 1_000, 400  # operators looked at for the finished plan, and for each of its first steps
+WASTEFUL = 2  # relaxed plans as long as which a plan may be that isn't searched again without lookahead
+AGAIN = 40_000_000  # bits that this may take
 SHORTENING = 50  # and a fiftieth of the bits of the search's work
 
 Path: TypeAlias = "tuple[int, list[int]]"
@@ -57,6 +59,11 @@ class Turn(NamedTuple):
     by_novelty: bool = False
     by_landmarks: bool = False
     ahead: bool = False
+
+    @property
+    def slow(self) -> bool:
+        """Whether it looks at each state of its plan by h."""
+        return not self.by_novelty and not self.ahead
 
 
 @dataclass(frozen=True)
@@ -196,7 +203,8 @@ def search(
         evaluate = evaluate or _on_bits(task, automatic(bits))
         many = _all_on_bits(task, cache(lambda: dense(bits))) if arrays else None
     often = _Evaluator(evaluate, many, needed, min(needed.width, portfolio.widest) if many else 1)
-    if evaluate(task.initial) is None:
+    begun = evaluate(task.initial)
+    if begun is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
     lookahead, marks = ahead(task), cache(lambda: landmarks(task))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
@@ -210,6 +218,7 @@ def search(
         )
         for turn in portfolio.turns
     ]
+    kinds = list(portfolio.turns)
     spent = [0.0] * len(searches)
     total = 0
     while True:
@@ -220,7 +229,7 @@ def search(
             total += done
             spent[turn] += done / share
         except OutOfMemoryError:
-            del searches[turn], spent[turn]
+            del searches[turn], spent[turn], kinds[turn]
             if not searches:
                 return Flat(Status.GAVE_UP, (), Reason("every search holds as many states as it may"), counts)
         except StopIteration as end:
@@ -234,6 +243,9 @@ def search(
             plan = _path(*end.value)
             if found:
                 found(plan)
+            if portfolio.restarts and kinds[turn].ahead and len(plan) > WASTEFUL * begun[0]:
+                slow = [one for (_, one), kind in zip(searches, kinds, strict=True) if kind.slow]
+                plan = _again(task, slow, plan, deadline)
             shortening = SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING
             best = shorter(task, plan, shortening, deadline, portfolio.restarts)
             return Flat(Status.SOLVED, tuple(best), None, counts, total)
@@ -243,6 +255,26 @@ def search(
             return Flat(Status.GAVE_UP, (), Reason(f"the limit of {limits.expansions} expansions came first"), counts)
         if deadline is not None and perf_counter() > deadline:
             return Flat(Status.GAVE_UP, (), Reason("the time limit came first"), counts)
+
+
+def _again(
+    task: Task,
+    searches: Sequence[Generator[int, None, tuple[Seen, int] | None]],
+    plan: list[int],
+    deadline: float | None,
+) -> list[int]:
+    """Return a plan, or a shorter one that costs no more and that a search goes on to with bounded work."""
+    for search_ in searches:
+        work = 0
+        try:
+            while work < AGAIN and (deadline is None or perf_counter() < deadline):
+                work += next(search_)
+        except OutOfMemoryError:
+            continue
+        except StopIteration as end:
+            other = plan if end.value is None else _path(*end.value)
+            return other if len(other) < len(plan) and task.cost_of(other) <= task.cost_of(plan) else plan
+    return plan
 
 
 def _bits(task: Task) -> Task:

@@ -220,6 +220,31 @@ def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> N
     )  # two at a time; picking another parcel meanwhile is no use
 
 
+LIFT = """(define (domain lift) (:requirements :typing) (:types floor person count)
+ (:predicates (lift ?f - floor) (at ?x - person ?f - floor) (in ?x - person) (next ?n ?m - count) (inside ?n - count))
+ (:action move :parameters (?f ?g - floor) :precondition (lift ?f) :effect (and (lift ?g) (not (lift ?f))))
+ (:action board :parameters (?x - person ?f - floor ?n ?m - count)
+  :precondition (and (lift ?f) (at ?x ?f) (inside ?n) (next ?n ?m))
+  :effect (and (in ?x) (inside ?m) (not (at ?x ?f)) (not (inside ?n))))
+ (:action leave :parameters (?x - person ?f - floor ?n ?m - count)
+  :precondition (and (lift ?f) (in ?x) (inside ?m) (next ?n ?m))
+  :effect (and (at ?x ?f) (inside ?n) (not (in ?x)) (not (inside ?m)))))"""
+
+
+def test_a_wasteful_plan_is_searched_again_without_lookahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    people = range(16)
+    text = f"""(define (problem p) (:domain lift) (:objects {" ".join(f"f{i}" for i in range(8))} - floor
+      {" ".join(f"x{i}" for i in people)} - person n0 n1 n2 n3 - count)
+     (:init (lift f0) (inside n0) (next n0 n1) (next n1 n2) (next n2 n3) {" ".join(f"(at x{i} f{i % 8})" for i in people)})
+     (:goal (and {" ".join(f"(at x{i} f{(3 * i + 1) % 8})" for i in people)})))"""
+    task = ground(imported(parse(LIFT, text)).problem)
+    assert isinstance(task, Task)
+    again = search(task)
+    assert task.carried_out(task.initial, again.plan)[0] & task.goal == task.goal
+    monkeypatch.setattr("planner.grounded.best_first.AGAIN", 0)
+    assert len(again.plan) < len(search(task).plan)
+
+
 def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
     task = ground(tabletop, goal=tabletop.goal_on(3))
     assert isinstance(task, Task)
