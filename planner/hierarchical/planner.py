@@ -177,6 +177,14 @@ def unmet(call: Call) -> int:
     return sum(not meets(initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items())
 
 
+def beside(call: Call, problem: Problem) -> Call:
+    """Return a call from the beginning once more, that knows which refinements were found and which weren't."""
+    other = Call(problem, call.using, call.segments.deadline, call.segments.most)
+    known = call.refiner
+    other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
+    return other
+
+
 def fewer(call: Call) -> list[RefinedStep]:
     """Return a call's steps with fewer of the most abstract level, where that level is small and has more steps than goals."""
     if len(call.steps) <= unmet(call):
@@ -186,7 +194,7 @@ def fewer(call: Call) -> list[RefinedStep]:
     found = shortest_known(call.problem, call.steps, call.segments.deadline)
     if len(found) == len(call.steps):
         return call.steps
-    other = Call(call.problem, call.using, call.segments.deadline, call.segments.most)
+    other = beside(call, call.problem)
     for step in found:
         done = other.refiner.do(call.program.levels[0], *step)
         if done is None:
@@ -210,7 +218,7 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     left = max(call.segments.worked, MUCH)  # for both together
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
-        other = Call(replace(call.problem, goal=goal), call.using, call.segments.deadline, call.segments.most)
+        other = beside(call, replace(call.problem, goal=goal))
         other.segments.most_work = left
         advised(other)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)

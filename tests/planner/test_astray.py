@@ -1,6 +1,7 @@
 """Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
 
-from planner.hierarchical.planner import plan
+from planner.hierarchical.planner import beside, plan
+from planner.hierarchical.serialization import Call, compiled
 from planner.plan import Status
 from planner.validation import validate
 from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
@@ -119,3 +120,16 @@ def test_fewer_steps_bring_about_what_level_1_does_not_see_too() -> None:
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
     assert outcome.plan.length == {1: 4, 2: 5}
+
+
+def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_before() -> None:
+    problem = slide(3)
+    call = Call(problem, compiled(problem), None, 10_000)
+    first, second = (call.refiner.do(1, "SEND", (item,)) for item in ("item0", "item1"))
+    assert first is not None
+    assert second is None  # one rode down
+    call.using.templates.clear()
+    other = beside(call, problem)
+    assert other.refiner.do(1, "SEND", ("item0",)) == first
+    assert other.refiner.do(1, "SEND", ("item1",)) is None
+    assert other.refiner.misses == 0
