@@ -40,8 +40,6 @@ FREE = 500_000
 """That is counted as if so much had been done before, in microseconds: a promise in a world with locks takes 20,000."""
 PATIENCE, SLACK = 3, 2
 """So many times as many steps are done as are promised, and so many more: each condition is promised by itself."""
-VAIN = 2
-"""So often rules may lead nowhere for one kind of targets, until there are new ones."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
 Found = TypeVar("Found")
@@ -76,8 +74,6 @@ class Guide:
         self.off: dict[Cell, str] = {}
         self.first = call.program.levels[0]
         self.wasted, self.vain = 0, 0.0
-        self.nowhere: dict[object, int] = {}
-        """Of each kind of targets how often rules led nowhere."""
         self.taught: dict[object, tuple[int, int]] = {}
         """Of each kind of targets how many lessons in a row rules led nowhere after, and how many more are left out."""
         self.classes: dict[str, frozenset[str]] = {}
@@ -165,27 +161,22 @@ class Guide:
 
     def tried(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do the same, however much comes to nothing."""
-        call, kind = self.call, self.kind(level, targets)
-        if self.nowhere.get(kind, 0) >= VAIN:
-            return None
+        call = self.call
         start, vain = len(call.table.trail), self.vain
-        expanded, much = call.segments.expanded, False
+        expanded = call.segments.expanded
         began = call.segments.effort + self.chains.spent
         outer, self.off = self.off, {}
         try:
             steps = self.led(level, targets, keep)
         except TooMuchError:
-            steps, much = None, True
+            steps = None
         finally:
             self.off = outer
         if steps is not None and call.refiner.left_as_it_must(start, targets, keep) is None:
-            self.taught.pop(kind, None)
-            self.nowhere.pop(kind, None)
+            self.taught.pop(self.kind(level, targets), None)
             if level == self.first:
                 return steps  # made shorter in the end
             return list(call.refiner.lean(tuple(steps), start, targets, keep))
-        if much or call.segments.expanded > expanded:
-            self.nowhere[kind] = self.nowhere.get(kind, 0) + 1
         if level == self.first:
             self.wasted += call.segments.expanded - expanded
         self.vain = max(self.vain, vain + call.segments.effort + self.chains.spent - began)
@@ -251,7 +242,6 @@ class Guide:
             return False
         self.taught[kind] = lessons + 1, 2**lessons
         known = len(self.names)
-        self.nowhere.pop(kind, None)
         done = [(step.behavior, step.arguments) for step in steps]
         self.add(course(self.call, mark, targets, keep, done).rules_of())
         return len(self.names) > known
