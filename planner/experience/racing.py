@@ -94,7 +94,6 @@ def raced(
     search = dict(outcome.search)
     base.clear()  # what is made shorter isn't raced
     if done is not None and improve:
-        with suppress(LimitError):
-            fast.shorten(done, improve, leave_levels)
-        return replace(outcome, plan=fast.levelled(done), search=search, given_up=tuple(done.given_up))
+        plan = fast.shortened(done, improve, leave_levels)
+        return replace(outcome, plan=plan, search=search, given_up=tuple(done.given_up))
     return outcome

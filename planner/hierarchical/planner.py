@@ -16,13 +16,14 @@ flat search             the rest, both ways, until a limit comes        `planner
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
 from planner.hierarchical.concerns import concerns, put_aside
-from planner.hierarchical.postoptimization import Improver, length
+from planner.hierarchical.detours import without_detours
+from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
@@ -38,6 +39,8 @@ IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
 DETOURS = 1.25
 """A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
+KEPT = 1.5
+"""Steps of the most abstract level are kept though, by primitives that come to nothing, the plan is up to so many times as long."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -108,10 +111,7 @@ def _plan(
         call.segments.doubt = recovery.doubt
         if call.serialise(recovery.harder) or (recovery.anew(levels) and call.serialise(recovery.harder)):
             recovery.solvable = True
-            if improve:
-                with suppress(LimitError):  # then the first plan is what there is
-                    shorten(call, improve, leave_levels, advised)
-            return outcome(Status.SOLVED, levelled(call) if improve else call.tree())
+            return outcome(Status.SOLVED, shortened(call, improve, leave_levels, advised) if improve else call.tree())
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
@@ -138,37 +138,53 @@ def _plan(
     return outcome(flat.status, found, flat.reason)
 
 
-def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> None:
-    """Make the steps of a call shorter; by steps of a lower level only where these break nothing that a level above asks."""
-    if len(call.program.levels) == 1:
-        return
-    first, call.steps = call.steps, fewer(call)
-    concerned = concerns(call.refiner, call.steps)
-    if not put_aside(concerned):
-        return
-    improver = Improver(call.refiner, call.using.shapes, improve)
-    before, call.steps = call.steps, reordered(call, advised)
-    if not leave_levels:
-        return
-    again, before = call.steps is not before, call.steps
-    improver.clusters_left = improve if before is first else (improve + 1) // 2
-    call.steps = improver.improve(before, () if again else concerned)
-    if length(call.steps) < length(before) and any(left.broken for left in levels_left(call.problem, call.tree())):
-        call.steps = before
+def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> Plan:
+    """Return the plan of a call, made shorter; by steps of a lower level only where nothing breaks that a level above asks.
 
-
-def levelled(call: Call) -> Plan:
-    """Return the plan of a call that left a level, or has only one, made shorter on the lowest one where that is small."""
-    levels, plan = call.program.levels, call.tree()
-    if len(levels) > 1 and not call.given_up:
+    A plan that left a level, has only one, or had primitives that came to nothing, is made shorter on the lowest level, too.
+    """
+    levels, idle = call.program.levels, False
+    with suppress(LimitError):  # then the first plan is what there is
+        if len(levels) > 1:
+            idle = shorten(call, improve, leave_levels, advised)
+    plan = call.tree()
+    if len(levels) > 1 and not call.given_up and not idle:
         return plan
-    from planner.hierarchical.flattened import shortened
+    from planner.hierarchical import flattened
 
     with suppress(LimitError):
-        plan = shortened(call.problem, plan, call.segments.deadline)
+        plan = flattened.shortened(call.problem, plan, call.segments.deadline)
     if all(step.level == levels[0] for step in plan.steps):
         call.given_up.clear()  # there are steps of it after all
     return plan
+
+
+def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> bool:
+    """Make the steps of a call shorter; whether some were left out that came to nothing, so that there may be more."""
+    first, call.steps = call.steps, fewer(call)
+    concerned = concerns(call.refiner, call.steps)
+    aside = put_aside(concerned)
+    before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
+    if not leave_levels:
+        return False
+    kept = call.steps
+    if aside:
+        improver = Improver(call.refiner, call.using.shapes, improve if kept is first else (improve + 1) // 2)
+        call.steps = improver.improve(kept, concerned if kept is before else ())
+        without = without_detours(call.refiner, call.steps, call.program.levels[-2])
+        call.steps = without if worth_it(call.steps, without) else call.steps
+    without = without_detours(call.refiner, call.steps, call.program.levels[-1])
+    price = KEPT if upper(call, without) < upper(call, call.steps) else 1.0
+    idle = length(call.steps) > price * length(without)
+    call.steps = without if idle else call.steps
+    if length(call.steps) < length(kept) and any(left.broken for left in levels_left(call.problem, call.tree())):
+        call.steps, idle = kept, False
+    return idle
+
+
+def upper(call: Call, steps: Sequence[RefinedStep]) -> int:
+    """Return how many of a plan's steps are of the most abstract level."""
+    return sum(step.level == call.program.levels[0] for step in steps)
 
 
 def unmet(call: Call) -> int:

@@ -1,21 +1,17 @@
-"""A plan made shorter: detours are dropped, and steps that concern the same things are planned anew together.
+"""A plan made shorter: steps that concern the same things are planned anew together.
 
 Both work below the most abstract level, where a step "hands empty again" costs something, and leave a step of the upper level
 in the plan only where its own refinement is still intact. Every change is played through on the table before it is kept.
 What the levels above ask of a change is asked of steps that are planned anew, too (`planner.hierarchical.inherited_preconditions`).
 
 whole    a task so small that its states are few is planned anew as a whole, one level above the lowest
-detour   two steps of which the second undoes what the first did (put down, picked up again), and nothing between needed it
 cluster  steps close together that change the same symbols, or one of which takes the place that another leaves
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from itertools import groupby
-from typing import TypeAlias
 
 from planner.hierarchical.concerns import Concern, concerns, put_aside
 from planner.hierarchical.inherited_preconditions import binding
@@ -25,9 +21,6 @@ from planner.hierarchical.subproblem import FEW, problem_of
 from planner.plan import Reason, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.symbols import Domain, Problem, Symbol
-
-Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
-"""What a step changes: the values before and after it."""
 
 PER_PRIMITIVE = 3
 """So many steps of the most abstract level are given up for a primitive less, at most: they say what the primitives are for."""
@@ -58,29 +51,6 @@ def worth_it(old: Sequence[RefinedStep], new: Sequence[RefinedStep]) -> bool:
 def worth(saved: int, given_up: int) -> bool:
     """Whether primitives that are saved are worth the steps of the most abstract level that are given up for them."""
     return saved > max(given_up, 0) / PER_PRIMITIVE
-
-
-def undone_by(changes: Sequence[Changes]) -> dict[int, int]:
-    """Return for each step that a later one undoes exactly, before anything else touches the same symbols, that one."""
-    latest: dict[Cell, int] = {}
-    found: dict[int, int] = {}
-    for j, (before, after) in enumerate(changes):
-        makers = {latest.get(cell, -1) for cell in before}
-        i = makers.pop() if len(makers) == 1 else -1
-        if i >= 0 and changes[i] == (after, before):
-            found[i] = j
-        latest.update(dict.fromkeys(before, j))
-    return found
-
-
-def net(changes: Sequence[Changes]) -> dict[Cell, str]:
-    """Return what the changes of steps one after the other come to."""
-    first: dict[Cell, str] = {}
-    last: dict[Cell, str] = {}
-    for before, after in changes:
-        first = before | first
-        last |= after
-    return {cell: value for cell, value in last.items() if value != first[cell]}
 
 
 @dataclass
@@ -119,9 +89,6 @@ class Improver:
         if anew is not None:
             return anew if worth_it(best, anew) else best
         found = self.clusters(known or concerns(self.refiner, best))
-        self.table.undo(0)
-        best = found if worth_it(best, found) else best
-        found = self.detours(best)
         self.table.undo(0)
         return found if worth_it(best, found) else best
 
@@ -187,79 +154,6 @@ class Improver:
         if level not in self.bound:
             self.bound[level] = binding(self.segments.program.problem, level)
         return self.bound[level]
-
-    # ---------------------------------------------------------------------------------------------------------- detours
-
-    def detours(self, steps: Sequence[RefinedStep]) -> list[RefinedStep]:
-        """Drop pairs of steps that undo each other, where what is between can be done without them and ends as with them."""
-        parts: list[tuple[RefinedStep, int]] = []  # steps above the lowest level, each with the number of its parent
-        for number, step in enumerate(steps):
-            parts.extend((part, number) for part in self._parts(step))
-        changes = self._changes([part for part, _ in parts])
-        self.table.undo(0)
-        undone = undone_by(changes)
-        if not undone:
-            return list(steps)
-        kept: list[tuple[RefinedStep, int]] = []
-        disturbed: set[int] = set()
-        k = 0
-        while k < len(parts):
-            self.segments.check_time()
-            j = undone.get(k)
-            mark = len(self.table.trail)
-            done = j is not None and all(self.refiner.again(part) is not None for part, _ in parts[k + 1 : j])
-            if j is not None and done and self.table.since(mark) == net(changes[k : j + 1]):
-                kept.extend(parts[k + 1 : j])
-                disturbed.update(range(parts[k][1], parts[j][1] + 1))
-                k = j + 1
-                continue
-            self.table.undo(mark)
-            self.table.put_all(changes[k][1])  # all is as it was when these changes were noted
-            kept.append(parts[k])
-            k += 1
-        self.table.undo(0)
-        return self._assembled(steps, kept, disturbed)
-
-    def _changes(self, parts: Sequence[RefinedStep]) -> list[Changes]:
-        """Do steps that can be done, and return what each changes."""
-        found = []
-        for part in parts:
-            mark = len(self.table.trail)
-            self.refiner.redo(part)
-            after = self.table.since(mark)
-            before: dict[Cell, str] = {}
-            for situation, key, old in self.table.trail[mark:]:
-                before.setdefault((situation, key), old)
-            found.append(({cell: before[cell] for cell in after}, after))
-        return found
-
-    def _assembled(
-        self, steps: Sequence[RefinedStep], parts: Sequence[tuple[RefinedStep, int]], disturbed: AbstractSet[int]
-    ) -> list[RefinedStep]:
-        """Return parts under their parents again, where all parts of a parent are there and it still does what it says.
-
-        Not inside a stretch of the lower level, which ends where everything is at rest again. Parents that aren't disturbed stand
-        where they stood, in the states in which they stood.
-        """
-        result: list[RefinedStep] = []
-        restless: set[Cell] = set()
-        rest, table = self.segments.rest, self.table
-        for parent, group in groupby(parts, key=lambda entry: entry[1]):
-            mine, mark = [part for part, _ in group], len(table.trail)
-            whole = steps[parent] if parent not in disturbed and self.refiner.redo(steps[parent]) else None
-            if whole is None and not restless and len(mine) == max(len(self._parts(steps[parent])), 1):
-                whole = self.refiner.again(steps[parent])
-            again = [whole] if whole is not None else [self.refiner.again(part) for part in mine]
-            result.extend(step for step in again if step is not None)
-            for situation, key, _ in table.trail[mark:]:
-                if situation in rest:
-                    (restless.add if table.now[situation][key] != rest[situation] else restless.discard)(
-                        (situation, key)
-                    )
-        return result
-
-    def _parts(self, step: RefinedStep) -> tuple[RefinedStep, ...]:
-        return step[4] if step[4] and step[4][0][0] < self.lowest else (step,)
 
     # --------------------------------------------------------------------------------------------------------- clusters
 

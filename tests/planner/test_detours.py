@@ -1,0 +1,68 @@
+"""What a plan does for nothing is left out where it is much: a chest that every step unlocks and locks again."""
+
+import pytest
+
+from planner.hierarchical.detours import without_detours
+from planner.hierarchical.planner import plan
+from planner.hierarchical.serialization import Call, compiled
+from planner.levels import levels_left
+from planner.validation import validate
+from reasoner.symbols import Problem, SituationType
+from worlds.writing import becomes, behavior, has, lacks, world
+
+
+def chest(items: int) -> Problem:
+    """Return a world in which things are fetched from a chest that is locked at rest."""
+    names = tuple(f"item{number}" for number in range(items))
+    return world(
+        [SituationType("AT", ("Item",), "Place"), SituationType("LID", ("Chest",), "LID", level=2, rest="locked")],
+        [
+            behavior("FETCH", 1, "?i:Item", [has("AT", "?i", "inside")], [becomes("AT", "?i", "table")]),
+            behavior("TAKE", 2, "?i:Item", [has("AT", "?i", "inside"), has("LID", "chest", "open")],
+                     [becomes("AT", "?i", "table")]),
+            behavior("UNLOCK", 2, "", [has("LID", "chest", "locked")], [becomes("LID", "chest", "shut")]),
+            behavior("OPEN", 2, "", [has("LID", "chest", "shut")], [becomes("LID", "chest", "open")]),
+            behavior("SHUT", 2, "", [has("LID", "chest", "open")], [becomes("LID", "chest", "shut")]),
+            behavior("LOCK", 2, "", [has("LID", "chest", "shut"), lacks("LID", "chest", "open")],
+                     [becomes("LID", "chest", "locked")]),
+        ],
+        {"Item": names, "Chest": ("chest",), "Place": ("inside", "table"), "LID": ("locked", "shut", "open")},
+        {**{f"AT {name}": "inside" for name in names}, "LID chest": "locked"},
+        {f"AT {name}": "table" for name in names},
+    )  # fmt: skip
+
+
+def names(problem: Problem, leave_levels: bool = True) -> list[str]:
+    """Return the primitives of a problem's plan."""
+    found = plan(problem, leave_levels=leave_levels).plan
+    assert found is not None
+    assert validate(problem, found) == []
+    assert [left for left in levels_left(problem, found) if left.broken] == []
+    return [step.behavior for step in found.primitives]
+
+
+def test_a_chest_is_locked_once_where_a_plan_that_keeps_the_levels_would_be_half_as_long_again() -> None:
+    assert names(chest(4)) == ["UNLOCK", "OPEN", *["TAKE"] * 4, "SHUT", "LOCK"]
+    assert len(names(chest(4), leave_levels=False)) == 20
+
+
+def test_a_plan_that_is_little_longer_with_its_levels_keeps_them() -> None:
+    found = plan(chest(1)).plan
+    assert found is not None
+    assert found.length == {1: 1, 2: 5}
+
+
+@pytest.mark.parametrize("items", [2, 3, 5])
+def test_what_comes_to_nothing_is_left_out_from_the_inside_out(items: int) -> None:
+    problem = chest(items)
+    call = Call(problem, compiled(problem), None, 1000)
+    for item in range(items):
+        step = call.refiner.do(1, "FETCH", (f"item{item}",))
+        assert step is not None
+        call.steps.append(step)
+    end = call.table.state()
+    left = without_detours(call.refiner, call.steps, 2)
+    assert call.table.state() == problem.initial
+    assert [step.behavior for step in left] == ["UNLOCK", "OPEN", *["TAKE"] * items, "SHUT", "LOCK"]
+    call.redo(left)
+    assert call.table.state() == end
