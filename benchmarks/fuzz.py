@@ -285,7 +285,12 @@ def _check_plan(result: Result) -> None:
     assert not faults, f"no plan of what was read: {faults[0]}"
     with suppress(KnowledgeError):  # what the task doesn't need may be broken
         whole = replace(result.scene.reading.problem, goal=problem.goal)
-        seen = {symbol: value for symbol, value in problem.initial.items() if symbol in whole.initial}
+        names = {
+            member for members in whole.classes.values() for member in members
+        }  # which may be longer than in a part
+        seen = {
+            symbol: value for symbol, value in problem.initial.items() if symbol in whole.initial and value in names
+        }
         faults = validate(replace(whole, initial={**whole.initial, **seen}), outcome.plan)
         faults = [fault for fault in faults if "its ID" not in str(fault)]
         assert not faults, f"no plan of the whole scene: {faults[0]}"

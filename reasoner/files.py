@@ -127,3 +127,14 @@ def as_iri_part(name: str) -> str:
 def _behind(path: Path) -> Path:
     """Return the file that a path leads to through all links, also if it doesn't exist yet."""
     return Path(os.path.realpath(path))
+
+
+@contextmanager
+def silent_about_numbers() -> Iterator[None]:
+    """Have rdflib not warn, with a traceback, of literals that aren't the numbers that they say they are."""
+    spoken = logging.getLogger("rdflib.term")
+    before, spoken.disabled = spoken.disabled, True
+    try:
+        yield
+    finally:
+        spoken.disabled = before

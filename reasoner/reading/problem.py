@@ -290,6 +290,7 @@ def frame(
         _check_behavior(behavior, domain)
     for rule in chain.from_iterable(rules.values()):
         _check_behavior(replace(rule.behavior, level=domain.situations[rule.situation].level), domain)
+    _asked(domain)
     return Frame(schema, parts, domain, classes, parents, properties, lifted)
 
 
@@ -572,14 +573,18 @@ def _facts(
 
 
 def _asked(domain: Domain) -> dict[str, int]:
-    """Return how many individuals conditions name for each relation without a number."""
+    """Return how many individuals conditions name for each relation without a number; raise `KnowledgeError` if they differ."""
     found: dict[str, int] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
     waiting = [condition for behavior in (*domain.behaviors.values(), *rules) for condition in behavior.conditions]
     while waiting:
         match waiting.pop():
             case RelationCondition(relation, arguments):
-                found[relation] = len(arguments)
+                if found.setdefault(relation, len(arguments)) != len(arguments):
+                    raise KnowledgeError(
+                        f"conditions of {relation} name {min(found[relation], len(arguments))} individuals here and "
+                        f"{max(found[relation], len(arguments))} there; let all of them name as many"
+                    )
             case Witness(_, _, inner):
                 waiting += inner
             case AnyOf(alternatives):

@@ -17,6 +17,7 @@ from typing import Any
 
 import pyparsing
 
+from reasoner.files import silent_about_numbers
 from reasoner.vocabulary import RDF
 
 A = "a"
@@ -79,6 +80,7 @@ class UpdateError(ValueError):
         self.what, self.remedy, self.at = what, remedy, at
 
 
+@silent_about_numbers()
 def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
     """Return the prefixes that an update declares, and its operations in order.
 

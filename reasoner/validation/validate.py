@@ -14,7 +14,6 @@ logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothi
 
 from __future__ import annotations
 
-import logging
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +28,7 @@ import ontology
 from reasoner.embodiment import measures, skill_checks
 from reasoner.embodiment.facts import EmbodimentError
 from reasoner.embodiment.reading import read_embodiment
+from reasoner.files import silent_about_numbers
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
 from reasoner.names import local_name
@@ -287,15 +287,11 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     sh = Namespace(SHACL)
     shapes = _shapes()
     data = Graph()
-    spoken = logging.getLogger(
-        "rdflib.term"
-    )  # warns, with a traceback, of numbers that are none: what the shapes look for
-    spoken.disabled = True
-    for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
-        if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
-            data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
-    conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
-    spoken.disabled = False
+    with silent_about_numbers():  # that are none: the shapes look for them
+        for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
+            if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
+                data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
+        conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
     if conforms or not isinstance(report, Graph):
         return
     for result in report.objects(None, sh.result):
