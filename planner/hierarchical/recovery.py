@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE
+from planner.hierarchical.refinement_cache import MOST_OPERATORS, NEAR, WHOLE
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.subproblem import MAKING
@@ -27,8 +27,6 @@ ALL = (WHOLE,)
 """All goals at once in the whole world."""
 FEW = 1_000
 """So many states of the lowest level, at least, are worth looking at."""
-CONFIDENT = 10
-"""So many times as many where all goals are of kinds that were reached before."""
 COSTLY = 4
 """From so many goals that need more than a few steps on, the observer is told."""
 Done = TypeVar("Done")
@@ -162,9 +160,12 @@ class Recovery:
             self._prove()
 
     def _prove(self) -> None:
-        """Raise `UnsolvableError` if the lowest level shows that there is no plan; what is expected is searched first."""
-        call, worth = self.call, FEW * CONFIDENT * self.call.program.size(self.call.program.levels[-1])
-        if call.advice is not None and call.advice.expects and call.segments.worked < worth:
+        """Raise `UnsolvableError` if the lowest level shows that there is no plan.
+
+        What is expected is searched first, with as much work as one small world may cost.
+        """
+        call = self.call
+        if call.advice is not None and call.advice.expects and call.segments.worked < NEAR.work:
             return
         if self._lowest is None:
             self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline, call.segments.watch)
