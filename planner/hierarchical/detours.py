@@ -43,12 +43,13 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
         What is left out are steps of this level, with their refinements, or of one below where there are none of it.
     """
     table = refiner.table
+    owners = [owner for owner, step in enumerate(steps) for _ in parts(step, level)]
     kept = dict(enumerate(part for step in steps for part in parts(step, level)))
     before, left, fewer = 0, AGAIN * len(kept), kept
     while before != len(fewer):  # what was left out may have been what others were needed for
         before = len(fewer)
         table.undo(0)
-        done, left = _lasting(refiner, fewer, left)
+        done, left = _lasting(refiner, fewer, owners, left)
         fewer = {one.number: one.step for one in done}
     table.undo(0)
     if len(fewer) == len(kept):
@@ -67,10 +68,13 @@ def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
         yield from parts(child, level)
 
 
-def _lasting(refiner: Refiner, steps: Mapping[int, RefinedStep], left: int) -> tuple[list[_Done], int]:
+def _lasting(
+    refiner: Refiner, steps: Mapping[int, RefinedStep], owners: Sequence[int], left: int
+) -> tuple[list[_Done], int]:
     """Do steps but for those that come to nothing and can be left out; return what was done.
 
-    At most so many are done again for that as are `left`; what is left of these is returned, too.
+    Those that one step was refined to (by `owners`) are as they are: its refinement was searched. At most so many are done again as
+    are `left`; what is left of these is returned, too.
     """
     table = refiner.table
     table = refiner.table
@@ -84,7 +88,8 @@ def _lasting(refiner: Refiner, steps: Mapping[int, RefinedStep], left: int) -> t
         done.append(one)
         for cell in one.changes[0]:
             latest.setdefault(cell, []).append(one)
-        if circle := _circle(one, latest):
+        circle = _circle(one, latest)
+        if circle and owners[circle[0].number] != owners[number]:
             left -= one.number - circle[0].number
             if left > 0 and _left_out(refiner, done, circle):
                 for cell in one.changes[0]:
@@ -107,10 +112,11 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
 
 def _changes(refiner: Refiner, mark: int) -> Changes:
     """Return what was changed since a mark."""
-    after = refiner.table.since(mark)
     before: dict[Cell, str] = {}
     for situation, key, old in refiner.table.trail[mark:]:
         before.setdefault((situation, key), old)
+    now = refiner.table.now
+    after = {cell: now[cell[0]][cell[1]] for cell, old in before.items() if now[cell[0]][cell[1]] != old}
     return {cell: before[cell] for cell in after}, after
 
 
