@@ -5,6 +5,7 @@ from planner.hierarchical.serialization import Call, compiled
 from planner.plan import Status
 from planner.validation import validate
 from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
+from worlds.hierarchies import hierarchy
 from worlds.writing import becomes, behavior, has, lacks, world
 
 
@@ -133,3 +134,9 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     assert other.refiner.do(1, "SEND", ("item0",)) == first
     assert other.refiner.do(1, "SEND", ("item1",)) is None
     assert other.refiner.misses == 0
+
+
+def test_what_level_1_does_not_see_and_all_goals_at_once_undid_is_a_goal_again() -> None:
+    problem = hierarchy(8_040_534)
+    outcome = plan(problem)
+    assert outcome.plan is None or validate(problem, outcome.plan) == []
