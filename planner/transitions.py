@@ -45,6 +45,8 @@ Cell: TypeAlias = "tuple[str, Key]"
 """A symbol as the table addresses it: situation type and key."""
 Change: TypeAlias = "tuple[str, Key, str]"
 """A cell and its value."""
+Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
+"""What is changed: the values before and after it."""
 Forward: TypeAlias = "Callable[..., tuple[tuple[str, ...], list[Change]] | None]"
 """Returns the individuals of a behaviour's variables, and its changes."""
 
@@ -110,13 +112,22 @@ class Table:
             self.put(situation, key, old)
             trail.pop()
 
+    def before(self, mark: int) -> dict[Cell, str]:
+        """Return what was touched since a mark, with the values of then."""
+        found: dict[Cell, str] = {}
+        for situation, key, old in self.trail[mark:]:
+            found.setdefault((situation, key), old)
+        return found
+
     def since(self, mark: int) -> dict[Cell, str]:
         """Return the net changes since a mark, with the present values."""
-        before: dict[Cell, str] = {}
-        for situation, key, old in self.trail[mark:]:
-            before.setdefault((situation, key), old)
         now = self.now
-        return {cell: now[cell[0]][cell[1]] for cell, old in before.items() if now[cell[0]][cell[1]] != old}
+        return {cell: now[cell[0]][cell[1]] for cell, old in self.before(mark).items() if now[cell[0]][cell[1]] != old}
+
+    def changes(self, mark: int) -> Changes:
+        """Return the net changes since a mark, with the values of then and with the present ones."""
+        before, after = self.before(mark), self.since(mark)
+        return {cell: before[cell] for cell in after}, after
 
     def state(self) -> dict[Symbol, str]:
         """Return the state as a value for those outside of the search."""

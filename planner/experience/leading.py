@@ -264,10 +264,7 @@ def by_rules(guide: Guide) -> None:
 
 def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
     """Return steps of a level, done since a mark, as a way from the state there to what they should leave."""
-    before: dict[Cell, str] = {}
-    for situation, key, old in call.table.trail[mark:]:
-        before.setdefault((situation, key), old)
-    state = call.table.state()
+    before, state = call.table.before(mark), call.table.state()
     goal = {}
     for cell, first in before.items():
         symbol = Symbol(cell[0], arguments_of(cell[1]))

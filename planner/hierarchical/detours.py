@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from planner.hierarchical.refinement_cache import RefinedStep, Refiner
-from planner.transitions import Cell
-
-Changes: TypeAlias = "tuple[dict[Cell, str], dict[Cell, str]]"
-"""What a step changes: the values before and after it."""
+from planner.transitions import Cell, Changes
 
 AGAIN = 30
 """So many times each step is done again, on average, to see what can be done without others."""
@@ -77,14 +73,13 @@ def _lasting(
     are `left`; what is left of these is returned, too.
     """
     table = refiner.table
-    table = refiner.table
     done: list[_Done] = []
     latest: dict[Cell, list[_Done]] = {}
     for number, step in steps.items():
         refiner.segments.check_time()
         mark = len(table.trail)
         refiner.again(step)
-        one = _Done(number, step, _changes(refiner, mark), mark)
+        one = _Done(number, step, table.changes(mark), mark)
         done.append(one)
         for cell in one.changes[0]:
             latest.setdefault(cell, []).append(one)
@@ -108,16 +103,6 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
         if first.changes[0] == last.changes[1]:
             return its[0][-back:]
     return []
-
-
-def _changes(refiner: Refiner, mark: int) -> Changes:
-    """Return what was changed since a mark."""
-    before: dict[Cell, str] = {}
-    for situation, key, old in refiner.table.trail[mark:]:
-        before.setdefault((situation, key), old)
-    now = refiner.table.now
-    after = {cell: now[cell[0]][cell[1]] for cell, old in before.items() if now[cell[0]][cell[1]] != old}
-    return {cell: before[cell] for cell in after}, after
 
 
 def _left_out(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:

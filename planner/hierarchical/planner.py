@@ -174,7 +174,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
         without = without_detours(call.refiner, call.steps, call.program.levels[-2])
         call.steps = without if worth_it(call.steps, without) else call.steps
     without = without_detours(call.refiner, call.steps, call.program.levels[-1])
-    price = KEPT if upper(call, without) < upper(call, call.steps) else 1.0
+    price = KEPT if abstract(call, without) < abstract(call, call.steps) else 1.0
     idle = length(call.steps) > price * length(without)
     call.steps = without if idle else call.steps
     if length(call.steps) < length(kept) and any(left.broken for left in levels_left(call.problem, call.tree())):
@@ -182,7 +182,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     return idle
 
 
-def upper(call: Call, steps: Sequence[RefinedStep]) -> int:
+def abstract(call: Call, steps: Sequence[RefinedStep]) -> int:
     """Return how many of a plan's steps are of the most abstract level."""
     return sum(step.level == call.program.levels[0] for step in steps)
 

@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 
 from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
-from planner.transitions import Cell, Change, key_of
+from planner.transitions import Cell, Change, Changes, key_of
 from reasoner.amounts import meets
 from reasoner.memory.experience import OpenRole
 from reasoner.symbols import FALSE, Behavior, ValueCondition
@@ -122,11 +122,8 @@ class Refiner:
 
     def left_as_it_must(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
         """Return a symbol touched since a mark, or a target, that isn't what it must be; None if all are."""
-        before: dict[Cell, str] = {}
-        for situation, key, old in self.table.trail[mark:]:
-            before.setdefault((situation, key), old)
         now = self.table.now
-        for cell, first in before.items():
+        for cell, first in self.table.before(mark).items():
             wanted = targets.get(cell) or keep(cell, first)
             if wanted is not None and not meets(now[cell[0]][cell[1]], wanted):
                 return cell
@@ -351,15 +348,11 @@ class Refiner:
     def _droppable(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
         """Return single steps that change only what may be anything in the end, and pairs of which one undoes the other."""
         self.table.undo(mark)
-        changes: list[tuple[dict[Cell, str], dict[Cell, str]]] = []
+        changes: list[Changes] = []
         for step in steps:
-            before = len(self.table.trail)
+            begin = len(self.table.trail)
             self.again(step)
-            after = self.table.since(before)
-            old: dict[Cell, str] = {}
-            for situation, key, value in self.table.trail[before:]:
-                old.setdefault((situation, key), value)
-            changes.append(({cell: old[cell] for cell in after}, after))
+            changes.append(self.table.changes(begin))
         alone = [
             {i} for i, (old, _) in enumerate(changes) if all(keep(cell, value) is None for cell, value in old.items())
         ]

@@ -115,9 +115,8 @@ class Call:
         asleep: Asleep = {}
         waiting: dict[Cell, list[Cell]] = {}
         before = self.order()
-        self.kept = {
-            cell: value for cell, value in self.kept.items() if self.met(cell)
-        }  # all at once may undo what is unseen
+        # What level 1 doesn't see may have been undone where all goals were planned at once.
+        self.kept = {cell: value for cell, value in self.kept.items() if self.met(cell)}
         active.extend(cell for cell in self.goal if cell not in self.kept)
 
         def sleep(cell: Cell, until: Sequence[Cell]) -> None:
