@@ -4,8 +4,9 @@ part          bits that need each other, mostly one; what a part needs besides s
 alternatives  a bit is set where all bits of one of its alternatives are; an opposite where the one bit that it names isn't
 
 After a change only the parts are looked at that need a bit which changed. A part of several bits is worked out from nothing, by
-counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984). Where there are many (who
-reaches whom in a large place), by arrays: round by round all alternatives at once.
+counting what each alternative still lacks: Dowling and Gallier, Journal of Logic Programming 1 (1984). Where a change wakes so
+many alternatives that all of the task are less work by arrays (who reaches whom in a large place; the ferry is empty, and every
+car may board), by arrays.
 """
 
 from __future__ import annotations
@@ -15,25 +16,11 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import chain
-from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
+from planner.grounded.derived_arrays import Bit, by_arrays
 
-Flags: TypeAlias = NDArray[np.bool_]
-
-MANY = 2_000
-"""Alternatives from which on arrays are faster than counting."""
-
-
-@dataclass(frozen=True, eq=False)
-class Bit:
-    """A bit, as a mask, that is set where a state has all bits of one of the masks; `opposite`: where it has none of them."""
-
-    mask: int
-    alternatives: tuple[int, ...]
-    opposite: bool = False
+AT_ONCE, CALLS = 50, 60
+"""In the time in which Python looks at one alternative, arrays look at so many; the calls of one layer, in alternatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,27 +35,47 @@ class Derived:
         return sum(bit.mask for part in self.parts for bit in part)
 
     @cached_property
+    def ways(self) -> Sequence[tuple[Sequence[int], int]]:
+        """What each alternative asks for and the bit that it sets, by number; the opposite of a bit is had for nothing."""
+        return [
+            ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
+            for part in self.parts
+            for bit in part
+            for way in bit.alternatives
+        ]
+
+    @cached_property
+    def needed(self) -> int:
+        """All bits that some alternative asks for."""
+        return _union(way for part in self.parts for bit in part for way in bit.alternatives)
+
+    @cached_property
     def effort(self) -> int:
-        """The alternatives gone through after a change, at most, but for those of parts of one bit."""
-        return sum(_ways(part) for part in self.parts if len(part) > 1)
+        """The alternatives gone through after a change, at most, but for those of parts of one bit where these are few."""
+        return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 
     def completed(self, state: int) -> int:
         """Return a state with all these bits as they have to be."""
+        if self._few < self._all:
+            return self._by_arrays(state)
         for number in range(len(self.parts)):
             state = self._worked_out(number, state)
         return state
 
     def after(self, state: int, before: int) -> int:
         """Return a state, made by changes from another one that was complete, with these bits as they have to be."""
-        users = self._users
+        users, woken = self._users, self._woken
         waiting: list[int] = []
         seen: set[int] = set()
-
-        def wake(changed: int) -> None:
+        changed, left = state ^ before, self._few
+        while True:
             changed &= self._needed
             while changed:
                 low = changed & -changed
                 changed ^= low
+                left -= woken[low]
+                if left < 0:
+                    return self._by_arrays(state)
                 came = bool(state & low)
                 for number, mask, opposite in users[low]:
                     if mask and bool(state & mask) is (came is not opposite):
@@ -76,21 +83,47 @@ class Derived:
                     if number not in seen:
                         seen.add(number)
                         heapq.heappush(waiting, number)
-
-        wake(state ^ before)
-        while waiting:
-            number = heapq.heappop(waiting)
-            new = self._worked_out(number, state)
-            if new != state:
-                changed, state = new ^ state, new
-                wake(changed)
-        return state
+            if not waiting:
+                return state
+            new = self._worked_out(heapq.heappop(waiting), state)
+            changed, state = new ^ state, new
 
     def fresh(self, state: int, bits: int) -> int:
         """Return a state with some of these bits as they have to be; the others may be those of another state."""
-        for number in self._support(bits & self.mask):
+        support = self._support(bits & self.mask)
+        if len(support) > self._few:
+            return self._by_arrays(state)
+        for number in support:
             state = self._worked_out(number, state)
         return state
+
+    @cached_property
+    def _all(self) -> int:
+        """The alternatives of all bits."""
+        return sum(map(_ways, self.parts))
+
+    @cached_property
+    def _few(self) -> int:
+        """The alternatives that are as much work one by one as all are by arrays."""
+        return self._all // AT_ONCE + CALLS * len(self._layers)
+
+    @cached_property
+    def _layers(self) -> Sequence[Sequence[Bit]]:
+        """The bits by how many parts are below theirs."""
+        height: dict[int, int] = {}  # by bit
+        found: list[list[Bit]] = []
+        for part in self.parts:
+            own = sum(bit.mask for bit in part)
+            needed = _union(way for bit in part for way in bit.alternatives) & self.mask & ~own
+            mine = 1 + max((height[low] for low in _single(needed)), default=-1)
+            height |= {bit.mask: mine for bit in part}
+            found += [[] for _ in range(mine + 1 - len(found))]
+            found[mine] += part
+        return found
+
+    @cached_property
+    def _by_arrays(self) -> Callable[[int], int]:
+        return by_arrays(self._layers)
 
     def _worked_out(self, number: int, state: int) -> int:
         """Return a state with the bits of one part as they have to be."""
@@ -126,6 +159,23 @@ class Derived:
     def _part_of(self) -> Mapping[int, int]:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
+    def within(self, state: int, changing: int, wanted: int) -> Derived:
+        """Return what it takes for some bits where, of all that don't follow, only some ever differ from a state."""
+        parts = []
+        for number in self._support(wanted & self.mask):
+            part = self.parts[number]
+            own = sum(bit.mask for bit in part)
+            if changing & ~own & _union(way for bit in part for way in bit.alternatives):
+                changing |= own
+                parts.append(part)
+        fixed = state & ~changing
+
+        def left(bit: Bit) -> Bit:
+            ways = (way & changing for way in bit.alternatives if not way & ~changing & ~fixed)
+            return replace(bit, alternatives=tuple(dict.fromkeys(ways)))
+
+        return Derived(tuple(tuple(map(left, part)) for part in parts))
+
     def renamed(self, small: Callable[[int], int]) -> Derived:
         """Return the same over other bits."""
         return Derived(
@@ -151,6 +201,12 @@ class Derived:
         return {low: tuple(numbers) for low, numbers in found.items()}
 
     @cached_property
+    def _woken(self) -> Mapping[int, int]:
+        """For each bit that is needed, the alternatives of the parts that need it."""
+        ways = [_ways(part) for part in self.parts]
+        return {low: sum(ways[number] for number, _, _ in users) for low, users in self._users.items()}
+
+    @cached_property
     def _needed(self) -> int:
         return sum(self._users)
 
@@ -166,7 +222,7 @@ def _work(part: tuple[Bit, ...]) -> Callable[[int], int]:
     """Return what gives a state the bits of one part as they have to be."""
     if len(part) == 1:
         return partial(_alone, part[0])
-    return _by_arrays(part) if _ways(part) >= MANY else _by_counting(part)
+    return _by_counting(part)
 
 
 def _ways(part: tuple[Bit, ...]) -> int:
@@ -210,41 +266,6 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
                 if not entry[0]:
                     waiting.append(entry[1])
         return state
-
-    return work
-
-
-def _by_arrays(part: tuple[Bit, ...]) -> Callable[[int], int]:
-    own = sum(bit.mask for bit in part)
-    ways = [(way, bit.mask.bit_length() - 1) for bit in part for way in bit.alternatives]
-    size = max(max(way.bit_length() for way, _ in ways), own.bit_length())
-
-    def rows(masks: Sequence[int]) -> NDArray[np.int64]:
-        lists = [[low.bit_length() - 1 for low in _single(mask)] for mask in masks]
-        found = np.full((len(lists), max(map(len, lists))), size)  # the bit behind the last is always set
-        for row, bits in zip(found, lists, strict=True):
-            row[: len(bits)] = bits
-        return found
-
-    outsides, inside = rows([way & ~own for way, _ in ways]), rows([way & own for way, _ in ways])
-    outsides, which = np.unique(outsides, axis=0, return_inverse=True)
-    heads, low, length = np.array([head for _, head in ways]), (1 << size) - 1, size // 8 + 1
-
-    def work(state: int) -> int:
-        there = np.frombuffer((state & low & ~own | 1 << size).to_bytes(length, "little"), np.uint8)
-        flags: Flags = np.unpackbits(there, bitorder="little").astype(np.bool_)
-        possible: Flags = np.logical_and.reduce(flags[outsides], axis=1)
-        active = np.flatnonzero(possible[which.ravel()])
-        lacking, goal = inside[active], heads[active]
-        while len(goal):
-            ready = flags[lacking].all(axis=1)
-            if not ready.any():
-                break
-            flags[goal[ready]] = True
-            left = ~flags[goal]
-            lacking, goal = lacking[left], goal[left]
-        flags[size] = False
-        return state & ~low | int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
 
     return work
 
@@ -296,29 +317,11 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
                         if member == number:
                             break
                     parts.append(tuple(part))
-    return Derived(tuple(_joined(parts)))
+    return Derived(tuple(parts))
 
 
 def _grounded(bit: Bit) -> Bit:
     return replace(bit, alternatives=tuple(way for way in bit.alternatives if not way & bit.mask))
-
-
-def _joined(parts: Sequence[tuple[Bit, ...]]) -> list[tuple[Bit, ...]]:
-    """Return parts by how many are below them; those of several bits that are equally high in one, if they are large."""
-    height: dict[int, int] = {}  # by bit
-    found: list[list[tuple[Bit, ...]]] = []
-    for part in parts:
-        own = {bit.mask for bit in part}
-        needed = {low for bit in part for way in bit.alternatives for low in _single(way)} - own
-        mine = 1 + max((height.get(low, -1) for low in needed), default=-1)
-        height |= dict.fromkeys(own, mine)
-        found += [[] for _ in range(mine + 1 - len(found))]
-        found[mine].append(part)
-    for as_high in found:
-        several = [part for part in as_high if len(part) > 1]
-        if len(several) > 1 and sum(map(_ways, several)) >= MANY:
-            as_high[:] = [*(part for part in as_high if len(part) == 1), tuple(chain(*several))]
-    return list(chain(*found))
 
 
 def _union(masks: Iterable[int]) -> int:

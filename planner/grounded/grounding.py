@@ -23,9 +23,11 @@ from dataclasses import replace
 import numpy as np
 
 from planner.grounded.amounts import Amounts, Linear, Move, pushes
-from planner.grounded.derived import Bit, Derived, in_parts
+from planner.grounded.derived import Derived, in_parts
+from planner.grounded.derived_arrays import Bit
+from planner.grounded.formulas import Formulas, Literals
 from planner.grounded.joins import Ints, Table, ranges
-from planner.grounded.reachability import Flags, Formulas, Literals, Reached
+from planner.grounded.reachability import Flags, Reached
 from planner.grounded.schemas import Schema
 from planner.grounded.shortage import shortage
 from planner.grounded.task import Change, Grouped, Task

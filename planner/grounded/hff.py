@@ -35,11 +35,11 @@ def heuristic(task: Task) -> Evaluate:
     goal = _bits(task.goal, task.size)
     unreached = [-1] * task.size
     size = (task.size + 7) // 8
-    table = [[[8 * place + b for b in range(8) if byte >> b & 1] for byte in range(256)] for place in range(size)]
+    of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
     def evaluate(state: int) -> Evaluation:
         left, cost, layer_of, supporter = missing[:], unreached[:], unreached[:], unreached[:]
-        layer = [bit for place, byte in enumerate(state.to_bytes(size, "little")) if byte for bit in table[place][byte]]
+        layer = [8 * i + b for i, byte in enumerate(state.to_bytes(size, "little")) if byte for b in of_byte[byte]]
         for bit in layer:
             cost[bit] = layer_of[bit] = 0
         reached, applicable, depth = always[:], None, 0

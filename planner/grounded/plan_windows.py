@@ -20,11 +20,13 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.grounded.amounts import Amounts
 from planner.grounded.hff import heuristic
 from planner.grounded.joins import Ints
 from planner.grounded.shortest import shortest, ways
@@ -237,7 +239,7 @@ class _Windows:
         if (state, wanted, len(steps)) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
-        task = self.part(operators, state, wanted)
+        task, operators = self.part(operators, state, wanted)
         found = self.search(task, len(steps), EVALUATIONS)
         if found is None:
             self.failed.add((state, wanted, len(steps)))
@@ -355,59 +357,88 @@ class _Windows:
                 chosen[operator] = None
         return sorted(chosen)
 
-    def part(self, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the task of getting from a state to what is wanted by some operators; it has only the bits that they need."""
+    def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
+        """Return the task of getting from a state to what is wanted by some operators, and those of them that it has.
+
+        What they don't change has no bit; those that ask for it are left out where the state hasn't it.
+        """
         task = self.task
-        place = {operator: i for i, operator in enumerate(operators)}
-        rows = [*operators, *(r for r in self.beside if task.owners[r] < 0 or task.owners[r] in place)]
-        needs = [task.needs[r] for r in rows]
-        owners = [place.get(task.owners[r], -1) for r in rows]
-        costs = [task.costs[operator] for operator in operators]
-        if task.amounts is not None:  # which are told by the bits of the whole task
-            of = task.amounts.moves
-            return replace(
-                task,
-                initial=state,
-                goal=wanted,
-                costs=costs,
-                owners=owners,
-                needs=_grouped(needs),
-                adds=_grouped([task.adds[r] for r in rows]),
-                change=lambda operator: task.known(operators[operator]),
-                describe=lambda operator: task.describe(operators[operator]),
-                amounts=replace(task.amounts, moves=lambda operator: of(operators[operator]), _moves={}),
-                _changes={},
-            )
-        bits = sorted({bit for found in needs for bit in found}.union(bits_of(wanted | task.derived.mask)))
-        new = {bit: i for i, bit in enumerate(bits)}
-        mask = sum(1 << bit for bit in bits)
+        if task.amounts is not None:
+            return self._part_with_amounts(task.amounts, operators, state, wanted), operators
+        changing, asked = 0, wanted
+        for operator in operators:
+            precondition, changes = task.known(operator)
+            asked |= precondition
+            for when, cleared, set_ in changes:
+                asked |= when
+                changing |= cleared | set_
+        derived = task.derived.within(state, changing, asked)
+        bits = derived.mask | changing & (asked | derived.needed)
+        missing = asked & ~(changing | derived.mask | state)
+        operators = [operator for operator in operators if not task.known(operator)[0] & missing]
+        rows = self._rows(operators)
+        lost = set(bits_of(missing))
+        rows = [r for r in rows if lost.isdisjoint(task.needs[r])]
+        new = {bit: i for i, bit in enumerate(bits_of(bits))}
 
         def small(state: int) -> int:
-            return sum(1 << new[bit] for bit in bits_of(state & mask))
+            return sum(1 << new[bit] for bit in bits_of(state & bits))
 
         def change(operator: int) -> tuple[int, tuple[Change, ...]]:
             precondition, changes = task.known(operators[operator])
-            return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in changes)
+            kept = (one for one in changes if not one[0] & missing)
+            return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in kept)
 
-        return replace(
+        needs, adds = [task.needs[r] for r in rows], [task.adds[r] for r in rows]
+        place = {operator: i for i, operator in enumerate(operators)}
+        ways = derived.ways
+        part = replace(
             task,
-            size=len(bits),
+            size=len(new),
             initial=small(state),
             goal=small(wanted),
-            costs=costs,
-            owners=owners,
-            needs=_grouped([[new[bit] for bit in found] for found in needs]),
-            adds=_grouped([[new[bit] for bit in task.adds[r] if bit in new] for r in rows]),
-            derived=task.derived.renamed(small),
+            costs=[task.costs[operator] for operator in operators],
+            owners=[place[task.owners[r]] for r in rows] + [-1] * len(ways),
+            needs=_grouped(
+                [[new[bit] for bit in found if bit in new] for found in needs + [list(way) for way, _ in ways]]
+            ),
+            adds=_grouped([[new[bit] for bit in found if bit in new] for found in adds + [[bit] for _, bit in ways]]),
+            derived=derived.renamed(small),
             change=change,
             describe=lambda operator: task.describe(operators[operator]),
             _changes={},
         )
+        return part, operators
+
+    def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
+        """Return the same with all bits, by which amounts are told."""
+        task, of = self.task, amounts.moves
+        place = {operator: i for i, operator in enumerate(operators)}
+        rows = [*self._rows(operators), *self._conditional.get(-1, ())]
+        return replace(
+            task,
+            initial=state,
+            goal=wanted,
+            costs=[task.costs[operator] for operator in operators],
+            owners=[place.get(task.owners[r], -1) for r in rows],
+            needs=_grouped([task.needs[r] for r in rows]),
+            adds=_grouped([task.adds[r] for r in rows]),
+            change=lambda operator: task.known(operators[operator]),
+            describe=lambda operator: task.describe(operators[operator]),
+            amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}),
+            _changes={},
+        )
+
+    def _rows(self, operators: Sequence[int]) -> list[int]:
+        """Return the relaxed operators that are these operators or conditional effects of theirs."""
+        return [*operators, *sorted(chain.from_iterable(self._conditional.get(operator, ()) for operator in operators))]
 
     @cached_property
-    def beside(self) -> list[int]:
-        """The relaxed operators that are conditional effects or derived bits."""
-        return list(range(len(self.task), len(self.task.owners)))
+    def _conditional(self) -> dict[int, list[int]]:
+        found: dict[int, list[int]] = {}
+        for r in range(len(self.task), len(self.task.owners)):
+            found.setdefault(self.task.owners[r], []).append(r)
+        return found
 
 
 def _grouped(lists: Sequence[Sequence[int]]) -> Grouped:

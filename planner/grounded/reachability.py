@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
@@ -13,17 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.grounded.amounts import AmountTable
+from planner.grounded.formulas import Formulas
 from planner.grounded.joins import Ints, Table, pack
-from planner.grounded.schemas import Atom, Schema, plain_variables, rules_apart, schemas
+from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
 from planner.language import mentions
-from planner.plan import OutOfTimeError, TooLargeError
-from reasoner.amounts import Amount, bounds
+from planner.plan import OutOfTimeError
 from reasoner.symbols import (
     FALSE,
     TRUE,
-    AnyOf,
     ClassCondition,
-    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -31,16 +29,10 @@ from reasoner.symbols import (
     SituationType,
     State,
     Symbol,
-    ValueCondition,
     ValueEffect,
-    Witness,
 )
 
 Flags: TypeAlias = NDArray[np.bool_]
-
-
-CONDITIONS_PER_ROW = 20
-"""Conditions that may be worked out with individuals put in, for each row that a join may have: nested groups multiply."""
 
 
 class Reached:
@@ -335,195 +327,3 @@ class Reached:
         if -1 in numbers or len(numbers) != table.arity:
             return -1
         return int(table.find(np.array([numbers], np.int64).reshape(1, -1))[0])
-
-
-Literals = tuple[int, ...] | None
-"""A conjunction of bits; the empty one is true, None is false."""
-
-
-class Formulas:
-    """Conditions with individuals put in, as conjunctions of bits. Disjunctions become derived bits, each made once.
-
-    Until `facts` is filled, situation types that change have no bits: only static conditions may be asked about.
-    """
-
-    def __init__(self, reached: Reached) -> None:
-        self.reached = reached
-        self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
-        self.size = 0
-        self.complements: dict[int, int] = {}
-        self.facts_of: dict[int, int] = {}  # their opposite
-        self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
-        self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # of disjunctions, by bit
-        self.asked = 0
-
-    def condition(
-        self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
-    ) -> Literals:
-        """Return what must hold for a condition (negated: its contrary) to hold."""
-        self.asked += 1
-        if self.asked > CONDITIONS_PER_ROW * self.reached.most:
-            raise TooLargeError(
-                f"more than {CONDITIONS_PER_ROW * self.reached.most} conditions with individuals put in"
-            )
-        if not self.asked % 1024:
-            self.reached.check_time()
-
-        def put(names: Sequence[str]) -> tuple[str, ...]:
-            return tuple(terms.get(name, name) for name in names)
-
-        match condition:
-            case ValueCondition(situation, arguments, value, flipped):
-                return self.value(situation, put(arguments), terms.get(value, value), flipped is not negated)
-            case RelationCondition(relation, arguments, flipped):
-                holds = put(arguments) in self.reached.problem.relations.get(relation, ())
-            case ClassCondition(term, kind, flipped):
-                holds = terms.get(term, term) in self.members(kind)
-            case EqualityCondition(left, right, flipped):
-                holds = terms.get(left, left) == terms.get(right, right)
-            case Witness(variable, kind, conditions, flipped):
-                groups: Iterable[Sequence[Condition]] = [(ClassCondition(variable, kind), *conditions)]
-                inner = {name: term for name, term in terms.items() if name != variable}
-                return self._any(groups, inner, {**kinds, variable: kind}, flipped is not negated)
-            case AnyOf(alternatives, flipped):
-                return self._any(alternatives, terms, kinds, flipped is not negated)
-            case Comparison(left, sign, right, flipped):
-                amounts = self.reached.amounts
-                one, other = amounts.linear(left, terms), amounts.linear(right, terms)
-                return self.any_of(amounts.comparison(one, sign, other, flipped is not negated, self.fresh))
-        return () if holds is not (flipped is not negated) else None
-
-    def _any(
-        self, groups: Iterable[Sequence[Condition]], terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
-    ) -> Literals:
-        """Return what must hold for some group to hold with some individuals for its own variables (negated: for none to)."""
-        cases = [(group, found) for group in groups for found in self._solutions(list(group), dict(terms), kinds)]
-        if negated:
-            return self.all_of(
-                self.any_of(self.condition(c, found, kinds, negated=True) for c in group) for group, found in cases
-            )
-        return self.any_of(self.all_of(self.condition(c, found, kinds) for c in group) for group, found in cases)
-
-    def _solutions(
-        self, group: list[Condition], terms: dict[str, str], kinds: Mapping[str, str]
-    ) -> Iterator[dict[str, str]]:
-        """Yield every way to put individuals in for a group's unbound variables that static knowledge doesn't rule out."""
-        unbound = sorted(plain_variables(group) - terms.keys())
-        if not unbound:
-            yield terms
-            return
-        name, values = min(
-            ((name, self._candidates(name, group, terms, kinds)) for name in unbound), key=lambda pair: len(pair[1])
-        )
-        for value in values:
-            yield from self._solutions(group, {**terms, name: value}, kinds)
-
-    def _candidates(
-        self, name: str, group: Sequence[Condition], terms: Mapping[str, str], kinds: Mapping[str, str]
-    ) -> Sequence[str]:
-        """Return individuals for a variable: those that a positive condition of the group leaves, else its whole class."""
-        members = self.members(kinds[name])
-        for c in group:
-            if isinstance(c, ValueCondition) and not c.negated and c.value == name:
-                arguments = tuple(terms.get(a, a) for a in c.arguments)
-                if not any(a.startswith("?") for a in arguments):
-                    return [v for v in self.values.get((c.situation, arguments), ()) if v in members]
-            if isinstance(c, RelationCondition) and not c.negated and name in c.arguments:
-                fixed = {i: terms[a] for i, a in enumerate(c.arguments) if a in terms}
-                place = c.arguments.index(name)
-                tuples = self.reached.problem.relations.get(c.relation, ())
-                found = {t[place] for t in tuples if all(t[i] == value for i, value in fixed.items())}
-                return [v for v in members if v in found]
-        return list(members)
-
-    @cached_property
-    def values(self) -> Mapping[tuple[str, tuple[str, ...]], list[str]]:
-        """The reachable values of each symbol that isn't boolean."""
-        found: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
-        names = self.reached.individuals
-        for name in self.reached.symbols:
-            for row in self.reached.tables["situation", name].rows.tolist():
-                found[name, tuple(names[i] for i in row[:-1])].append(names[row[-1]])
-        return found
-
-    def members(self, kind: str) -> dict[str, None]:
-        """Return the individuals of a class."""
-        if kind not in self._members:
-            self._members[kind] = dict.fromkeys(self.reached.problem.classes.get(kind, ()))
-        return self._members[kind]
-
-    @cached_property
-    def _members(self) -> dict[str, dict[str, None]]:
-        return {}
-
-    def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return what must hold for a symbol to have a value (negated: not to have it)."""
-        kind = self.reached.situations.get(situation)
-        if kind is None:  # it doesn't exist on this level
-            return () if negated else None
-        if kind.boolean and value == FALSE:
-            if not all(a in self.members(k) for a, k in zip(arguments, kind.arguments, strict=True)):
-                return () if negated else None
-            return self.value(situation, arguments, TRUE, not negated)
-        bits = self.bits.get(situation)
-        if bits is None:
-            bit = -1 if self.reached.find(kind, arguments, value) >= 0 else None
-        else:
-            bit = bits.get(arguments if kind.boolean else (*arguments, value))
-        if bit is None or bit == -1:
-            return () if (bit is None) is negated else None
-        return (self.complement(bit) if negated else bit,)
-
-    def complement(self, bit: int) -> int:
-        """Return the bit that says that a fact doesn't hold, or the fact's bit if that is a complement."""
-        if bit in self.facts_of:
-            return self.facts_of[bit]
-        if bit not in self.complements:
-            self.complements[bit] = self.fresh()
-            self.facts_of[self.complements[bit]] = bit
-        return self.complements[bit]
-
-    def opposite(self, bit: int) -> Literals:
-        """Return what must hold for a bit not to be set."""
-        groups = self._groups.get(bit)
-        if groups is not None:
-            return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)
-        contrary = self.reached.amounts.opposite(bit, self.fresh)
-        return (self.complement(bit),) if contrary is None else self.any_of(contrary)
-
-    def fresh(self) -> int:
-        """Return a bit that nothing has yet."""
-        self.size += 1
-        return self.size - 1
-
-    def wanted(self, symbol: Symbol, value: str) -> Literals:
-        """Return what must hold for a symbol to be as a goal wants it."""
-        if self.reached.problem.domain.situations[symbol.situation].quantity is None:
-            return self.value(symbol.situation, symbol.arguments, value, False)
-        amount = Amount(symbol.situation, symbol.arguments)
-        return self.all_of(self.condition(Comparison(amount, sign, limit), {}, {}) for sign, limit in bounds(value))
-
-    def all_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the conjunction."""
-        found: set[int] = set()
-        for part in parts:
-            if part is None:
-                return None
-            found.update(part)
-        return tuple(sorted(found))
-
-    def any_of(self, parts: Iterable[Literals]) -> Literals:
-        """Return the disjunction: one derived bit unless it is simpler than that."""
-        found: set[tuple[int, ...]] = set()
-        for part in parts:
-            if part == ():
-                return ()
-            if part is not None:
-                found.add(part)
-        alternatives = tuple(sorted(found))
-        if len(alternatives) < 2:
-            return alternatives[0] if alternatives else None
-        if alternatives not in self.derived:
-            self.derived[alternatives] = self.fresh()
-            self._groups[self.derived[alternatives]] = alternatives
-        return (self.derived[alternatives],)

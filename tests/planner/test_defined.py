@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.grounded.derived import Bit, in_parts
+from planner.grounded.derived import in_parts
+from planner.grounded.derived_arrays import Bit
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.hierarchical.operators import Program
@@ -271,26 +272,46 @@ def test_what_is_defined_by_a_lower_level_exists_from_there_on(tmp_path: Path, d
     assert not [finding for finding in validate([path]) if finding.serious]
 
 
+def following(rng: Random) -> dict[int, Bit]:
+    """Return twelve bits that follow from each other and from six that are stated, before them."""
+    return {
+        bit: Bit(1 << bit, tuple(sum({1 << other for other in rng.sample(range(18), rng.randint(1, 3))} - {1 << bit})
+                                 for _ in range(rng.randint(0, 4))))
+        for bit in range(6, 18)
+    }  # fmt: skip
+
+
 @given(seed=st.integers(0, 10**9))
 def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int) -> None:
     rng = Random(seed)
-    first, places = 6, range(6, 18)  # six bits that are stated, twelve that follow from each other and from these
-    bits = {
-        bit: Bit(1 << bit, tuple(sum({1 << other for other in rng.sample(range(18), rng.randint(1, 3))} - {1 << bit})
-                                 for _ in range(rng.randint(0, 4))))
-        for bit in places
-    }  # fmt: skip
+    first, bits = 6, following(rng)
     changes, above = (
         rng.sample(range(1 << first), 1 << first),
         5 << 20,
     )  # the number of the amounts stands above all bits
     found = []
-    for many in (0, 10**6):
+    for few in (0, 10**6):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("planner.grounded.derived.MANY", many)
+            patch.setattr("planner.grounded.derived.CALLS", few)
+            patch.setattr("planner.grounded.derived.AT_ONCE", 10**9)
             derived = in_parts(bits)
             states = [derived.completed(stated | above) for stated in range(1 << first)]
             after = [derived.after(state ^ change, state) for state, change in zip(states, changes, strict=True)]
             assert after == [states[stated ^ change] for stated, change in enumerate(changes)]
             found.append(states)
     assert found[0] == found[1]
+
+
+@given(seed=st.integers(0, 10**9))
+def test_what_few_changes_can_make_of_what_follows_is_told_by_less(seed: int) -> None:
+    rng = Random(seed)
+    bits = following(rng)
+    bits[18] = Bit(1 << 18, (1 << rng.randrange(6, 18),), opposite=True)
+    derived = in_parts(bits)
+    state = derived.completed(rng.randrange(1 << 6))
+    changing, wanted = rng.randrange(1 << 6), rng.randrange(1 << 19)
+    less = derived.within(state, changing, wanted)
+    for _ in range(10):
+        other = state ^ changing & rng.randrange(1 << 6)
+        assert less.completed(other) & wanted == derived.completed(other) & wanted
+    assert not derived.within(state, 0, wanted).parts

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.grounded.best_first import plan_level, search
+from planner.grounded.formulas import Formulas
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
 from planner.language import DomainError
@@ -218,3 +221,40 @@ def corridor(length: int) -> Problem:
         {Symbol("AT", ("x",)): places[0]},
         {Symbol("LIT", (place,)): TRUE for place in places},
     )
+
+
+def test_what_a_condition_asks_of_one_place_is_worked_out_once_for_each_place() -> None:
+    size = 40
+    places, things = tuple(f"p{i:02}" for i in range(size)), tuple(f"x{i:02}" for i in range(size))
+    waits = Witness("?x", "Thing", (ValueCondition("AT", ("?x",), "?v"), ValueCondition("LIT", ("?u",), TRUE)))
+    go = Behavior(
+        "GO",
+        1,
+        (Parameter("?y", "Thing"), Parameter("?v", "Place")),
+        (Parameter("?u", "Place"),),
+        (ValueCondition("AT", ("?y",), "?u"), AnyOf(((waits,), (ValueCondition("LIT", ("?v",), TRUE, True),)))),
+        (ValueEffect("AT", ("?y",), "?v"), ValueEffect("LIT", ("?u",), FALSE)),
+    )
+    situations = {name: SITUATIONS[name] for name in ("AT", "LIT")}
+    problem = Problem(
+        "urn:waits",
+        Domain(situations, {"GO": go}),
+        {"Thing": things, "Place": places},
+        {},
+        {Symbol("AT", (x,)): p for x, p in zip(things, places, strict=True)}
+        | {Symbol("LIT", (p,)): TRUE for p in places},
+        {Symbol("AT", (things[0],)): places[1]},
+    )
+    asked = 0
+    with pytest.MonkeyPatch.context() as patch:
+        condition = Formulas.condition
+
+        def counted(*arguments: Any) -> Any:
+            nonlocal asked
+            asked += 1
+            return condition(*arguments)
+
+        patch.setattr(Formulas, "condition", counted)
+        task = ground(problem)
+    assert isinstance(task, Task) and len(task) > size**2
+    assert asked < 8 * size**2  # and not a thing for each pair of places

@@ -170,7 +170,7 @@ def test_queries_on_the_graph_say_so_too(world: str) -> None:
 
 CASES = {
     "planner/transitions.py": "expression",
-    "planner/grounded/reachability.py": "condition",
+    "planner/grounded/formulas.py": "condition",
     "reasoner/reading/affordance.py": "positive",
     "planner/validation.py": "test",
     "tests/planner/naive.py": "holds",

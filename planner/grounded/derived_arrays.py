@@ -1,0 +1,110 @@
+"""Bits that follow from other bits, all of a task at once: in layers, each by arrays of all its alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import chain
+from operator import or_
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.grounded.joins import Ints
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Bit:
+    """A bit, as a mask, that is set where a state has all bits of one of the masks; `opposite`: where it has none of them."""
+
+    mask: int
+    alternatives: tuple[int, ...]
+    opposite: bool = False
+
+
+def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
+    """Return what gives a state all bits of some layers as they have to be; a layer needs none behind it."""
+    bits = list(chain(*layers))
+    own = reduce(or_, (bit.mask for bit in bits))
+    size = reduce(or_, (way for bit in bits for way in bit.alternatives), own).bit_length()
+    low, length = (1 << size) - 1, size // 8 + 1
+    works = [_Layer.of(layer, size) for layer in layers]
+
+    def work(state: int) -> int:
+        there = np.frombuffer((state & low & ~own | 1 << size).to_bytes(length, "little"), np.uint8)
+        flags: Flags = np.unpackbits(there, bitorder="little").view(np.bool_)
+        for layer in works:
+            layer.work(flags)
+        flags[size] = False
+        return state & ~low | int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
+
+    return work
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    """Alternatives by how much they need: of layers before and of this one, in columns; the bit of each; which are opposites."""
+
+    before: Sequence[Ints]
+    inside: Sequence[Ints]
+    heads: Ints
+    opposites: Ints
+
+    @staticmethod
+    def of(layer: Sequence[Bit], always: int) -> _Layer:
+        """Return the arrays of a layer; a bit that is always set fills up what is shorter."""
+        own = reduce(or_, (bit.mask for bit in layer))
+        ways = [(way & ~own, way & own, _numbers(bit.mask)[0]) for bit in layer for way in bit.alternatives]
+        ways.sort(key=lambda way: -way[0].bit_count())
+        first, *others = _columns([before for before, _, _ in ways], always) or [np.full(len(ways), always)]
+        return _Layer(
+            [first, *(column[column != always] for column in others)],  # only the first ones are so long
+            _columns([inside for _, inside, _ in ways], always),
+            np.array([head for _, _, head in ways], np.int64),
+            np.array([_numbers(bit.mask)[0] for bit in layer if bit.opposite], np.int64),
+        )
+
+    def work(self, flags: Flags) -> None:
+        """Set the flags of the layer's bits, none of which is set before, in rounds until nothing is new."""
+        active = np.flatnonzero(_all_set(flags, self.before))
+        lacking, goal = [column[active] for column in self.inside], self.heads[active]
+        while lacking and len(goal):
+            ready = _all_set(flags, lacking)
+            if not ready.any():
+                break
+            flags[goal[ready]] = True
+            left = ~flags[goal]
+            lacking, goal = [column[left] for column in lacking], goal[left]
+        if not lacking:
+            flags[goal] = True
+        flags[self.opposites] = ~flags[self.opposites]
+
+
+def _columns(masks: Sequence[int], always: int) -> list[Ints]:
+    """Return the first bit of each mask, the second, and so on."""
+    lists = [_numbers(mask) for mask in masks]
+    found = np.full((max(map(len, lists), default=0), len(lists)), always)
+    for which, bits in enumerate(lists):
+        found[: len(bits), which] = bits
+    return list(found)
+
+
+def _numbers(mask: int) -> list[int]:
+    found = []
+    while mask:
+        low = mask & -mask
+        mask ^= low
+        found.append(low.bit_length() - 1)
+    return found
+
+
+def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
+    """Return of which rows all bits are set; only the first column has one of each row, the others of the first ones."""
+    found: Flags = flags[columns[0]]
+    for column in columns[1:]:
+        found[: len(column)] &= flags[column]
+    return found

@@ -1,0 +1,319 @@
+"""Conditions with individuals put in, as conjunctions of bits.
+
+What doesn't speak of a witness is apart from it: "the ferry is here, and some car waits there" is the ferry's bit and a bit for the
+car, which is worked out once for each place.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import count
+from typing import Protocol
+
+from planner.grounded.amounts import AmountTable
+from planner.grounded.joins import Table
+from planner.grounded.schemas import plain_variables
+from planner.language import mentions
+from planner.plan import TooLargeError
+from reasoner.amounts import Amount, bounds
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+
+CONDITIONS_PER_ROW = 20
+"""Conditions that may be worked out with individuals put in, for each row that a join may have: nested groups multiply."""
+
+Literals = tuple[int, ...] | None
+"""A conjunction of bits; the empty one is true, None is false."""
+
+
+class Known(Protocol):
+    """What is reached, as far as conditions ask for it (`planner.grounded.reachability.Reached`)."""
+
+    problem: Problem
+    most: int
+    situations: dict[str, SituationType]
+    individuals: tuple[str, ...]
+    amounts: AmountTable
+    tables: dict[tuple[str, str], Table]
+    symbols: dict[str, Table]
+
+    def find(self, situation: SituationType, arguments: Sequence[str], value: str) -> int:
+        """Return the row of a fact in its table, or -1."""
+
+    def check_time(self) -> None:
+        """Raise `OutOfTimeError` when the deadline has passed."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Conditions that share variables which nothing outside binds, those that are bound there, and the kinds of all."""
+
+    conditions: tuple[Condition, ...]
+    unbound: tuple[str, ...]
+    bound: tuple[str, ...]
+    kinds: Mapping[str, str]
+
+
+class Formulas:
+    """Conditions with individuals put in, as conjunctions of bits. Disjunctions become derived bits, each made once.
+
+    Until `facts` is filled, situation types that change have no bits: only static conditions may be asked about.
+    """
+
+    def __init__(self, reached: Known) -> None:
+        self.reached = reached
+        self.bits: dict[str, dict[tuple[str, ...], int]] = {}  # of facts that can change, -1 for those always true
+        self.size = 0
+        self.complements: dict[int, int] = {}
+        self.facts_of: dict[int, int] = {}  # their opposite
+        self.derived: dict[tuple[tuple[int, ...], ...], int] = {}
+        self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # of disjunctions, by bit
+        self.asked = 0
+        self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # by part and what it has from outside
+        self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Part]]]] = {}
+        self._relations: dict[tuple[str, int, int, tuple[int, ...]], dict[tuple[str, ...], dict[str, None]]] = {}
+        self._names = count()
+
+    def condition(
+        self, condition: Condition, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool = False
+    ) -> Literals:
+        """Return what must hold for a condition (negated: its contrary) to hold."""
+        self.asked += 1
+        if self.asked > CONDITIONS_PER_ROW * self.reached.most:
+            raise TooLargeError(
+                f"more than {CONDITIONS_PER_ROW * self.reached.most} conditions with individuals put in"
+            )
+        if not self.asked % 1024:
+            self.reached.check_time()
+
+        def put(names: Sequence[str]) -> tuple[str, ...]:
+            return tuple(terms.get(name, name) for name in names)
+
+        match condition:
+            case ValueCondition(situation, arguments, value, flipped):
+                return self.value(situation, put(arguments), terms.get(value, value), flipped is not negated)
+            case RelationCondition(relation, arguments, flipped):
+                holds = put(arguments) in self.reached.problem.relations.get(relation, ())
+            case ClassCondition(term, kind, flipped):
+                holds = terms.get(term, term) in self.members(kind)
+            case EqualityCondition(left, right, flipped):
+                holds = terms.get(left, left) == terms.get(right, right)
+            case Witness() | AnyOf():
+                return self._any(condition, terms, kinds, condition.negated is not negated)
+            case Comparison(left, sign, right, flipped):
+                amounts = self.reached.amounts
+                one, other = amounts.linear(left, terms), amounts.linear(right, terms)
+                return self.any_of(amounts.comparison(one, sign, other, flipped is not negated, self.fresh))
+        return () if holds is not (flipped is not negated) else None
+
+    def _any(
+        self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
+    ) -> Literals:
+        """Return what must hold for some group to hold with some individuals for its own variables (negated: for none to)."""
+        groups = self._groups_of(condition, frozenset(terms), kinds)
+        if negated:
+            return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
+        return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
+
+    def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
+        """Return what must hold for some individuals to fulfil all conditions of a part (negated: for none to)."""
+        bound = {name: terms[name] for name in part.bound}
+        key = id(part), negated, tuple(bound.values())
+        if key not in self._known:
+            solutions, kinds = self._solutions(part, part.unbound, bound), part.kinds
+            each = ((self.condition(c, found, kinds, negated) for c in part.conditions) for found in solutions)
+            self._known[key] = self.all_of(map(self.any_of, each)) if negated else self.any_of(map(self.all_of, each))
+        return self._known[key]
+
+    def _groups_of(
+        self, condition: Witness | AnyOf, bound: frozenset[str], kinds: Mapping[str, str]
+    ) -> list[list[_Part]]:
+        """Return the groups of a condition, each in parts that share no variable but those that are bound."""
+        key = id(condition), bound
+        if key not in self._parts_of:
+            groups: Iterable[Sequence[Condition]] = (
+                [(replace(condition, negated=False),)] if isinstance(condition, Witness) else condition.alternatives
+            )
+            self._parts_of[key] = condition, [list(self._parts(group, bound, kinds)) for group in groups]
+        return self._parts_of[key][1]
+
+    def _parts(self, group: Sequence[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> Iterator[_Part]:
+        """Yield a group in parts: "a cup is clean and a hand is empty" asks for a cup and, apart from it, for a hand."""
+        kinds = dict(kinds)
+        conditions = list(self._opened(group, bound | plain_variables(group), kinds))
+        unbound = plain_variables(conditions) - bound
+        while conditions:
+            of_part, names = [conditions.pop(0)], set[str]()
+            while True:
+                names = {name for c in of_part for name in mentions(c)} & unbound
+                more = [c for c in conditions if mentions(c) & names]
+                if not more:
+                    break
+                of_part += more
+                conditions = [c for c in conditions if c not in more]
+            outside = {name for c in of_part for name in mentions(c)} & bound
+            yield _Part(tuple(of_part), tuple(sorted(names)), tuple(sorted(outside)), kinds)
+
+    def _opened(
+        self, group: Sequence[Condition], shared: set[str] | frozenset[str], kinds: dict[str, str]
+    ) -> Iterator[Condition]:
+        """Yield the conditions of a group, those of witnesses among them with variables that are nobody else's."""
+        for c in group:
+            if not isinstance(c, Witness) or c.negated:
+                yield c
+                continue
+            own = {c.variable: c.kind} | {
+                name: kinds[name] for name in plain_variables(c.conditions) - shared - {c.variable}
+            }
+            names = {name: f"{name}/{next(self._names)}" for name in sorted(own)}
+            kinds |= {names[name]: kind for name, kind in own.items()}
+            yield ClassCondition(names[c.variable], c.kind)
+            inner = [substituted(one, names) for one in c.conditions]
+            yield from self._opened(inner, shared | set(names.values()), kinds)
+
+    def _solutions(self, part: _Part, unbound: Sequence[str], terms: Mapping[str, str]) -> Iterator[Mapping[str, str]]:
+        """Yield every way to put individuals in for a part's unbound variables that static knowledge doesn't rule out."""
+        if not unbound:
+            yield terms
+            return
+        name, values = min(
+            ((name, self._candidates(name, part, terms)) for name in unbound), key=lambda pair: len(pair[1])
+        )
+        rest = [other for other in unbound if other != name]
+        for value in values:
+            yield from self._solutions(part, rest, {**terms, name: value})
+
+    def _candidates(self, name: str, part: _Part, terms: Mapping[str, str]) -> Sequence[str]:
+        """Return individuals for a variable: those that a positive condition of the part leaves, else its whole class."""
+        members = self.members(part.kinds[name])
+        for c in part.conditions:
+            if isinstance(c, ValueCondition) and not c.negated and c.value == name:
+                arguments = tuple(terms.get(a, a) for a in c.arguments)
+                if not any(a.startswith("?") for a in arguments):
+                    return [v for v in self.values.get((c.situation, arguments), ()) if v in members]
+            if isinstance(c, RelationCondition) and not c.negated and name in c.arguments:
+                fixed = {i: terms.get(a, a) for i, a in enumerate(c.arguments) if a in terms or not a.startswith("?")}
+                found = self._related(c.relation, len(c.arguments), c.arguments.index(name), tuple(fixed))
+                return [v for v in found.get(tuple(fixed.values()), ()) if v in members]
+        return list(members)
+
+    def _related(
+        self, relation: str, arity: int, place: int, fixed: tuple[int, ...]
+    ) -> Mapping[tuple[str, ...], Mapping[str, None]]:
+        """Return the individuals in one place of a relation's tuples, by those in other places."""
+        key = relation, arity, place, fixed
+        if key not in self._relations:
+            found = self._relations[key] = {}
+            for row in sorted(self.reached.problem.relations.get(relation, ())):
+                if len(row) == arity:
+                    found.setdefault(tuple(row[i] for i in fixed), {})[row[place]] = None
+        return self._relations[key]
+
+    @cached_property
+    def values(self) -> Mapping[tuple[str, tuple[str, ...]], list[str]]:
+        """The reachable values of each symbol that isn't boolean."""
+        found: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        names = self.reached.individuals
+        for name in self.reached.symbols:
+            for row in self.reached.tables["situation", name].rows.tolist():
+                found[name, tuple(names[i] for i in row[:-1])].append(names[row[-1]])
+        return found
+
+    def members(self, kind: str) -> dict[str, None]:
+        """Return the individuals of a class."""
+        if kind not in self._members:
+            self._members[kind] = dict.fromkeys(self.reached.problem.classes.get(kind, ()))
+        return self._members[kind]
+
+    @cached_property
+    def _members(self) -> dict[str, dict[str, None]]:
+        return {}
+
+    def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
+        """Return what must hold for a symbol to have a value (negated: not to have it)."""
+        kind = self.reached.situations.get(situation)
+        if kind is None:  # it doesn't exist on this level
+            return () if negated else None
+        if kind.boolean and value == FALSE:
+            if not all(a in self.members(k) for a, k in zip(arguments, kind.arguments, strict=True)):
+                return () if negated else None
+            return self.value(situation, arguments, TRUE, not negated)
+        bits = self.bits.get(situation)
+        if bits is None:
+            bit = -1 if self.reached.find(kind, arguments, value) >= 0 else None
+        else:
+            bit = bits.get(arguments if kind.boolean else (*arguments, value))
+        if bit is None or bit == -1:
+            return () if (bit is None) is negated else None
+        return (self.complement(bit) if negated else bit,)
+
+    def complement(self, bit: int) -> int:
+        """Return the bit that says that a fact doesn't hold, or the fact's bit if that is a complement."""
+        if bit in self.facts_of:
+            return self.facts_of[bit]
+        if bit not in self.complements:
+            self.complements[bit] = self.fresh()
+            self.facts_of[self.complements[bit]] = bit
+        return self.complements[bit]
+
+    def opposite(self, bit: int) -> Literals:
+        """Return what must hold for a bit not to be set."""
+        groups = self._groups.get(bit)
+        if groups is not None:
+            return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)
+        contrary = self.reached.amounts.opposite(bit, self.fresh)
+        return (self.complement(bit),) if contrary is None else self.any_of(contrary)
+
+    def fresh(self) -> int:
+        """Return a bit that nothing has yet."""
+        self.size += 1
+        return self.size - 1
+
+    def wanted(self, symbol: Symbol, value: str) -> Literals:
+        """Return what must hold for a symbol to be as a goal wants it."""
+        if self.reached.problem.domain.situations[symbol.situation].quantity is None:
+            return self.value(symbol.situation, symbol.arguments, value, False)
+        amount = Amount(symbol.situation, symbol.arguments)
+        return self.all_of(self.condition(Comparison(amount, sign, limit), {}, {}) for sign, limit in bounds(value))
+
+    def all_of(self, parts: Iterable[Literals]) -> Literals:
+        """Return the conjunction."""
+        found: set[int] = set()
+        for part in parts:
+            if part is None:
+                return None
+            found.update(part)
+        return tuple(sorted(found))
+
+    def any_of(self, parts: Iterable[Literals]) -> Literals:
+        """Return the disjunction: one derived bit unless it is simpler than that."""
+        found: set[tuple[int, ...]] = set()
+        for part in parts:
+            if part == ():
+                return ()
+            if part is not None:
+                found.add(part)
+        alternatives = tuple(sorted(found))
+        if len(alternatives) < 2:
+            return alternatives[0] if alternatives else None
+        if alternatives not in self.derived:
+            self.derived[alternatives] = self.fresh()
+            self._groups[self.derived[alternatives]] = alternatives
+        return (self.derived[alternatives],)
