@@ -453,26 +453,25 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
             return Comparison(put_in(one, terms), sign, put_in(other, terms), negated)
 
 
+def made_of(effect: Effect, one: str) -> Effect:
+    """Return an effect on each of a class as one on an individual."""
+    if effect.each is None:
+        return effect
+    terms = {effect.each.name: one}
+    arguments = tuple(terms.get(a, a) for a in effect.arguments)
+    when = tuple(substituted(condition, terms) for condition in effect.when)
+    if isinstance(effect, ValueEffect):
+        return ValueEffect(effect.situation, arguments, terms.get(effect.value, effect.value), when)
+    return AmountEffect(effect.situation, arguments, effect.operation, put_in(effect.amount, terms), when)
+
+
 def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior:
     """Return a behaviour with an effect for each individual of a class in place of one for all of them."""
     if all(effect.each is None for effect in behavior.every_effect):
         return behavior
 
     def single(effect: Effect) -> list[Effect]:
-        if effect.each is None:
-            return [effect]
-        found: list[Effect] = []
-        for one in classes.get(effect.each.kind, ()):
-            terms = {effect.each.name: one}
-            arguments = tuple(terms.get(a, a) for a in effect.arguments)
-            when = tuple(substituted(condition, terms) for condition in effect.when)
-            if isinstance(effect, ValueEffect):
-                value = terms.get(effect.value, effect.value)
-                found.append(ValueEffect(effect.situation, arguments, value, when))
-            else:
-                by = put_in(effect.amount, terms)
-                found.append(AmountEffect(effect.situation, arguments, effect.operation, by, when))
-        return found
+        return [effect] if effect.each is None else [made_of(effect, one) for one in classes.get(effect.each.kind, ())]
 
     every = [one for effect in behavior.every_effect for one in single(effect)]
     effects = tuple(one for one in every if isinstance(one, ValueEffect))

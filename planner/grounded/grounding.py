@@ -34,6 +34,7 @@ from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
 from planner.plan import Reason
+from reasoner.amounts import written
 from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
@@ -120,7 +121,7 @@ class _Assembly:
             needs = {i: _expanded(*pairs, means) for i, pairs in needs.items()}
             wanted = tuple(sorted({one for bit in wanted for one in means[bit]}))
         if wanted is None:
-            return Reason("the goals exclude one another, or what is wanted to end can't")
+            return self._excluded(goal)
         # Number the operators, then the conditional effects behind them; those whose operator fell away fall away too.
         owners, first, count = {}, {}, 0
         for i in base:
@@ -307,6 +308,17 @@ class _Assembly:
 
     def _goal(self, goal: State) -> Literals:
         return self.formulas.all_of(self.formulas.wanted(symbol, value) for symbol, value in goal.items())
+
+    def _excluded(self, goal: State) -> Reason:
+        """Return which goal can't be in any state; if each can, they exclude one another."""
+        for symbol, value in sorted(goal.items()):
+            if self.formulas.wanted(symbol, value) is None:
+                quantity = self.reached.problem.domain.situations[symbol.situation].quantity
+                limits = (("at least", quantity.least), ("at most", quantity.most)) if quantity else ()
+                stays = ", ".join(f"{word} {written(limit)}" for word, limit in limits if limit is not None)
+                text = f"{Fact(symbol, value)} can't be" + (f": it is {stays}" if stays else "")
+                return Reason(text, (symbol.situation, *symbol.arguments))
+        return Reason("the goals exclude one another, or what is wanted to end can't")
 
     def _build(
         self,

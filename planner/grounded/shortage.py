@@ -1,15 +1,20 @@
 """By how much an amount falls short: a proof that there is no plan, found by adding up.
 
-What is there of a situation type, over all symbols, is at most what there is now if no operator makes the sum larger. What is
-wanted is at least what the goals take: each goal that doesn't hold yet, the least that any operator uses up that brings it about
-(divided among the goals that one operator brings about at once); and what has to be left, by the goal or by the bounds.
+What is there of a situation type, over all symbols or of one, and of what was made of it: that sum never becomes larger if no
+operator makes it so. Facts stand for what was made of an amount, each for the least that any operator uses up that sets it
+(divided among those that one sets at once); an operator that gives an amount back (who lends a book frees its place) doesn't
+enlarge the sum if it undoes as much. What is wanted are the facts that the goals need, and what has to be left, by the goal or
+by the bounds.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property, reduce
+from operator import or_
 
 from planner.grounded.amounts import Amounts, Exact, Move, Vector
 from planner.grounded.task import Task, bits_of
@@ -36,29 +41,161 @@ def shortage(task: Task) -> Reason | None:
                     text = f"{symbol}: {what} {written(limit)}{' ' * bool(unit)}{unit} can be there"
                     more = f"{'more' if factor > 0 else 'less'} than " if sign == ">" else ""
                     return Reason(f"{text}, {more}{written(wanted)} wanted", (symbol.situation, *symbol.arguments))
-    places = defaultdict[str, list[int]](list)
-    for place, symbol in enumerate(amounts.symbols):
-        places[symbol.situation].append(place)
-    unmet = [bit for bit in bits_of(task.goal & ~task.initial) if not amounts.compared >> bit & 1]
-    makers = _makers(task, unmet)
-    for situation, its in places.items():
-        left = _left(task, amounts, its, vector, moves)
-        if left is None or any(_change(found, its, True) != 0 for found in moves.values()):
-            continue
-        used = {o: -(_change(found, its, False) or 0) for o, found in moves.items()}
-        wanted = left + sum(
-            min((Fraction(used.get(o, 0)) / shared for o, shared in makers[bit].items()), default=Fraction(0))
-            for bit in unmet
-        )
-        there = sum((Fraction(vector[place]) for place in its), Fraction(0))
-        if wanted > there:
-            unit = amounts.quantities[its[0]].unit
-            what = f"{written(there)}{' ' * bool(unit)}{unit}"
-            about = ", ".join(str(amounts.symbols[place].arguments[0]) for place in its[:5]) + ", …" * (len(its) > 5)
-            text = f"{situation} of {about}: {what} are there, {written(wanted)} are wanted, and nothing gives more"
-            terms = (situation, *(argument for place in its for argument in amounts.symbols[place].arguments))
-            return Reason(text, tuple(dict.fromkeys(terms)))
-    return None
+    return _Sums(task, amounts, vector, moves).short()
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """What is added up: amounts of one situation type, and what stands for amounts that were used up."""
+
+    task: Task
+    amounts: Amounts
+    vector: Vector
+    moves: Mapping[int, Sequence[Move]]
+
+    def short(self) -> Reason | None:
+        """Return which sum can't become what is wanted."""
+        places = defaultdict[str, list[int]](list)
+        for place, symbol in enumerate(self.amounts.symbols):
+            places[symbol.situation].append(place)
+        for its in places.values():
+            for some in (its, *([place] for place in its if len(its) > 1)):
+                left = [self.left(place) for place in some]
+                floor = sum((one for one in left if one is not None), Fraction(0))
+                if None not in left and (reason := self.wanted_of(some, floor)):
+                    return reason
+        return None
+
+    def wanted_of(self, places: Sequence[int], left: Fraction) -> Reason | None:
+        """Return that some amounts together can't become what the goals take, and what has to be left."""
+        touched = {o for place in places for o, _ in self.of[place]}
+        used = {o: -found for o in touched if (found := _change(self.moves[o], places, False))}
+        gains = {o: gain for o in touched if (gain := _change(self.moves[o], places, True)) != 0}
+        for bits in self.counted(used):
+            worth = self.worth(bits, used)
+            if any(gain is None or gain > self.undone(o, worth) for o, gain in gains.items()):
+                continue
+            taken = sum((value for bit, value in worth.items() if self.task.initial >> bit & 1), Fraction(0))
+            there = sum((Fraction(self.vector[place]) for place in places), taken)
+            wanted = left + self.least(worth)
+            if wanted > there:
+                return self.said(places, there, taken, wanted)
+        return None
+
+    @cached_property
+    def of(self) -> Mapping[int, Sequence[tuple[int, Move]]]:
+        """For each amount, the operators that change it, and how."""
+        found = defaultdict[int, list[tuple[int, Move]]](list)
+        for o, its in self.moves.items():
+            for move in its:
+                found[move.place].append((o, move))
+        return found
+
+    @cached_property
+    def sets(self) -> Mapping[int, Set[int]]:
+        """For each operator the bits that it may set."""
+        found = defaultdict[int, set[int]](set)
+        for bits, owner in zip(self.task.adds.lists(), self.task.owners, strict=True):
+            found[owner].update(bits)
+        return found
+
+    @cached_property
+    def makers(self) -> Mapping[int, Sequence[int]]:
+        """For each bit the operators that may set it."""
+        found = defaultdict[int, list[int]](list)
+        for o, bits in self.sets.items():
+            for bit in bits:
+                found[bit].append(o)
+        return found
+
+    def counted(self, used: Mapping[int, Exact]) -> Iterator[Set[int]]:
+        """Yield bits that may stand for what was used up: goals to come; the facts of one situation type."""
+        task = self.task
+        yield {bit for bit in bits_of(task.goal & ~task.initial) if not self.amounts.compared >> bit & 1}
+        kinds = {task.facts[bit].symbol.situation for o in used for bit in self.sets[o] if bit < len(task.facts)}
+        for kind in sorted(kinds):
+            yield {bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == kind}
+
+    def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
+        """Return for some bits how much is used up, at least, by whatever sets them; shared by those that it sets at once."""
+        found = {
+            bit: min(
+                (Fraction(used.get(o, 0)) / len(self.sets[o] & bits) for o in self.makers[bit]), default=Fraction(0)
+            )
+            for bit in bits
+        }
+        return {bit: value for bit, value in found.items() if value > 0}
+
+    def undone(self, operator: int, worth: Mapping[int, Fraction]) -> Fraction:
+        """Return the worth of what an operator surely makes false."""
+        asked, changes = self.task.known(operator)
+        cleared = reduce(or_, (bits for when, bits, _ in changes if not when & ~asked), 0)
+        kept = reduce(or_, (bits for _, _, bits in changes), 0)
+        return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))
+
+    def least(self, worth: Mapping[int, Fraction]) -> Fraction:
+        """Return what the goals ask, at least, of what stands for amounts; what may serve two of them counts once."""
+        least, serving = dict(worth), {bit: 1 << bit for bit in worth}
+        for part in self.task.derived.parts:
+            for one in part if len(part) == 1 and not part[0].opposite else ():
+                bit, ways = one.mask.bit_length() - 1, [bits_of(way) for way in one.alternatives]
+                least[bit] = min(
+                    (max((least.get(b, Fraction(0)) for b in way), default=Fraction(0)) for way in ways),
+                    default=Fraction(0),
+                )
+                serving[bit] = reduce(or_, (serving.get(b, 0) for way in ways for b in way), 0)
+        groups: list[tuple[int, Fraction]] = []
+        for bit in bits_of(self.task.goal):
+            if value := least.get(bit, Fraction(0)):
+                bits = serving[bit]
+                for group in [group for group in groups if group[0] & bits]:
+                    groups.remove(group)
+                    bits, value = bits | group[0], max(value, group[1])
+                groups.append((bits, value))
+        return sum((value for _, value in groups), Fraction(0))
+
+    def said(self, places: Sequence[int], there: Fraction, taken: Fraction, wanted: Fraction) -> Reason:
+        symbols = [self.amounts.symbols[place] for place in places]
+        unit = self.amounts.quantities[places[0]].unit
+        about = ", ".join(str(symbol.arguments[0]) for symbol in symbols[:5]) + ", …" * (len(symbols) > 5)
+        what = f"{written(there)}{' ' * bool(unit)}{unit} are there"
+        of_it = f" ({written(taken)} of them in use)" if taken else ""
+        text = f"{symbols[0].situation} of {about}: {what}{of_it}, {written(wanted)} are wanted, and nothing gives more"
+        terms = (symbols[0].situation, *(argument for symbol in symbols for argument in symbol.arguments))
+        return Reason(text, tuple(dict.fromkeys(terms)))
+
+    @cached_property
+    def limits(self) -> Mapping[int, tuple[int, Fraction]]:
+        """For each bit that asks for so much of one amount, which one and how much."""
+        return {
+            bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
+            for (difference, _), bit in self.amounts.bits.items()
+            if len(difference.terms) == 1 and difference.terms[0][1] > 0
+        }
+
+    def asked(self, bits: Iterable[int], place: int) -> Fraction | None:
+        """Return what comparisons of one amount with a number ask of it, at least."""
+        found = (self.limits[bit] for bit in bits if bit in self.limits)
+        return max((wanted for of, wanted in found if of == place), default=None)
+
+    def kept(self, place: int) -> Fraction | None:
+        """Return what no operator takes of an amount, as far as each asks for more than it takes."""
+        least = Fraction(self.vector[place])
+        for o, move in self.of[place]:
+            if move.operation == "increase" and move.by is not None and not move.by.terms and move.by.constant >= 0:
+                continue
+            before = self.asked(self.task.needs[o], place)
+            if before is None or move.by is None or move.by.terms or move.operation != "decrease":
+                return None
+            least = min(least, before - Fraction(move.by.constant))
+        return least
+
+    def left(self, place: int) -> Fraction | None:
+        """Return what is left of an amount in any state in which the goal holds, at least; None if that has no bound."""
+        wanted = self.asked(bits_of(self.task.goal), place)
+        found = (self.amounts.quantities[place].least, self.kept(place), wanted)
+        floor = [limit for limit in found if limit is not None]
+        return max(floor, default=None)
 
 
 def _extent(
@@ -83,16 +220,6 @@ def _extent(
     return max(limits, default=None), min(most, default=None)
 
 
-def _makers(task: Task, unmet: Sequence[int]) -> Mapping[int, Mapping[int, int]]:
-    """Return for each bit the operators that may set it, with how many of the bits such a one may set."""
-    wanted = set(unmet)
-    sets = defaultdict[int, set[int]](set)
-    for bits, owner in zip(task.adds.lists(), task.owners, strict=True):
-        if found := wanted.intersection(bits):
-            sets[owner] |= found
-    return {bit: {o: len(bits) for o, bits in sets.items() if bit in bits} for bit in unmet}
-
-
 def _change(moves: Sequence[Move], places: Sequence[int], most: bool) -> Exact | None:
     """Return what an operator makes of a sum: at most, if that is more than nothing, else what it surely uses up.
 
@@ -108,42 +235,3 @@ def _change(moves: Sequence[Move], places: Sequence[int], most: bool) -> Exact |
         if not move.when or (by > 0) is most:
             total += by
     return max(total, 0) if most else min(total, 0)
-
-
-def _left(
-    task: Task, amounts: Amounts, places: Sequence[int], vector: Vector, moves: Mapping[int, Sequence[Move]]
-) -> Fraction | None:
-    """Return what is left of a sum in any state in which the goal holds, at least; None if that has no bound."""
-    limits = {bit: (difference, sign) for (difference, sign), bit in amounts.bits.items()}
-    needs = task.needs.lists()
-
-    def asked(bits: Sequence[int], place: int) -> Fraction | None:
-        """Return what comparisons of one amount with a number ask of it, at least."""
-        found = [
-            Fraction(-difference.constant) / Fraction(difference.terms[0][1])
-            for bit in bits
-            for difference, _ in [limits.get(bit, (None, ""))]
-            if difference is not None and [p for p, _ in difference.terms] == [place] and difference.terms[0][1] > 0
-        ]
-        return max(found, default=None)
-
-    def kept(place: int) -> Fraction | None:
-        """Return what no operator takes of an amount, as far as each asks for more than it takes."""
-        least = Fraction(vector[place])
-        for o, its in moves.items():
-            for move in its:
-                if move.place == place:
-                    before = asked(needs[o], place)
-                    if before is None or move.by is None or move.by.terms or move.operation != "decrease":
-                        return None
-                    least = min(least, before - Fraction(move.by.constant))
-        return least
-
-    total = Fraction(0)
-    for place in places:
-        floor = [limit for limit in (amounts.quantities[place].least, kept(place)) if limit is not None]
-        wanted = asked(bits_of(task.goal), place)
-        if not floor:
-            return None
-        total += max(floor) if wanted is None else max(*floor, wanted)
-    return total

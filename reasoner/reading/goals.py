@@ -119,7 +119,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                 raise KnowledgeError(f"<{iri}>: a goal has to be a value condition or a comparison")
             symbol = Symbol(wanted.situation, wanted.arguments)
             check_arguments(symbol, problem.domain, "a goal")
-            value = _wanted_value(iri, wanted, problem)
+            value = _wanted_value(iri, symbol, wanted, problem)
             kind = problem.domain.situations[symbol.situation]
             members = (problem.classes.get(of, ()) for of in kind.arguments)
             if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
@@ -133,8 +133,8 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     return replace(problem, goal=dict(sorted(goal.items())))
 
 
-def _wanted_value(iri: str, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the value that a goal wants; of a negated one, what is left if not this.
+def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
+    """Return the value that a goal wants; of a negated one, what is left if not this on the first level that can see it.
 
     Raises
     ------
@@ -146,7 +146,8 @@ def _wanted_value(iri: str, wanted: ValueCondition, problem: Problem) -> str:
     situation = problem.domain.situations[wanted.situation]
     if situation.boolean:
         return FALSE if wanted.value == TRUE else TRUE
-    left = [value for value in problem.classes.get(situation.range, ()) if value != wanted.value]
+    level = max(problem.first_level(symbol), problem.value_levels.get(wanted.value, 1))
+    left = [value for value in problem.values(symbol, level) if value != wanted.value]
     if len(left) != 1:
         raise KnowledgeError(
             f"<{iri}>: the goal says which value {wanted.situation} shall not have, and leaves {some_of(left) or 'none'}; name the "

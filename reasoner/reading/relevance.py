@@ -550,9 +550,11 @@ def _goal_individuals(schema: Schema) -> set[str]:
 
 
 def _goal_classes(schema: Schema) -> set[str]:
-    """Return the classes of which goals want something of all individuals."""
-    goals = (schema.nodes.get(iri, {}) for iri in _goal_conditions(schema))
-    return {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
+    """Return the classes of which goals want something of all individuals, or another value than they name."""
+    goals = [schema.nodes.get(iri, {}) for iri in _goal_conditions(schema)]
+    wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
+    negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))
+    return wanted | {v for node in negated for v in node.get(CORE + "situationType", ()) if v not in schema.pairs}
 
 
 def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:

@@ -341,7 +341,7 @@ def situations_of(schema: Schema) -> Situations:
 
 def plainly(behavior: Behavior) -> object:
     """Return what a behaviour says, whatever its bound variables are called, and in whatever order it says it."""
-    effects = ((e.situation, e.arguments, e.value, _plain(e.when)) for e in behavior.effects)
+    effects = ((e.situation, e.arguments, e.value, _plain(e.when), e.each) for e in behavior.effects)
     return (
         behavior.name,
         behavior.level,
@@ -351,7 +351,7 @@ def plainly(behavior: Behavior) -> object:
         behavior.price,
         _plain(behavior.asked),
         frozenset(effects),
-        frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when)) for e in behavior.amounts),
+        frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when), e.each) for e in behavior.amounts),
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, written
@@ -26,6 +26,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    made_of,
     substituted,
 )
 
@@ -56,9 +57,20 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
         Of its preconditions, in order; they become comments.
     """
     writer = _Writer(behavior, situations, spell)
+    behavior = _by_their_class(behavior)
     (_, effects), *conditional = _operations(behavior)
     operations = [writer.main(effects, labels), *(writer.conditional(when, made) for when, made in conditional)]
     return " ;\n".join(operations) + "\n"
+
+
+def _by_their_class(behavior: Behavior) -> Behavior:
+    """Return a behaviour whose effects on all of a class name the class, as updates do."""
+    effects = [effect if effect.each is None else made_of(effect, effect.each.kind) for effect in behavior.every_effect]
+    return replace(
+        behavior,
+        effects=tuple(e for e in effects if isinstance(e, ValueEffect)),
+        amounts=tuple(e for e in effects if isinstance(e, AmountEffect)),
+    )
 
 
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:

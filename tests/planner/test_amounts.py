@@ -7,7 +7,7 @@ import pytest
 
 import confab
 from planner.grounded.best_first import plan_level
-from planner.plan import Status
+from planner.plan import Outcome, Status
 from planner.solve import Request, solve
 from reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
 from reasoner.symbols import AmountEffect, Behavior, Comparison, Parameter, Problem, SituationType, Symbol, ValueEffect
@@ -84,6 +84,22 @@ def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted
     assert outcome.status is Status.UNSOLVABLE
     assert outcome.reason is not None
     assert outcome.reason.text == said
+
+
+def test_what_gives_an_amount_back_by_undoing_what_took_it_gives_no_more() -> None:
+    problem = pouring("2", 3, Fraction(1), refill=None)
+
+    def given_back(much: str) -> Outcome:
+        full, empty = has("DRINK", "?c", "tea"), becomes("DRINK", "?c", "empty")
+        more = AmountEffect("TEA", ("?j",), "increase", Fraction(much))
+        pour = Behavior("POUR_BACK", 2, (JUG, CUP), (), (has("HELD", "?j", "yes"), full), (empty,), amounts=(more,))
+        domain = replace(problem.domain, behaviors={**problem.domain.behaviors, "POUR_BACK": pour})
+        return solve(Request(replace(problem, domain=domain)))
+
+    outcome = given_back("1")
+    assert outcome.reason is not None
+    assert outcome.reason.text == "TEA of jug: 2 servings are there, 3 are wanted, and nothing gives more"
+    assert given_back("1.5").status is Status.SOLVED
 
 
 def test_what_each_step_leaves_counts_as_missing_too() -> None:

@@ -30,6 +30,7 @@ from worlds.language import language
 
 ROOT = Path(__file__).resolve().parents[2]
 LABORATORY = ROOT / "docs" / "examples" / "laboratory"
+THEATRE = ROOT / "docs" / "examples" / "theatre" / "theatre.ttl"
 RANDOM = "https://example.org/random"
 
 
@@ -91,6 +92,16 @@ def test_a_file_converted_there_and_back_says_the_same_and_keeps_what_isnt_a_beh
     assert len(short.read_text().splitlines()) < len(path.read_text().splitlines())
     assert "c:ValueCondition" not in short.read_text()
     assert "c:update" not in long.read_text()
+
+
+def test_effects_on_all_of_a_class_are_said_by_the_class() -> None:
+    graph = load(THEATRE)
+    found = convert(THEATRE, "sparql")
+    assert found.notes == []
+    assert "INSERT { :Prop :isAt ?room }" in found.text
+    for iri, behavior in behaviors(graph).items():
+        written, there_and_back = again(graph, iri, behavior, graph.declared)
+        assert there_and_back == plainly(behavior), written
 
 
 def test_the_laboratory_in_updates_is_under_a_hundred_lines_and_plans_like_its_individuals(tmp_path: Path) -> None:
