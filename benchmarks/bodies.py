@@ -1,12 +1,12 @@
 """Tasks, robots and noise: how many perturbed rollouts of each are verified, why the others aren't, and what a rollout costs.
 
     python -m benchmarks.bodies            the table of what was rolled out so far, of the code as it is
-    python -m benchmarks.bodies run [TASK …]   roll out what is missing of the reporting seeds, ten of everything at a time
+    python -m benchmarks.bodies run [MM …] [TASK …]   roll out what is missing of the reporting seeds, one row after another
     python -m benchmarks.bodies carry [TASK …]   let older rollouts count, of tasks whose first two come out the same, bit by bit
     python -m benchmarks.bodies try TASK [MM [FROM [TO]]]   development seeds of one task, each failure told
 
 A line per rollout goes to confab-out/bodies.jsonl, with what tells its code and its course from others; a run that was stopped
-goes on where it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 70000 are for reporting only.
+goes on where it was. Seeds from 7000 are for development, what fails there may be mended; seeds from 80000 are for reporting only.
 """
 
 from __future__ import annotations
@@ -33,9 +33,12 @@ from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
 
 KEPT = Path("confab-out/bodies.jsonl")
-DEVELOPMENT, REPORTING = 7000, 70000
-NOISE = {0: 100, 4: 100, 8: 20}
-"""Millimetres of standard deviation on every perceived position, and how many rollouts of each task are wanted with it."""
+DEVELOPMENT, REPORTING = 7000, 80000
+NOISE = {4: 100, 0: 100, 8: 20}
+"""Millimetres of standard deviation on every perceived position, and how many rollouts of each task are wanted with it.
+
+Rows are done in this order.
+"""
 AGAIN = 2
 """So many rollouts of a task are done again to find out whether other code does the same."""
 MEASURED = ("sim", "ontology/embodiment.ttl", "ontology/robots")
@@ -63,15 +66,15 @@ CASES = {
     "button": Case("two arms", "centrifuge", ("F3_PRESS right_hand start",)),
     "lid onto pot": Case("two arms", "kitchen-corner", goals=("lid LOCATION pot_top",)),
     "pick and place": Case("two arms", "beverage-serving", goals=("cup2 LOCATION location5",)),
-    "move and pour": Case("two arms", "beverage-serving-moved", beads=True),
+    "serving": Case("Panda", "panda-serving", beads=True),
+    "moving": Case("Panda", "panda-serving", goals=("cup1 LOCATION place2", "cup2 LOCATION place1")),
     "kitchen corner": Case("two arms", "spice-drawer"),
     "laboratory": Case("two arms", "centrifuge"),
-    "serving": Case("Panda", "panda-serving", beads=True),
+    "move and pour": Case("two arms", "beverage-serving-moved", beads=True),
     "driving and serving": Case("two arms that drive", "two-tables", beads=True),
     "cup and bottle": Case("iiwa", "iiwa-serving", beads=True),
     "cup and bottle, six joints": Case("xArm 6", "xarm-serving", beads=True),
     "handing over and serving": Case("Panda pair", "panda-pair-serving", beads=True),
-    "moving": Case("Panda", "panda-serving", goals=("cup1 LOCATION place2", "cup2 LOCATION place1")),
 }
 """The tasks of the table, by name."""
 
@@ -152,20 +155,19 @@ def carry(names: Sequence[str]) -> None:
     KEPT.write_text("".join(json.dumps(one) + "\n" for one in rows), encoding="utf-8")
 
 
-def missing(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
-    """Yield task, noise and seed of what isn't rolled out yet, ten seeds of everything before the next ten of anything."""
+def missing(names: Sequence[str], noises: Sequence[int]) -> Iterator[tuple[str, int, int]]:
+    """Yield task, noise and seed of what isn't rolled out yet, a row after another."""
     done = {(one["task"], one["noise"], one["seed"]) for one in kept()}
-    for first in range(0, max(NOISE.values()), 10):
-        for name, (noise, count) in product(names, NOISE.items()):
-            seeds = range(REPORTING + first, REPORTING + min(first + 10, count))
-            yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
+    for noise, name in product(noises, names):
+        seeds = range(REPORTING, REPORTING + NOISE[noise])
+        yield from ((name, noise, seed) for seed in seeds if (name, noise, seed) not in done)
 
 
-def run(names: Sequence[str]) -> None:
+def run(names: Sequence[str], noises: Sequence[int]) -> None:
     """Roll out what is missing of some tasks, and keep a line for each rollout."""
     KEPT.parent.mkdir(parents=True, exist_ok=True)
     now = code()
-    for name, noise, seed in missing(names):
+    for name, noise, seed in missing(names, noises):
         found = {"code": now, **row(name, noise, trial(name, noise).run(seed))}
         with KEPT.open("a", encoding="utf-8") as file:
             file.write(json.dumps(found) + "\n")
@@ -189,7 +191,7 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for name, case in CASES.items():
-        for noise in NOISE:
+        for noise in sorted(NOISE):
             if some := [one for one in rows if (one["task"], one["noise"]) == (name, noise)]:
                 print(_line(name, case, noise, some))
 
@@ -209,8 +211,9 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case []:
             main()
-        case ["run", *names]:
-            run(names or list(CASES))
+        case ["run", *words]:
+            noises = [int(word) for word in words if word.isdecimal()]
+            run([word for word in words if not word.isdecimal()] or list(CASES), noises or list(NOISE))
         case ["carry", *names]:
             carry(names or list(CASES))
         case ["try", name, *numbers]:

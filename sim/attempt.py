@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from sim.perception import tilt_of
 from sim.robot import Manipulator
 from sim.stages import MARGIN, Numbers, Stage
 from sim.urdf import Array
-from sim.verdict import SkillError, named
+from sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
 """Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
@@ -40,6 +41,9 @@ ROUNDED = 3
 
 THIN = 0.01
 """Metres by which fingers are open around a handle."""
+
+WARY = 0.5
+"""Share of its speed at which a hand that was stopped goes back."""
 
 SAMPLES = 1500
 """Samples of a search for a path to any of the goals."""
@@ -125,14 +129,15 @@ class Attempt:
                     missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
                     raise SkillError("unreachable", objects, beyond_m=missing)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
-            closed, bare = self.hand.mover(THIN), self.hand.mover(opening)
-            try:
-                found = _free(reacher, closed, bare, stages, solved, order, objects)
-            except SkillError:
-                if not self.world.blur:
-                    raise
-                blurred = replace(reacher, margin=MARGIN - 2 * self.world.blur)
-                found = _free(blurred, closed, bare, stages, solved, order, objects)
+            movers = self.hand.mover(THIN), self.hand.mover(opening)
+            scenes = [_scene(reacher, *movers, stage, CLOSE if stage.near else reacher.margin) for stage in stages]
+            found = _free(scenes, solved, order)
+            if not found and self.world.noise:  # what isn't seen well may be farther
+                margins = (CLOSE - 2 * self.world.blur if stage.near else CLOSE for stage in stages)
+                scenes = [_scene(reacher, *movers, *pair) for pair in zip(stages, margins, strict=True)]
+                found = _free(scenes, solved, order)
+            if not found:
+                raise _blocked(scenes, [q[order] for q in solved], objects)
             return [int(left[i]) for i in found]
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
@@ -179,6 +184,8 @@ class Attempt:
             reacher = self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
+            if self.world.noise and not reacher.free(reacher.solve(np.array(targets))[0]).any():
+                reacher = replace(reacher, margin=CLOSE)
             free = reacher.follow(start[None]) is not None
             left = start if free else leave(reacher, start)
             reached = None if left is None else connect(reacher, left, targets, self.world.rng, SAMPLES)
@@ -187,10 +194,22 @@ class Attempt:
                 raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
             turns = reached[1] if free else np.concatenate([start[None], reached[1]])
             q = reacher.solve(polyline(turns))[0]
-            near = replace(reacher, margin=min(MARGIN, CLOSE + 2 * self.world.noise))
+            near = replace(reacher, margin=min(reacher.margin, CLOSE + 2 * self.world.noise))
             rounded = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(q, n)).all()), 0)
-        self.follow(q, corners=rounded)
+        try:
+            self.follow(q, corners=rounded)
+        except SkillError:
+            if self.world.noise:
+                self._withdraw(q)
+            raise
         return reached[0]
+
+    def _withdraw(self, q: Array) -> None:
+        """Go back along the postures that the arm has come along, from where something stopped it."""
+        now = self.hand.measured()
+        self.hand.command(now)
+        passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
+        self.follow(np.concatenate([now[None], passed[::-1]]), WARY)
 
     def straight(
         self,
@@ -200,11 +219,18 @@ class Attempt:
         speed: float = 1.0,
         enough: Callable[[], bool] | None = None,
     ) -> None:
-        """Move along the straight line to a pose; or until it is `enough`, as far as the line is free; raise if it isn't."""
-        poses = line(self.hand.pose, goal)
+        """Move along the straight line to a pose, or until it is `enough`; raise if it isn't free.
+
+        Where a guard ends it, it is begun as far as it is free; else the elbow turns on the way if it must.
+        """
+        start = self.hand.pose
         if enough is not None:
-            poses = np.linspace(poses[0], poses[-1], FINER * (len(poses) - 1) + 1)
-        self.along(poses, objects, *ignored, speed=speed, enough=enough, partly=enough is not None)
+            poses = line(start, goal)
+            fine = np.linspace(poses[0], poses[-1], FINER * (len(poses) - 1) + 1)
+            self.along(fine, objects, *ignored, speed=speed, enough=enough, partly=True)
+            return
+        bent = (np.append(goal[:5], goal[5] + turn) for turn in sorted(SWIVELS, key=abs) if turn)
+        self.along(line(start, goal), objects, *ignored, speed=speed, others=(line(start, end) for end in bent))
 
     def along(
         self,
@@ -214,12 +240,19 @@ class Attempt:
         speed: float = 1.0,
         enough: Callable[[], bool] | None = None,
         partly: bool = False,
+        others: Iterable[Array] = (),
     ) -> None:
-        """Move along sampled poses, or until it is `enough`; raise if they can't be followed, or not even `partly`."""
+        """Move along sampled poses, else `others`, or until it is `enough`; raise if none can be followed, or not even `partly`.
+
+        What is followed `partly` ends where something is felt, so what is only seen to be in the way doesn't end it.
+        """
         with self.planning():
-            reacher = self.reacher(*ignored, margin=CLOSE)
-            ways = [reacher, replace(reacher, margin=CLOSE - 2 * self.world.blur)][: 2 if self.world.blur else 1]
-            found = (way.begin(poses) if partly else way.follow(poses) for way in ways)
+            reacher = self.reacher(*ignored, margin=CLOSE - 2 * self.world.noise if partly else CLOSE)
+            blurred = replace(reacher, margin=CLOSE - 2 * self.world.blur)
+            ways = [reacher, blurred] if self.world.blur and not partly else [reacher]
+            found = (
+                way.begin(some) if partly else way.follow(some) for some in chain((poses,), others) for way in ways
+            )
             q = next((q for q in found if q is not None), None)
             if q is None:
                 blame = reacher.blame(poses)
@@ -227,22 +260,15 @@ class Attempt:
         self.follow(q, speed, enough)
 
     def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
-        """Go up in a line, the elbow turning as it must."""
-        start = self.hand.pose
-        if goal[2] - start[2] < 1e-3:
+        """Go up in a line, the elbow turning as it must, or else around what is in the way."""
+        if goal[2] - self.hand.pose[2] < 1e-3:
             return
-        with self.planning():
-            reacher = self.reacher(*ignored, margin=CLOSE)
-            for turn in sorted(SWIVELS, key=abs):
-                bent = goal.copy()
-                bent[5] = start[5] + turn
-                q = reacher.follow(line(start, bent))
-                if q is not None:
-                    break
-        if q is None:
+        try:
+            self.straight(goal, objects, *ignored)
+        except SkillError as failure:
+            if failure.verdict.code not in (*REFUTED, "unreachable"):
+                raise
             self.go([goal], objects, *ignored)
-        else:
-            self.follow(q)
 
     # ------------------------------------------------------------------------------------------------- checks
 
@@ -287,49 +313,39 @@ def _seen_from(world: Engine, carrier: str, body: str) -> Array:
     return local
 
 
-def _free(
-    reacher: Reacher,
-    closed: Mover,
-    bare: Mover,
-    stages: Sequence[Stage],
-    postures: Sequence[Array],
-    order: NDArray[np.intp],
-    objects: tuple[str, ...],
-) -> list[int]:
-    """Return the first few candidates, in `order`, that touch nothing at any stage; raise if none does."""
+Scene = tuple[Mover, Surroundings, float]
+"""An arm as it is at a stage, what is around it then, and the metres by which it keeps off that."""
+
+
+def _free(scenes: Sequence[Scene], postures: Sequence[Array], order: NDArray[np.intp]) -> list[int]:
+    """Return the first few candidates, in `order`, that touch nothing at any stage."""
     chosen: list[int] = []
-    scenes = [_scene(reacher, closed, bare, stage) for stage in stages]
     for start in range(0, len(order), BATCH):
         left = order[start : start + BATCH]
-        for (mover, around, spare), q in zip(scenes, postures, strict=True):
-            left = left[free(mover.at(q[left]), mover.spheres.radii, around, reacher.margin - spare)]
+        for (mover, around, margin), q in zip(scenes, postures, strict=True):
+            left = left[free(mover.at(q[left]), mover.spheres.radii, around, margin)]
         chosen += [int(i) for i in left]
         if len(chosen) >= ENOUGH:
             break
-    if not chosen:
-        raise _blocked(reacher.margin, scenes, [q[order] for q in postures], objects)
     return chosen
 
 
-Scene = tuple[Mover, Surroundings, float]
-
-
-def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage) -> Scene:
-    """Return an arm as it is at a stage, what is around it then, and by how much less it has to keep off that."""
+def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage, margin: float) -> Scene:
+    """Return the scene of a stage."""
     around = reacher.around if stage.around is None else stage.around
     mover = closed if stage.closed else bare if stage.released else reacher.mover
-    return mover, around.without(*stage.ignored), MARGIN - CLOSE if stage.near else 0.0
+    return mover, around.without(*stage.ignored), margin
 
 
-def _blocked(margin: float, scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
+def _blocked(scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
     """Return what to raise where no candidate is free: it names what blocks most of them."""
     nearest: dict[str, Array] = {}
-    for (mover, around, spare), q in zip(scenes, postures, strict=True):
+    for (mover, around, margin), q in zip(scenes, postures, strict=True):
         for name, gap in mover.clearances(q, around).items():
-            nearest[name] = np.minimum(gap + spare, nearest.get(name, np.inf))
-    count = {name: int(np.sum(gap <= margin)) for name, gap in nearest.items()}
+            nearest[name] = np.minimum(gap - margin, nearest.get(name, np.inf))
+    count = {name: int(np.sum(gap <= 0)) for name, gap in nearest.items()}
     blocking = sorted(
         (name for name in nearest if count[name] == max(count.values())), key=lambda name: float(nearest[name].max())
     )
-    widest = float(np.min(list(nearest.values()), axis=0).max())
+    widest = float(np.min(list(nearest.values()), axis=0).max()) + max(margin for _, _, margin in scenes)
     return SkillError("goal in collision", named(*objects, *blocking), clearance_m=widest)

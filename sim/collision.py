@@ -142,8 +142,8 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
     if not count:
         return np.ones(0, dtype=bool)
     keep = np.maximum(radii + margin, 0.0)
-    low, high = (points - np.tile(keep, count)[:, None]).min(0), (points + np.tile(keep, count)[:, None]).max(0)
-    squares = np.tile(keep**2, count)
+    low, high = points.min(0) - keep.max(initial=0.0), points.max(0) + keep.max(initial=0.0)
+    keep = np.tile(keep, count)
     touched: Flags = np.zeros(len(points), dtype=bool)
     turned, middles, half, bottom, top = around.packed
     near = np.flatnonzero(np.all((bottom <= high) & (top >= low), -1))
@@ -156,14 +156,14 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
         across = np.hypot(local[:, split:, 0], local[:, split:, 1]) - half[near[split:], 0]
         along = local[:, split:, 2] - half[near[split:], 2]
         outside.append(np.maximum(across, 0.0) ** 2 + np.maximum(along, 0.0) ** 2)
-        touched = np.asarray((np.concatenate(outside, 1) <= squares[:, None]).any(1))
-    if len(around.radii):
-        reach = around.radii[:, None]
-        close = np.all((around.centers + reach >= low) & (around.centers - reach <= high), -1)
-        if close.any():
-            others = around.centers[close]
-            gaps = (points**2).sum(1)[:, None] + (others**2).sum(1) - 2 * points @ others.T
-            touched |= np.asarray((gaps <= (np.tile(keep, count)[:, None] + around.radii[close]) ** 2).any(1))
+        touched = np.asarray((np.concatenate(outside, 1) <= (keep**2)[:, None]).any(1))
+    reach = around.radii[:, None]
+    close = np.all((around.centers + reach >= low) & (around.centers - reach <= high), -1)
+    if close.any():  # |p - o|^2 - (k + r)^2 of all pairs as one product
+        others, wide = around.centers[close], around.radii[close]
+        left = np.column_stack([points, np.einsum("pi,pi->p", points, points) - keep**2, np.ones(len(points)), keep])
+        right = np.column_stack([-2 * others, np.ones(len(wide)), (others**2).sum(1) - wide**2, -2 * wide])
+        touched |= (left @ right.T).min(1) <= 0
     found: Flags = np.asarray(~touched.reshape(count, -1).any(1))
     return found
 

@@ -240,11 +240,16 @@ class Engine:
         """Standard deviation in metres of what `sense` returns."""
         return self.noise / float(np.sqrt(LOOKS))
 
-    def look(self) -> None:
-        """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move."""
+    def look(self, before: int = 0) -> None:
+        """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move.
+
+        After some looks `before`, of which the mean is what is perceived, it is that of all.
+        """
         self.errors.clear()
         if self.noise:
-            self.shifts = {mechanic.body: self.rng.normal(0.0, self.noise, 3) for mechanic in self.mechanics}
+            for mechanic in self.mechanics:
+                seen = self.rng.normal(0.0, self.noise, 3)
+                self.shifts[mechanic.body] = (before * self.shift(mechanic) + seen) / (before + 1)
 
     def shift(self, mechanic: Mechanic) -> Array:
         """Return by how much a mechanism is perceived to be elsewhere than it is."""

@@ -115,8 +115,7 @@ class Reacher:
         """Return the postures along sampled poses up to where `follow` would refuse them, or None if it refuses the first."""
         q, valid = self.solve(poses)
         smooth = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(1) <= JUMP
-        good = np.all([valid, self.free(q), smooth], axis=0)
-        end = len(q) if good.all() else int(np.argmin(good))
+        end = _first(np.all([valid, self.free(q), smooth], axis=0))
         return q[:end] if end else None
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
@@ -262,15 +261,20 @@ def _extend(
     if not greedy:
         way = way[:14]
     q, valid = reacher.solve(np.concatenate([nodes[nearest][None], way]))
-    smooth = np.abs(np.diff(q, axis=0)).max(1) <= JUMP
-    good = valid[1:] & smooth & reacher.free(q[1:])
-    reached = len(good) if good.all() else int(np.argmin(good))
-    if reached == 0:
+    reached = _first(valid[1:] & (np.abs(np.diff(q, axis=0)).max(1) <= JUMP))
+    if reached:
+        reached = _first(reacher.free(q[1 : reached + 1]))
+    if not reached:
         return None
     nodes.append(way[reached - 1])
     back.append(nearest)
     new: Array = way[reached - 1]
     return new
+
+
+def _first(good: Flags) -> int:
+    """Return how many are good before the first that isn't."""
+    return len(good) if good.all() else int(np.argmin(good))
 
 
 def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:

@@ -40,7 +40,10 @@ from sim.running import Run
 from sim.stages import Stage
 from sim.touch import FINGERS, ROOM, go_around, off_centre, room
 from sim.urdf import Array
-from sim.verdict import SkillError
+from sim.verdict import REFUTED, SkillError
+
+LOOKS = 3
+"""So often is looked, if things aren't seen exactly, before there is no way, or before what was met on it stops a hand."""
 
 SAMPLES = 9
 """Values of a joint at which its path is foreseen."""
@@ -55,6 +58,9 @@ ASIDE = sorted(
 
 SLACK = 0.1
 """Radians kept from the limits of the arm's joints in planning a joint's path, for what will have to be corrected on the way."""
+
+TURNED = 0.02
+"""Radians kept from them beside that where the hand may have to be elsewhere than where it is now seen that it must."""
 
 NARROW = 0.02
 """Metres by which each finger opens at a handle with little room beside it."""
@@ -88,16 +94,32 @@ def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
 
 
 def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
-    if phase.motion == "free":  # whether there is a way is known before the fingers move
-        stages = _choose(run, phase, later)
-        FINGERS[phase.fingers](run, phase)
-        _go(run, phase, *stages)
+    if phase.motion == "free":
+        _looking(run, phase, lambda: _free(run, phase, later))
     else:
         FINGERS[phase.fingers](run, phase)
-        MOTIONS[phase.motion](run, phase)
+        _looking(run, phase, lambda: MOTIONS[phase.motion](run, phase))
     run.world.run(round(run.number(phase.wait) * run.world.rate))
     for guard in phase.checks:
         check(run, phase, guard)
+
+
+def _looking(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
+    """Do a motion; where there is no way, or something stops it, and things aren't seen exactly, look again and do it anew."""
+    world, hand = run.world, run.attempt.hand
+    for looks in range(1, LOOKS + 1):
+        try:
+            motion()
+        except SkillError as failure:
+            known = {*world.bodies, *world.links, *(fixture.name for fixture in world.embodiment.fixtures)}
+            stopped = failure.verdict.code == "tracking error" and phase.motion in WITHDRAWING
+            felt = stopped and known.issuperset(failure.verdict.objects)
+            if looks == LOOKS or not world.noise or not (felt or failure.verdict.code in REFUTED):
+                raise
+            world.look(looks)
+            hand.deadline = world.steps + hand.limit * world.rate  # each try has the time of the skill
+        else:
+            return
 
 
 # ----------------------------------------------------------------------------------------------------- poses
@@ -195,9 +217,11 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
 
 def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
     """Return the candidates that allow all stages; if possible those that leave the hand what it may need on the way."""
-    if any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain):
-        with suppress(SkillError):  # it will have to give way, which a stretched arm can't
-            return run.attempt.choose([replace(stage, fold=FOLD) for stage in stages], run.things(), run.spread)
+    narrow = any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain)
+    if narrow or run.world.blur:
+        with suppress(SkillError):  # it will have to give way, or be corrected, which a stretched arm can't
+            spare = [replace(stage, fold=FOLD, slack=max(stage.slack, TURNED)) for stage in stages]
+            return run.attempt.choose(spare, run.things(), run.spread)
     try:
         return run.attempt.choose(stages, run.things(), run.spread)
     except SkillError:
@@ -218,8 +242,10 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
     return [Stage(at, ignored, around, True, True, SLACK) for at, around in zip(found[1:], moved[1:], strict=True)]
 
 
-def _go(run: Run, phase: Phase, goals: Array, way: Ways, chosen: list[int]) -> None:
-    """Go to one of the chosen poses."""
+def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
+    """Go to one of the poses that allow all that follows."""
+    goals, way, chosen = _choose(run, phase, later)  # whether there is a way is known before the fingers move
+    FINGERS[phase.fingers](run, phase)
     opening = run.spread if phase.fingers == "open" else None
     best = chosen[run.attempt.go([goals[i] for i in chosen], run.things(), *run.free_of(phase), opening=opening)]
     run.way = way.pick(best)
@@ -307,7 +333,11 @@ MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "over": _over,
     "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
-"""How a hand goes; ``free`` is done by `_choose` and `_go`."""
+"""How a hand goes; ``free`` is done by `_free`."""
+
+
+WITHDRAWING = ("free", "home")
+"""Motions from which a hand that was stopped comes back."""
 
 
 CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
