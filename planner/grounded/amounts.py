@@ -308,6 +308,18 @@ class Amounts:
         return [Fact(symbol, written(Fraction(amount))) for symbol, amount in found]
 
 
+def settled(moves: Sequence[Move], difference: Linear) -> Exact | None:
+    """Return what a difference comes to after some changes that assign a number to each of its amounts; None unless they do."""
+    given = {
+        move.place: move.by.constant
+        for move in moves
+        if move.operation == "assign" and move.by is not None and not move.by.terms
+    }
+    if any(place not in given for place, _ in difference.terms):
+        return None
+    return _exact(difference.constant + sum(given[place] * factor for place, factor in difference.terms))
+
+
 def pushes(moves: Sequence[Move], difference: Linear) -> Push | bool:
     """Return how far some changes move a difference: False if they don't, None if that depends on the state."""
     factors = dict(difference.terms)

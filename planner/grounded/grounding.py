@@ -15,14 +15,15 @@ start.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
-from planner.grounded.amounts import Amounts, Linear, Move, pushes
+from planner.grounded.amounts import Amounts, Linear, Move, pushes, settled
 from planner.grounded.derived import Derived, in_parts
 from planner.grounded.derived_arrays import Bit
 from planner.grounded.formulas import Formulas, Literals
@@ -34,7 +35,7 @@ from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
 from planner.language import mentions
 from planner.plan import Reason
-from reasoner.amounts import written
+from reasoner.amounts import COMPARING, written
 from reasoner.derivation import circular
 from reasoner.symbols import (
     FALSE,
@@ -353,7 +354,7 @@ class _Assembly:
                 if bit >= 0:
                     symbol_bits[symbol].append(bit)
         moves = self._moves(rows, first)
-        add = self._adds(effects, need, symbol_bits, count, self._pushed(moves))
+        add = self._adds(effects, need, symbol_bits, count, self._pushed(moves, owner))
         reached.check_time()
         by_owner = np.lexsort((effects[:, 1], owner[effects[:, 0]])) if len(effects) else np.empty(0, np.int64)
         ordered = effects[by_owner]
@@ -525,17 +526,26 @@ class _Assembly:
                         found[begin + number].append(Move(position, 0, table.place[symbol], effect.operation, by))
         return found
 
-    def _pushed(self, moves: Mapping[int, Sequence[Move]]) -> tuple[Ints, Ints]:
+    def _pushed(self, moves: Mapping[int, Sequence[Move]], owner: Ints) -> tuple[Ints, Ints]:
         """Return pairs of a relaxed operator and the bit of a comparison that it may bring about."""
         by_place = defaultdict[int, list[tuple[Linear, str]]](list)
         for difference, sign in self.reached.amounts.bits:
             for place, _ in difference.terms:
                 by_place[place].append((difference, sign))
+        often = Counter((owner[relaxed], move.place) for relaxed, found in moves.items() for move in found)
+
+        def may(relaxed: int, found: Sequence[Move], difference: Linear, sign: str) -> bool:
+            alone = [move for move in found if often[owner[relaxed], move.place] == 1]
+            amount, push = settled(alone, difference), pushes(found, difference)
+            if amount is not None:
+                return COMPARING[sign](Fraction(amount), Fraction(0))
+            return push is None or push > 0 or (push != 0 and sign == "=")
+
         pairs = [
             (relaxed, self.reached.amounts.bits[key])
             for relaxed, found in moves.items()
             for key in dict.fromkeys(key for move in found for key in by_place.get(move.place, ()))
-            if (push := pushes(found, key[0])) is None or push > 0 or (push and key[1] == "=")
+            if may(relaxed, found, *key)
         ]
         both = np.array(pairs, np.int64).reshape(-1, 2)
         return both[:, 0], both[:, 1]

@@ -155,3 +155,14 @@ def test_what_no_amount_can_be_is_known_before_any_state_is_looked_at() -> None:
     assert outcome.status is Status.UNSOLVABLE
     assert outcome.search[2].expanded == 0
     assert solve(Request(problem)).status is Status.UNSOLVABLE
+
+
+def test_what_is_set_to_too_little_is_known_to_bring_nothing_about() -> None:
+    problem = pouring("0.5", 1, Fraction(1), refill=None)
+    rinse = Behavior("RINSE", 2, (JUG,), amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(0)),))
+    fill = replace(rinse, name="FILL", amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(2)),))
+    for behavior, status in ((rinse, Status.UNSOLVABLE), (fill, Status.SOLVED)):
+        domain = replace(problem.domain, behaviors={**problem.domain.behaviors, behavior.name: behavior})
+        outcome = plan_level(replace(problem, domain=domain), 2)
+        assert outcome.status is status
+        assert outcome.search[2].expanded == 0 or outcome.plan is not None
