@@ -15,7 +15,7 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.options import QUIET
-from confab.terminal import run_to_end
+from confab.terminal import Ending, run_to_end
 
 COMMANDS = {  # as the help lists them, the main one first
     "plan": ("planning", "plan"),
@@ -91,6 +91,9 @@ def app() -> None:
     """Plan what a robot does from an ontology, and verify it in physics."""
 
 
-def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line: whatever happens in it ends as an exit code and at most one line on stderr."""
-    run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False))
+def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
+    """Run the command line: whatever happens in it ends as an exit code and at most one line on stderr.
+
+    `ending` ends the process where a step goes on long after its deadline; without it, as within another program, nothing does.
+    """
+    run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

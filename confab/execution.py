@@ -26,10 +26,10 @@ from reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
     import networkx
-    from rich.tree import Tree
 
     from confab.known import Known
     from confab.memory import Memory
+    from confab.show import PlanTree
     from sim.live import LiveWorld
 
 WORLDS = ("symbolic", "pybullet")
@@ -285,7 +285,7 @@ class Execution:
         save_episode(Path(path), self.json(), self.scene.names)
         return Path(path)
 
-    def __rich__(self) -> Tree:
+    def __rich__(self) -> PlanTree:
         """Return the plan as it was carried out, for rich."""
         from confab.show import plan_tree
 

@@ -24,9 +24,8 @@ from sim.world import Step as PrimitiveStep
 from sim.world import World
 
 if TYPE_CHECKING:
-    from rich.tree import Tree
-
     from confab.known import Known
+    from confab.show import PlanTree
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ class Report:
         poured = "" if self.poured is None else f", poured {self.poured:.1%} on average"
         return f"{self.good} of {len(self.rollouts)} rollouts verified ({seeds}; 95 % confidence: {low:.1%} to {high:.1%}){poured}"
 
-    def __rich__(self) -> Tree:
+    def __rich__(self) -> PlanTree:
         """Return the plan with a verdict behind each primitive, for rich."""
         from confab.show import plan_tree
 

@@ -27,12 +27,12 @@ from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     import networkx
-    from rich.tree import Tree
 
     from confab.execution import Execution
     from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
+    from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
     from planner.causal_links import Purpose
 
@@ -364,7 +364,7 @@ class Result:
         write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
         return Path(path)
 
-    def __rich__(self) -> Tree | str:
+    def __rich__(self) -> PlanTree | str:
         """Return a tree for rich."""
         from confab.show import plan_tree, summary
 

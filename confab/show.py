@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from planner.plan import Outcome, Plan, Step
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.text import Text
+    from rich.console import Console, ConsoleOptions
+    from rich.segment import Segment
     from rich.tree import Tree
 
 STYLES = ("bold cyan", "green", "default")
@@ -33,32 +34,59 @@ def show(what: Any) -> None:
     page().print(what, markup=False, highlight=False)
 
 
-def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> Tree:
-    """Return the plan as a rich tree: ID, behaviour and arguments of every step."""
-    from rich.text import Text
-    from rich.tree import Tree
+@dataclass(frozen=True)
+class PlanTree:
+    """A plan as a tree that rich prints: ID, behaviour and arguments of every step."""
 
-    tree = Tree(Text(title), guide_style="dim")
-    for step in plan.steps:
-        _grow(tree, step, notes or {})
-    return tree
+    plan: Plan
+    title: str
+    notes: Notes
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Tree | Segment]:
+        """Yield a tree for a terminal, else plain text: rich takes longer to draw a large plan than it takes to find it."""
+        from rich.control import strip_control_codes
+        from rich.segment import Segment
+        from rich.text import Text
+        from rich.tree import Tree
+
+        if console.is_terminal:
+            tree = Tree(Text(self.title), guide_style="dim")
+            for step in self.plan.steps:
+                _grow(tree, step, self.notes)
+            yield tree
+        else:
+            lines = (self.title, *_drawn(self.plan.steps, self.notes, ""))
+            yield Segment(strip_control_codes("\n".join(lines)) + "\n")
+
+
+def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:
+    """Return the plan as rich prints it, with what there is to say of its steps."""
+    return PlanTree(plan, title, notes or {})
 
 
 def _grow(tree: Tree, step: Step, notes: Notes) -> None:
-    branch = tree.add(_label(step, notes))
+    from rich.text import Text
+
+    branch = tree.add(Text.assemble(*_label(step, notes)))
     for below in step.steps:
         _grow(branch, below, notes)
 
 
-def _label(step: Step, notes: Notes) -> Text:
-    from rich.text import Text
+def _drawn(steps: Sequence[Step], notes: Notes, indent: str) -> Iterator[str]:
+    for count, step in enumerate(steps, 1):
+        last = count == len(steps)
+        yield f"{indent}{'└' if last else '├'}── {''.join(text for text, _ in _label(step, notes))}"
+        yield from _drawn(step.steps, notes, indent + ("    " if last else "│   "))
 
+
+def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
+    """Return pieces of text, each with its style."""
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
-    label = Text.assemble((f"{step.id:>2} ", "dim"), (step.behavior, style), " ", " ".join(step.arguments))
+    label = [(f"{step.id:>2} ", "dim"), (step.behavior, style), (" " + " ".join(step.arguments), "")]
     if step.bindings and not step.steps:
-        label.append("  " + ", ".join(f"{name}: {value}" for name, value in step.bindings.items()), "dim italic")
+        label.append(("  " + ", ".join(f"{name}: {value}" for name, value in step.bindings.items()), "dim italic"))
     if step.path in notes:
-        label.append("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green")
+        label.append(("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green"))
     return label
 
 

@@ -9,16 +9,21 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
-from threading import current_thread, main_thread
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from threading import Timer, current_thread, main_thread
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from confab.progress import quiet
 from reasoner.graph.knowledge import KnowledgeError
 
+if TYPE_CHECKING:
+    from reasoner.limits import Deadline
+
+Ending = Callable[[int], NoReturn]
+"""Ends the process at once with an exit code."""
 YES, NO, MISUSE, GAVE_UP, BUG, INTERRUPTED = 0, 1, 2, 3, 4, 130
 EXIT = {"solved": YES, "unsolvable": NO, "gave-up": GAVE_UP}
 """What the status of an outcome is as an exit code."""
@@ -87,6 +92,31 @@ def _interruptible(call: Callable[[], int | None]) -> int | None:
     finally:
         if before is not None:
             signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
+    """End the process where what is done in here goes on for a tenth longer than it may: nothing interrupts a query of a store.
+
+    Nothing may be written in here.
+    """
+    if deadline.left is None or ending is None:
+        yield
+        return
+
+    def end() -> None:
+        _say(
+            f"gave up after {deadline.seconds:g} s, within a step that can't be interrupted; give more time (--time-limit)"
+        )
+        ending(GAVE_UP)
+
+    watch = Timer(deadline.left + deadline.seconds / 10, end)
+    watch.daemon = True
+    watch.start()
+    try:
+        yield
+    finally:
+        watch.cancel()
 
 
 def show_result(what: Any) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from time import perf_counter
 
 from reasoner.symbols import Condition, Fact, State
 
@@ -162,6 +163,10 @@ class Limits:
 
     expansions: int = 200_000
     seconds: float | None = None
+
+    def end(self, share: float = 1.0) -> float | None:
+        """Return when a share of the seconds from now on is over, as `perf_counter` counts; None: never."""
+        return None if self.seconds is None else perf_counter() + share * self.seconds
 
 
 class UnsolvableError(Exception):

@@ -29,7 +29,7 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.terminal import EXIT, GAVE_UP, NO, YES, remark, show_result
+from confab.terminal import EXIT, GAVE_UP, NO, YES, Ending, ended_by, remark, show_result
 from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ if TYPE_CHECKING:
 @SCENE_IRI
 @AS_JSON
 @QUIET
+@click.pass_obj
 def plan(
+    ending: Ending | None,
     scene: str,
     goal: tuple[str, ...],
     memory: Path | None,
@@ -103,7 +105,7 @@ def plan(
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     limit = None if time_limit is None else deadline
-    with progress("planning"):
+    with progress("planning"), ended_by(deadline, ending):
         result = loaded.plan(
             goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
         )
@@ -112,7 +114,8 @@ def plan(
     if out is not None:
         show_result(f"{result.save(out)}: {summary(result.outcome)}")
     else:
-        show_result(result.json() if as_json else result)
+        # What draws trees is imported for a plan alone: there may be no time left for it.
+        show_result(result.json() if as_json else result if result.solved else str(result))
     doubt(loaded, deadline)
     raise Exit(EXIT[result.outcome.status.value])
 

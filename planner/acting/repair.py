@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
-from time import perf_counter
 
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.recovery import Recovery
@@ -49,7 +48,6 @@ class Mended:
     kind: str
     steps: tuple[Step, ...] | None
     cost: float
-    seconds: float
     outcome: Outcome | None = None
 
 
@@ -89,18 +87,17 @@ def mend(
         Whether the first step of `rest` may be finished as it was planned.
     limits : Limits
     """
-    begin = perf_counter()
     using = using or compiled(problem)
     repaired = repair(problem, rest, planned, using, in_progress, limits)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
     fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
-        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
+        return Mended("repair", repaired.steps, repaired.cost)
     anew, outcome = replan(problem, planner, using, limits)
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
-        return Mended("repair", repaired.steps, repaired.cost, perf_counter() - begin)
-    return Mended("replan", anew, cost_of(problem, Plan(anew or ())), perf_counter() - begin, outcome)
+        return Mended("repair", repaired.steps, repaired.cost)
+    return Mended("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
 
 
 def repair(
@@ -125,12 +122,11 @@ def repair(
                 del pending[:1]
             settle(call)
         finished = len(call.steps)
-        begun = finished if rest and touched.isdisjoint(rest[0].arguments) else 0
         _restore(call, pending)
         restored = len(call.steps)
         whole = _replay(call, pending, wanted)
-        kept = range(restored, len(call.steps)) if whole else ()  # where nothing is dropped, all has its purpose
-        begun = begun if whole else 0
+        # Where nothing is dropped, all that is kept has its purpose.
+        kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
         settle(call)
         solved = not refuted(call.segments) and call.serialise(recovery.harder)
     except (LimitError, UnsolvableError):
@@ -138,11 +134,8 @@ def repair(
     if not solved:
         return None
     costs = costs_of_steps(call.problem, call.tree().steps)
-    needed = {*range(begun), *(i for i in kept if touched.isdisjoint(call.steps[i][2]))}
-    needed |= {i for i in _last_steps(call) if i < begun or i >= finished}
-    old, first = {(step.behavior, step.arguments) for step in rest}, call.program.levels[0]
-    new = [step[2] for step in call.steps if step[0] == first and (step[1], step[2]) not in old]
-    for individual in touched.union(*new):  # its steps could perhaps be done as one
+    needed = {i for i in kept if touched.isdisjoint(call.steps[i][2])} | _last_steps(call)
+    for individual in sorted(touched):  # its steps could perhaps be done as one
         together = [i for i in needed if individual in call.steps[i][2]]
         needed.difference_update(sorted(together, key=lambda i: -costs[i])[1:])
     return Repaired(call.tree().steps, sum(costs), sum(costs[i] for i in needed))
@@ -207,15 +200,8 @@ def settle(call: Call) -> bool:
 
     What a hand holds goes where it is wanted if that takes no longer, else to any place.
     """
-    levels, domain = call.program.levels, call.problem.domain
-    for level in reversed(levels[1:]):
-        targets = {
-            (name, key): situation.rest
-            for name, situation in domain.situations.items()
-            if situation.level == level and situation.rest is not None
-            for key, value in call.table.now[name].items()
-            if value != situation.rest
-        }
+    for level in reversed(call.program.levels[1:]):
+        targets = _restless(call, level)
         if not targets:
             continue
         hidden = {
@@ -271,7 +257,7 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
     """Achieve first, where one step does it, the open goals that no pending step is for: something happened to them."""
     planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
-    before = call.order() if len(orphans) > 1 else {}
+    before = call.order() if orphans else {}
     for cell in orphans:
         if not any(other in orphans for other in before.get(cell, ())):
             call.achieve(call.program.levels[0], cell, EASY)
@@ -309,7 +295,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
 def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     """Do a step by the very primitives that it has, or return None with the table as it was.
 
-    Of a step that was `begun` before, only what is below it counts; any other must be applicable, and do what it promises.
+    Of a step that was `begun` before, only its primitives count; any other must be applicable, and do what it promises.
     """
     mark = len(call.table.trail)
     applicable = call.segments.forward[step.behavior](*step.arguments)
@@ -320,8 +306,8 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
         call.segments.apply(applicable[1])
         return RefinedStep(step.level, step.behavior, step.arguments, applicable[0], ())
     below = []
-    for position, child in enumerate(step.steps):
-        done = _redo(call, child, begun and position == 0)
+    for child in step.steps:
+        done = _redo(call, child, begun)
         if done is None:
             call.table.undo(mark)
             return None
@@ -331,7 +317,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
         call.table.undo(mark)
         return None
     names = call.program.variables[step.behavior]
-    bindings = applicable[0] if applicable and not begun else tuple(step.bindings.get(name, "") for name in names)
+    bindings = tuple(step.bindings.get(name, "") for name in names) if applicable is None else applicable[0]
     return RefinedStep(step.level, step.behavior, step.arguments, bindings, tuple(below))
 
 
@@ -366,12 +352,18 @@ def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapp
 
 def _at_rest(call: Call) -> bool:
     """Whether everything that the uppermost level doesn't know of rests."""
-    return all(
-        value == situation.rest
+    return not any(_restless(call, level) for level in call.program.levels[1:])
+
+
+def _restless(call: Call, level: int) -> dict[Cell, str]:
+    """Return the values of rest of what a level knows of and what doesn't rest."""
+    return {
+        (name, key): situation.rest
         for name, situation in call.problem.domain.situations.items()
-        if situation.level > call.program.levels[0] and situation.rest is not None
-        for value in call.table.now[name].values()
-    )
+        if situation.level == level and situation.rest is not None
+        for key, value in call.table.now[name].items()
+        if value != situation.rest
+    }
 
 
 def _last_steps(call: Call) -> set[int]:
@@ -397,5 +389,4 @@ def _last_steps(call: Call) -> set[int]:
 
 
 def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
-    deadline = None if limits.seconds is None else perf_counter() + limits.seconds
-    return Call(problem, using, deadline, limits.expansions)
+    return Call(problem, using, limits.end(), limits.expansions)

@@ -140,7 +140,7 @@ def plan_level(
         Unsolvable is said of this level only.
     """
     began = perf_counter()
-    deadline = None if limits.seconds is None else began + limits.seconds
+    deadline = limits.end()
     level = problem.domain.levels[-1] if level is None else level
     goal = problem.goal_on(level) if goal is None else goal
     try:

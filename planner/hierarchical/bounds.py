@@ -52,7 +52,7 @@ def plan(
         Optimal if `bound` is the cost of the plan's primitives.
     """
     begin = perf_counter()
-    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
+    deadline = limits.end(SEARCHING)
     using = using or compiled(problem)
     best = fast_plan(problem, limits=_left(limits, deadline), using=using)
     best = _shortened(problem, best, limits, using, deadline)

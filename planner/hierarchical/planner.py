@@ -95,7 +95,7 @@ def _plan(
     advised: Callable[[Call], None],
 ) -> Outcome:
     begin = perf_counter()
-    deadline = None if limits.seconds is None else begin + SEARCHING * limits.seconds
+    deadline = limits.end(SEARCHING)
     using = using or compiled(problem)
 
     call = Call(problem, using, deadline, limits.expansions)

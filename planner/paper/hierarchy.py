@@ -146,7 +146,7 @@ def _call(
         links=links or Links(),
         constants=constants,
         limits=limits,
-        deadline=None if limits.seconds is None else perf_counter() + limits.seconds,
+        deadline=limits.end(),
         proof=proof,
         counts={level: Counts() for level in levels},
     )

@@ -9,7 +9,8 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from time import sleep
+from typing import Any, NoReturn, cast
 
 import pytest
 
@@ -17,7 +18,7 @@ import confab
 from confab.authoring import migrate, new_domain
 from confab.cli import main
 from confab.memory import Memory
-from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, run_to_end
+from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, Ending, ended_by, run_to_end
 from ontology import ROOT
 from ontology import scenes as shipped_scenes
 from reasoner.files import alone, write_whole
@@ -641,6 +642,21 @@ def test_the_time_limit_holds_from_the_first_step_on(tmp_path: Path, ask: Ask, m
     code, out, err = ask("plan", tmp_path / "s.ttl", "--time-limit", "0.05", "--mode", mode)
     assert (code, out, err.count("\n")) == (GAVE_UP, "", 1)
     assert re.search("gave up after 0.05 s while .*--time-limit", err)
+
+
+def test_a_step_that_nothing_interrupts_is_broken_off_a_tenth_after_the_time_limit(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    codes: list[int] = []
+    ending = cast("Ending", codes.append)
+    with ended_by(Deadline.after(0.1), ending):
+        sleep(0.5)
+    assert codes == [GAVE_UP]
+    assert "gave up after 0.1 s, within a step" in capsys.readouterr().err
+    with ended_by(Deadline.after(0.2), ending), ended_by(Deadline(), ending), ended_by(Deadline.after(0.0), None):
+        pass
+    sleep(0.4)
+    assert codes == [GAVE_UP]
 
 
 def test_no_look_for_faults_outlasts_the_time_limit(tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:

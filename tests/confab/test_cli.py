@@ -4,13 +4,17 @@ import json
 import os
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+
+from confab import load
 
 
 def confab(*arguments: str, cwd: Path | None = None, **env: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from confab.cli import main; main()", *arguments]
+    command = [sys.executable, "-c", "from confab.start import main; main()", *arguments]
     return subprocess.run(
         command,
         capture_output=True,
@@ -27,6 +31,17 @@ def test_plan_prints_the_tree_with_ids() -> None:
     assert done.returncode == 0
     assert "4 / 10 / 32 steps" in done.stdout
     assert "22 B1_MOVE cup1 location7" in done.stdout
+
+
+def test_a_plan_is_the_same_tree_in_a_pipe_as_in_a_terminal() -> None:
+    result = load("beverage-serving").plan()
+    plain, shown = StringIO(), StringIO()
+    Console(file=plain, width=200).print(result)
+    Console(file=shown, width=200, force_terminal=True, color_system=None).print(result)
+    assert plain.getvalue().count("\n") == 47
+    assert [line.rstrip() for line in plain.getvalue().splitlines()] == [
+        line.rstrip() for line in shown.getvalue().splitlines()
+    ]
 
 
 def test_plan_as_json_has_the_documented_keys() -> None:

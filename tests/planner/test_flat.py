@@ -100,8 +100,8 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("planner.grounded.best_first.automatic", slow)
     monkeypatch.setattr("planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
     monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
-    for module in ("best_first", "plan_windows", "reachability"):
-        monkeypatch.setattr(f"planner.grounded.{module}.perf_counter", lambda: float(evaluated))
+    for module in ("plan", "grounded.best_first", "grounded.plan_windows", "grounded.reachability"):
+        monkeypatch.setattr(f"planner.{module}.perf_counter", lambda: float(evaluated))
     problem = carrier(16)
     assert plan_level(problem).status is Status.SOLVED and evaluated > 50
     evaluated = 0

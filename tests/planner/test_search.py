@@ -56,8 +56,8 @@ def test_the_limit_of_expansions_gives_up_instead_of_claiming_anything() -> None
 
 def test_the_time_limit_ends_a_search_within_one_state(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = count()
-    for module in ("hierarchy", "astar"):
-        monkeypatch.setattr(f"planner.paper.{module}.perf_counter", lambda: float(next(clock)), raising=False)
+    for module in ("plan", "paper.hierarchy", "paper.astar"):
+        monkeypatch.setattr(f"planner.{module}.perf_counter", lambda: float(next(clock)), raising=False)
     outcome = plan(tabletop(), limits=Limits(seconds=4.0))
     assert outcome.status is Status.GAVE_UP
     assert sum(counts.generated for counts in outcome.search.values()) <= 5

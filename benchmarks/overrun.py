@@ -1,0 +1,91 @@
+"""How long `confab plan --time-limit N` goes on after its limit, and that it ends with exit 3 then.
+
+    python -m benchmarks.overrun        every call, as docs/promises.md has it
+
+The limit is one of the clock, so a call is watched from outside: what CPU time it has used when the limit is over, and in the end.
+On a busy machine the limit comes at another step, but a step takes the CPU time that it takes.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import sleep
+
+SCENES = {
+    "1,000 objects": ("served", "--objects", "1000"),
+    "10,000 objects": ("served", "--objects", "10000"),
+    "100,000 irrelevant objects": ("served", "--objects", "4", "--clutter", "100000"),
+    "200 objects": ("served", "--objects", "200"),
+}
+CALLS: tuple[tuple[str, float, tuple[str, ...]], ...] = (
+    ("1,000 objects", 1, ()),
+    ("1,000 objects", 2, ("--mode", "optimal")),
+    ("10,000 objects", 2, ()),
+    ("10,000 objects", 5, ()),
+    ("10,000 objects", 10, ()),
+    ("100,000 irrelevant objects", 2, ()),
+    ("100,000 irrelevant objects", 5, ()),
+    ("200 objects", 1, ("--mode", "paper")),
+    ("200 objects", 3, ("--mode", "paper")),
+    ("1,000 objects", 5, ("--mode", "paper")),
+)
+"""In which scene, with how many seconds, and with which other options."""
+WATCHED = """
+import os, sys
+from reasoner.limits import Deadline
+begin = Deadline.after.__func__
+def after(cls, seconds):
+    os.write(int(os.environ["WATCH"]), b"!")
+    return begin(cls, seconds)
+Deadline.after = classmethod(after)
+from confab.start import main
+main()
+"""
+"""The command, which says when it begins to count."""
+
+
+def overrun(arguments: list[str], seconds: float) -> tuple[int, float]:
+    """Return how a command ended, and the CPU seconds that it used after its limit."""
+    told, tell = os.pipe()
+    with subprocess.Popen(
+        [sys.executable, "-c", WATCHED, *arguments, "--time-limit", f"{seconds:g}"],
+        pass_fds=(tell,),
+        env={**os.environ, "WATCH": str(tell)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        os.close(tell)
+        os.read(told, 1)
+        sleep(seconds)
+        ran = Path(f"/proc/{process.pid}/schedstat")
+        used = int(ran.read_text().split()[0]) / 1e9 if process.poll() is None else None
+        _, state, resources = os.wait4(process.pid, 0) if used is not None else (0, process.returncode << 8, None)
+        process.returncode = os.waitstatus_to_exitcode(state)
+        os.close(told)
+    after = 0.0 if resources is None or used is None else resources.ru_utime + resources.ru_stime - used
+    return process.returncode, max(0.0, after)
+
+
+def main() -> None:
+    """Print a row for each call."""
+    with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
+        files = {name: Path(folder) / f"{number}.ttl" for number, name in enumerate(SCENES)}
+        for name, file in files.items():
+            command = [sys.executable, "-c", "from confab.start import main; main()", "generate", *SCENES[name]]
+            subprocess.run([*command, "-o", str(file)], check=True, stdout=subprocess.DEVNULL)
+        print("| scene | options | limit, s | exit | CPU s after it | share of the limit |\n|---|---|---|---|---|---|")
+        for name, seconds, options in CALLS:
+            code, after = overrun(["plan", str(files[name]), *options], seconds)
+            said = " ".join(options)
+            print(
+                f"| {name} | {f'`{said}`' if said else ''} | {seconds:g} | {code} | {after:.2f} | {after / seconds:.0%} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
