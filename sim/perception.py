@@ -122,6 +122,8 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
     between its open fingers, else at the place to which it points: an empty one may have drawn back from it.
     """
     hand, numbers = arguments[0], use.numbers
+    if not world.embodiment.places:  # nothing to be low above
+        return use.values["raised"]
     held = world.held(hand)
     point = top = world.hands[hand].frame()[1]
     if held is not None:

@@ -204,6 +204,24 @@ def test_a_knob_is_turned_and_a_door_slides_aside_as_an_author_describes_them(tm
             assert (world.links["valve"].values()["valve"] > 1.0) == (behavior == "F3_OPEN")
 
 
+def test_a_crank_is_turned_around_its_post_where_there_is_no_place_at_all(tmp_path: Path) -> None:
+    file = Path(__file__).parents[2] / "docs" / "examples" / "sluice" / "sluice.ttl"
+    (tmp_path / file.name).write_text(file.read_text())
+    rollouts = with_reach(confab.load(tmp_path / file.name)).plan().verify(rollouts=2, perturb=True)
+    assert str(rollouts).startswith("verified")
+    assert not rollouts.scene.embodiment.places
+
+
+def test_a_button_that_seems_nearer_than_it_is_is_pressed_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = confab.load("centrifuge")
+    press = by_skill(scene.embodiment)["press"]
+    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
+        nearer = {mechanic.body: np.array([-0.009, 0.0, 0.0]) for mechanic in world.mechanics}
+        monkeypatch.setattr(world, "look", lambda before=0: world.shifts.update(nearer))
+        perform(world, press, {"hand": "right_hand", "object": "start"})
+        assert world.observe()[Symbol("RUNNING", ("start",))] == "true"
+
+
 def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
     scene = kitchen()
     operate = by_skill(scene.embodiment)["operate"]

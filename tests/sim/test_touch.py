@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import confab
+from sim.attempt import Attempt
 from sim.engine import Engine
 from sim.faults import misaligned
+from sim.motion import line, pose_of
+from sim.urdf import Array
 from sim.verify import expectations, verify
 from sim.world import World
 
@@ -51,3 +54,30 @@ def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_
             world.look()
             seen.append(world.sense("cup1")[1] - world.truth("cup1")[1])
         assert np.std(seen) == pytest.approx(0.01 / np.sqrt(6), rel=0.1)
+
+
+def test_looks_at_a_mechanism_again_are_averaged() -> None:
+    scene = confab.load("kitchen-corner")
+    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
+        seen = []
+        for _ in range(300):
+            for before in range(3):
+                world.look(before)
+            seen.append(world.shift(world.mechanics[0]))
+        assert np.std(seen) == pytest.approx(0.01 / np.sqrt(3), rel=0.1)
+
+
+def test_a_straight_line_that_the_elbow_is_in_the_way_of_is_gone_with_the_elbow_turning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = confab.load("panda-serving")
+    with World(scene.embodiment, scene.problem.initial, beads=False) as world:
+        attempt, driven = Attempt.begin(world, "gripper"), list[Array]()
+        start = np.array([0.598, 0.359, 0.965, 0.412, 0.0, 0.0])
+        goal = start - np.array([0.0, 0.0, 0.03, 0.0, 0.0, 0.0])
+        reacher = attempt.reacher(margin=0.002)
+        attempt.hand.posture = reacher.solve(start[None])[0][0]
+        assert reacher.follow(line(start, goal)) is None
+        monkeypatch.setattr(Attempt, "follow", lambda self, q, *_: driven.append(q))
+        attempt.straight(goal, ())
+        assert pose_of(attempt.hand.arm, driven[0][-1])[:5] == pytest.approx(goal[:5], abs=1e-4)
