@@ -1,7 +1,7 @@
 """What experience is worth: transfer to larger worlds of any kind, flat PDDL, harm, and files.
 
     python -m benchmarks memory
-    CONFAB_MEMORY=transfer,harm …     some of: transfer, worlds, curve, pddl, harm, files
+    CONFAB_MEMORY=transfer,harm …     some of: transfer, worlds, curve, said, pddl, harm, files
     CONFAB_WORLDS=FOLDER …            worlds from elsewhere beside the shipped ones: pairs ``…-small.ttl`` and ``…-large.ttl``
     CONFAB_PDDL=FOLDER …              folders with ``domain.pddl``, ``training…`` and ``testing…``
     CONFAB_ALL=1 …                    every problem of those, not only a few per folder
@@ -35,7 +35,7 @@ from reasoner.names import Names
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import PddlError, parse_files
 from reasoner.symbols import Problem
-from worlds.lessons import problem, taught
+from worlds.lessons import backwards, problem, taught
 
 FAMILIES = ("served", "swap", "rotate", "full", "handover", "blocked")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -48,6 +48,7 @@ def main() -> None:
         "transfer": transfer,
         "worlds": worlds,
         "curve": curve,
+        "said": said,
         "pddl": pddl,
         "harm": harm,
         "files": files,
@@ -153,6 +154,19 @@ def curve(world: str = "canal", episodes: int = 3) -> None:
             live(experience, large, led.plan)
 
 
+def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None:
+    """Print the rules of a lesson as the page of advice has them, those of the most abstract level."""
+    for world in worlds:
+        scene = confab.load(f"{world}-small")
+        memory = confab.Memory.of(scene)
+        memory.teach(scene, scene.plan().plan)
+        print(f"\n**{world}**\n")
+        say, behaviors = memory.sayings(), scene.problem.domain.behaviors
+        rules = [r for r in rules_in(memory.experience) if behaviors[r.does[0]].level == scene.problem.domain.levels[0]]
+        for rule in sorted(rules, key=lambda rule: (rule.goal.situation, rule.does, rule.name)):
+            print(f"- {say.rule(rule)}")
+
+
 def folders() -> Iterator[tuple[Path, list[Path], list[Path]]]:
     """Yield domain, problems to learn from and problems to test on, some of each size."""
     root = Path(os.environ.get("CONFAB_PDDL", SHARED / "pddl"))
@@ -192,14 +206,13 @@ def bad_memories() -> dict[str, Memory]:
     """Return memories that are right, wrong and of elsewhere."""
     good = taught(FAMILIES)
     rules = rules_in(good.experience)
-    longest = max(rule.steps for rule in rules)
-    turned = [replace(rule, steps=longest + 1 - rule.steps) for rule in rules]
+    turned = [backwards(rule) for rule in rules]
     careless = [replace(rule, asks=rule.asks[::2]) for rule in rules]
     swapped = [replace(rule, does=(rule.does[0], rule.does[1][::-1])) for rule in rules]
     other = [replace(rule, does=(f"OTHER_{rule.does[0]}", rule.does[1])) for rule in rules]
     found = {"trained": good}
     for name, those in (
-        ("ranks reversed", turned),
+        ("promises reversed", turned),
         ("half the conditions", careless),
         ("arguments swapped", swapped),
         ("of another domain", other),

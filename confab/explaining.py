@@ -196,11 +196,11 @@ def behind(memory: Memory, name: str) -> str:
 
 
 def _best(ways: Sequence[Candidate], advisor: Advisor, view: View) -> Candidate | None:
-    """Return the way of the fewest steps, of these the most cogent."""
+    """Return the most cogent way."""
 
-    def key(c: Candidate) -> tuple[float, ...]:
+    def key(c: Candidate) -> float:
         facts, who = view.facts(c.rule, c.roles), view.individuals(c.rule, c.roles)
-        return -c.rule.steps, advisor.judge.cogency(c.rule, facts, who)
+        return advisor.judge.cogency(c.rule, facts, who)
 
     return max(ways, key=key, default=None)
 

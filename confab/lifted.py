@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from confab.labels import Labels, denied
@@ -114,17 +114,14 @@ class Sayings:
             return f"{self.name(rule.goal.situation)} of {who} becomes {rule.goal.value}"
         return self.fact(Fact(Symbol(rule.goal.situation, rule.goal.arguments), rule.goal.value))
 
-    def rule(self, rule: Rule, beyond: Collection[Condition] = ()) -> str:
-        """Return a rule as a sentence; conditions that its successor asks for, too, may be left out."""
-        said = sorted(
-            (c for c in rule.asks if c not in beyond), key=lambda c: isinstance(c, Witness | RelationCondition)
-        )
+    def rule(self, rule: Rule) -> str:
+        """Return a rule as a sentence."""
+        said = sorted(rule.asks, key=lambda c: isinstance(c, Witness | RelationCondition))
         asks = [self.condition(c) for c in said]
         left = len(asks) - MOST_SAID
         more = f" and {left} thing{'s' * (left > 1)} more" if left > 0 else ""
         when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""
-        steps = "the last step" if rule.steps == 1 else f"{rule.steps} steps to go"
-        return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)} ({steps})"
+        return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)}"
 
     def said(self, one: Said) -> str:
         """Return what something says that was learned."""
@@ -152,17 +149,3 @@ class Sayings:
             if match := pattern.fullmatch(asks):
                 return sentence.format(*map(put, match.groups()), answer=put(answer))
         return f"{' '.join(map(put, asks.split()))}: {answer}"
-
-
-def successors(rules: Iterable[Rule]) -> dict[str, Rule]:
-    """Return for each rule the one that most likely follows it: for the same goal, with a step less, of the most common asks."""
-    by_rank: dict[tuple[object, int], list[Rule]] = {}
-    for rule in rules:
-        by_rank.setdefault((rule.goal, rule.steps), []).append(rule)
-    found = {}
-    for (goal, steps), those in by_rank.items():
-        for rule in those:
-            after = by_rank.get((goal, steps - 1), ())
-            if after:
-                found[rule.name] = max(after, key=lambda other: (len(set(other.asks) & set(rule.asks)), other.name))
-    return found

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.accepting import AnyPlan, plan_of
-from confab.lifted import Sayings, successors
+from confab.lifted import Sayings
 from confab.table import Table
 from planner.paper.learning import LearningError
 from planner.paper.learning import learn as learn_plan
@@ -282,20 +282,17 @@ class Memory:
         return Sayings(self.labels() if self.labels is not None else None)
 
     def advice(self, most: int | None = None) -> Table:
-        """Return the rules by kind of goal, the shortest ways first; of each what it asks beyond the rule that follows it."""
+        """Return the rules by kind of goal."""
         say, totals = self.sayings(), self.experience.totals()
         rules = [one for one in self.experience.said.values() if isinstance(one, Rule)]
-        after = successors(rules)
         rows = []
-        for rule in sorted(rules, key=lambda r: (r.goals.situation, r.goals.classes, r.steps, r.name)):
+        for rule in sorted(rules, key=lambda r: (r.goals.situation, r.goals.classes, r.goal.value, r.does, r.name)):
             t = totals.get(rule.name, {}).get(ITSELF, Tally())
             kind = totals.get(rule.goals.name, {}).get(ITSELF, Tally())
             record = say.said(rule.goals)
             if kind.chosen + kind.failed:
                 record += f" ({kind.chosen} of {kind.chosen + kind.failed} reached by rules alone)"
-            then = after.get(rule.name)
-            text = say.rule(rule, then.asks if then is not None else ())
-            text += "" if rule.name not in self.experience.disabled else " – disabled"
+            text = say.rule(rule) + ("" if rule.name not in self.experience.disabled else " – disabled")
             rows.append((record, text, f"{t.chosen}", f"{t.passed_over}", f"{t.failed}"))
         return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
 

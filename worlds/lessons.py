@@ -12,10 +12,10 @@ from planner.experience.advice import Memory
 from planner.experience.lessons import teach
 from reasoner.generate import generate
 from reasoner.graph.knowledge import load
-from reasoner.memory.experience import Experience
+from reasoner.memory.experience import Experience, Rule
 from reasoner.reading.problem import Reading, read
 from reasoner.reading.relevance import recognise
-from reasoner.symbols import Problem
+from reasoner.symbols import Problem, ValueCondition
 
 
 def as_it_is(text: str) -> str:
@@ -52,6 +52,18 @@ def single_level(problem: Problem, level: int) -> Problem:
     """Return a problem whose first level is `level`: the levels above it are left out."""
     behaviors = {name: b for name, b in problem.domain.behaviors.items() if b.level >= level}
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
+
+
+def backwards(rule: Rule) -> Rule:
+    """Return a rule that promises what its behaviour takes away, if it takes away anything; else one that asks for half as much."""
+    for c in rule.asks:
+        same = isinstance(c, ValueCondition) and (c.situation, c.arguments) == (
+            rule.goal.situation,
+            rule.goal.arguments,
+        )
+        if isinstance(c, ValueCondition) and same and not c.negated:
+            return replace(rule, goal=c, asks=(*(other for other in rule.asks if other != c), rule.goal))
+    return replace(rule, asks=rule.asks[::2])
 
 
 @lru_cache(maxsize=8)

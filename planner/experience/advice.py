@@ -7,9 +7,9 @@ leading    rules lead whatever their record is
 strict     rules are tried beside the search, with a twentieth of its expansions (`planner.experience.racing`)
 =========  ====================================================================================================
 
-Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`);
-what search finds where they have nothing to say, they learn at once. That there is no plan is for search to prove. Memory that
-isn't trusted runs in strict mode whatever was asked for, and one that knows none of the goals isn't asked at all.
+Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`).
+That there is no plan is for search to prove. Memory that isn't trusted runs in strict mode whatever was asked for, and one that
+knows none of the goals isn't asked at all.
 """
 
 from __future__ import annotations

@@ -82,8 +82,8 @@ class Chains:
         It may grow.
     joins : dict
         What was compiled of rules for other calls over the same program; grows.
-    prefer : function of a candidate
-        Of ways that are equally near the one of the least value is gone first.
+    score : function of a candidate, optional
+        Of ways that are equally near the one of the greatest value is gone first.
     before : function of two conditions with who is in their roles
         Whether the first is known to be brought about before the second.
     """
@@ -93,10 +93,10 @@ class Chains:
         call: Call,
         rules: Mapping[tuple[int, str], list[Rule]],
         joins: dict[str, Bind | None],
-        prefer: Callable[[Candidate], tuple[bool, float]],
+        score: Callable[[Candidate], float] | None,
         before: Callable[[Condition, Condition, Mapping[str, str]], bool],
     ) -> None:
-        self.call, self.rules, self.joins, self.prefer, self.before = call, rules, joins, prefer, before
+        self.call, self.rules, self.joins, self.score, self.before = call, rules, joins, score, before
         self.finds: dict[str, Find | None] = {}
         self.achievers: dict[str, Achiever] = {}
         self.age = -1
@@ -108,6 +108,8 @@ class Chains:
         """How long chains may be that lead to a goal, and how long they may not."""
         self.picked: dict[int, Sequence[str]] = {}
         self.seen: set[tuple[int, Cell, str, bool]] = set()
+        self.needed: list[dict[Cell, str]] = []
+        """What steps that are to be done ask, of each that is being prepared."""
         self.cut = False
 
     def met(self, goal: Goal) -> bool:
@@ -205,11 +207,7 @@ class Chains:
             return False
         self.beyond[key] = most  # met again on the way, it isn't nearer
         self.seen.add(key)
-        self.cut |= any(way.rule.steps > most for way in ways)
-        if any(
-            way.rule.steps <= most and all(self.mended(level, way, n, most - 1, everybody) for n in way.unmet)
-            for way in ways
-        ):
+        if any(all(self.mended(level, way, n, most - 1, everybody) for n in way.unmet) for way in ways):
             self.near[key] = most
             return True
         return False
@@ -222,7 +220,7 @@ class Chains:
     def cost(self, level: int, way: Candidate, everybody: bool, most: float) -> float:
         """Return how long a chain is at least whose last rule is followed this way."""
         if not way.unmet:
-            return way.rule.steps
+            return 1
         lacks = (self.lacks(level, way, n) for n in way.unmet)
         return 1 + max(min((self.distance(level, g, everybody, most) for g in goals), default=1) for goals in lacks)
 
@@ -237,19 +235,35 @@ class Chains:
                     if (cost := self.cost(level, way, everybody, most + 2)) < below
                 ]
                 if ways:
-                    return self.best(ways)
+                    return self.best(level, ways)
         return []
 
-    def best(self, ways: list[tuple[float, Candidate]]) -> list[tuple[float, Candidate]]:
+    def best(self, level: int, ways: list[tuple[float, Candidate]]) -> list[tuple[float, Candidate]]:
         """Return the first few of the ways in the order in which to try them."""
-        groups: dict[tuple[float, int], list[Candidate]] = {}
+        groups: dict[tuple[float, int, int], list[Candidate]] = {}
         for cost, way in ways:
-            groups.setdefault((cost, len(way.unmet)), []).append(way)
+            groups.setdefault((cost, self.spoils(level, way), len(way.unmet)), []).append(way)
         found: list[tuple[float, Candidate]] = []
-        for (cost, _), group in sorted(groups.items()):
+        for (cost, *_), group in sorted(groups.items()):
             if len(found) < TRIES:
-                found += [(cost, way) for way in (sorted(group, key=self.prefer) if len(group) > 1 else group)]
+                if self.score is not None and len(group) > 1:
+                    group.sort(key=self.score, reverse=True)
+                found += [(cost, way) for way in group]
         return found[:TRIES]
+
+    def spoils(self, level: int, way: Candidate) -> int:
+        """Return how many changes by a way, or changes that it lacks, would spoil what is kept or was brought about for others."""
+        if way.unmet:
+            wants = (self.lacks(level, way, n) for n in way.unmet)
+            changes = [lacks[0] for lacks in wants if len(lacks) == 1]
+        else:
+            done = self.call.segments.forward[way.ground[0]](*way.ground[1])
+            changes = [((situation, key), value) for situation, key, value in done[1]] if done is not None else []
+        situations, asked = self.call.program.domain.situations, (self.call.kept, *self.needed)
+        return sum(
+            situations[cell[0]].quantity is None and any(value != its.get(cell, value) for its in asked)
+            for cell, value in changes
+        )
 
     # ---------------------------------------------------------------------------------------------------------- attaining
 
@@ -269,13 +283,19 @@ class Chains:
             steps = self.go(level, way, cost, budget, (*above, goal))
             if steps:
                 on = cost
-                if way.rule.steps == 1 and (steps[-1].behavior, steps[-1].arguments) == way.ground:
+                if (steps[-1].behavior, steps[-1].arguments) == way.ground:
                     on = below if self.off(goal) < off else 0.0  # an amount may need the same once more
                 rest = self.attain(level, goal, budget, above, on)
-                if rest is not None:
+                if rest is not None and (above or self.hopeful(level, mark)):
                     return steps + rest
             table.undo(mark)
         return None
+
+    def hopeful(self, level: int, mark: int) -> bool:
+        """Whether chains may lead back to the goals reached before that were spoiled since a mark."""
+        kept, first = self.call.kept, self.call.program.levels[0]
+        spoiled = dict.fromkeys((s, key) for s, key, _ in self.call.table.trail[mark:] if (s, key) in kept)
+        return level != first or all(self.far(level, (cell, kept[cell])) < inf for cell in spoiled)
 
     def off(self, goal: Goal) -> float:
         """Return by how much an amount isn't as wanted; nothing of what is none."""
@@ -295,7 +315,13 @@ class Chains:
         for _ in range(2 * len(asks) + 1):
             if not way.unmet:
                 break
+            env = way.named
+            facts = (fact(c, env) for i, c in enumerate(asks) if i not in way.unmet)
+            self.needed.append(
+                {(f.symbol.situation, key_of(f.symbol.arguments)): f.value for f in facts if f is not None}
+            )
             done = self.mend(level, way, budget, above)
+            self.needed.pop()
             if done is None:
                 return None
             steps += done
@@ -322,10 +348,10 @@ class Chains:
         """Bring about the next of the conditions that a way lacks."""
         asks, env = self.achievers[way.rule.name].soft, way.named
         first: tuple[int, float, int] | None = None
-        goals: list[tuple[float, int, Goal]] = []
+        goals: list[tuple[float, bool, int, Goal]] = []
         for n in way.unmet:
             lacks = self.lacks(level, way, n)
-            near = sorted((self.far(level, g), i, g) for i, g in enumerate(lacks))
+            near = sorted((self.far(level, g), not self.mends(way, n, g), i, g) for i, g in enumerate(lacks))
             if not near:
                 continue  # perhaps it comes with the others
             if near[0][0] == inf:
@@ -333,11 +359,24 @@ class Chains:
             later = sum(m != n and self.before(asks[m], asks[n], env) for m in way.unmet)
             if first is None or (later, -near[0][0], n) < first:
                 first, goals = (later, -near[0][0], n), near
-        for far, _, goal in goals[:TRIES]:
+        for far, *_, goal in goals[:TRIES]:
             done = self.attain(level, goal, budget, above) if far < inf else None
             if done is not None:
                 return done
         return None
+
+    def mends(self, way: Candidate, number: int, goal: Goal) -> bool:
+        """Whether a want alone would do for a condition; of amounts and of what is defined that isn't asked."""
+        table, achiever, program = self.call.table, self.achievers[way.rule.name], self.call.program
+        if goal[0][0] in program.rules or program.domain.situations[goal[0][0]].quantity is not None:
+            return True
+        mark, fresh = len(table.trail), self.age == table.age
+        table.put(*goal[0], goal[1])
+        holds = self.call.segments.wants.holds(achiever, achiever.soft[number], way.named)
+        table.undo(mark)
+        if fresh:
+            self.age = table.age  # all is as it was
+        return holds
 
 
 def fact(condition: Condition, env: Mapping[str, str]) -> Fact | None:

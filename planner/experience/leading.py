@@ -8,28 +8,25 @@ wasted    what was undone because a promise of the most abstract level was broke
 vain      all that came to nothing, rules that were asked included; of all effort that is never more than a tenth, and a little
 
 The goals of a task, one by one in series, and the changes that a refinement must bring about are the same to rules: `Guide.follow`
-leaves the table as wanted, with all kept that must be, or as it was. So search goes on as if nobody had asked, and what it
-finds becomes rules at once.
+leaves the table as wanted, with all kept that must be, or as it was. So search goes on as if nobody had asked.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from math import inf
 from typing import TypeAlias, TypeVar
 
 from planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
-from planner.experience.evidence import told_apart
 from planner.experience.matching import Bind, known
-from planner.experience.regression import Course, ordered
+from planner.experience.regression import ordered
 from planner.hierarchical.operators import Program
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.subplans import Keep
 from planner.transitions import Cell, arguments_of
 from reasoner.amounts import meets
-from reasoner.memory.experience import ITSELF, Experience, Ground, Order, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
 from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol
 
 CASES, NEARLY = 3, 0.95
@@ -67,39 +64,20 @@ class Guide:
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
     ) -> None:
-        self.call, self.score = call, score
+        self.call = call
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
-        self.names: set[str] = set()
         self.off: dict[Cell, str] = {}
         self.first = call.program.levels[0]
         self.wasted, self.vain = 0, 0.0
-        self.taught: dict[object, tuple[int, int]] = {}
-        """Of each kind of targets how many lessons in a row rules led nowhere after, and how many more are left out."""
-        self.classes: dict[str, frozenset[str]] = {}
         self.orders = frozenset(orders)
         self.constants = frozenset(call.program.named) | {TRUE, FALSE}
         self.before = _before(call.goal, orders, call.program)
-        self.chains = Chains(call, self.by_goal, {} if joins is None else joins, self.least, self.sooner)
-        self.add(rules)
-        self.expects = all((self.first, situation) in self.by_goal for situation, _ in self.open())
-
-    def add(self, rules: Iterable[Rule]) -> None:
-        """Follow more rules."""
+        self.chains = Chains(call, self.by_goal, {} if joins is None else joins, score, self.sooner)
         for rule in rules:
-            if rule.name not in self.names:
-                self.names.add(rule.name)
-                if known(rule, self.call.program.problem):
-                    of = self.by_goal.setdefault((self.levels[rule.does[0]], rule.goal.situation), [])
-                    of.append(rule)
-                    of.sort(key=lambda rule: (rule.steps, rule.name))
-
-    def least(self, c: Candidate) -> tuple[bool, float]:
-        """Return what is least for the candidate to try first: last come those that give what somebody else is to have."""
-        wanted = {value: arguments_of(key) for (_, key), value in self.off.items() if value not in (TRUE, FALSE)}
-        given = c.ground[1]
-        away = len(wanted) > 1 and any(not set(wanted[a]) & set(given) for a in given if a in wanted)
-        return away, -self.score(c) if self.score is not None else 0.0
+            if known(rule, call.program.problem):
+                self.by_goal.setdefault((self.levels[rule.does[0]], rule.goal.situation), []).append(rule)
+        self.expects = all((self.first, situation) in self.by_goal for situation, _ in self.open())
 
     def sooner(self, first: Condition, then: Condition, env: Mapping[str, str]) -> bool:
         """Whether one condition is known to be brought about before another one."""
@@ -111,19 +89,19 @@ class Guide:
         return {cell: value for cell, value in self.call.goal.items() if not self.call.met(cell)}
 
     def every(self, cells: Mapping[Cell, str]) -> Iterator[Candidate]:
-        """Yield every way to follow a rule of the most abstract level for some values."""
-        for goal in cells.items():
-            yield from (way for way in self.chains.ways(self.call.program.levels[0], goal) if not way.unmet)
+        """Yield the ways to follow a rule of the most abstract level now for some values, or for what the nearest ways lack."""
+        goals = dict.fromkeys(cells.items())
+        for goal in (asked := list(goals)):
+            ready = [way for way in self.chains.ways(self.first, goal) if not way.unmet]
+            yield from ready
+            for _, way in () if ready else self.chains.nearest(self.first, goal):
+                new = [g for n in way.unmet for g in self.chains.lacks(self.first, way, n) if g not in goals]
+                goals.update(dict.fromkeys(new))
+                asked += new
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal comes first."""
         return any(not self.call.met(other) for other in self.before.get(cell, ()))
-
-    def candidates(self, cells: Mapping[Cell, str]) -> list[Candidate]:
-        """Return the ways to follow a rule of the most abstract level for some values that lack nothing and promise most."""
-        found = list(self.every(cells))
-        least = min((way.rule.steps for way in found), default=0)
-        return [way for way in found if way.rule.steps == least]
 
     def allowed(self) -> float:
         """Return how much more may come to nothing."""
@@ -173,7 +151,6 @@ class Guide:
         finally:
             self.off = outer
         if steps is not None and call.refiner.left_as_it_must(start, targets, keep) is None:
-            self.taught.pop(self.kind(level, targets), None)
             if level == self.first:
                 return steps  # made shorter in the end
             return list(call.refiner.lean(tuple(steps), start, targets, keep))
@@ -217,35 +194,6 @@ class Guide:
         else:
             self.off[cell] = wanted
 
-    def kind(self, level: int, targets: Mapping[Cell, str]) -> object:
-        """Return of what kind targets are: the situation types, and the classes of those whom they are about."""
-        if not self.classes:
-            members = self.call.program.problem.members
-            self.classes = {kind: members(kind) for kind in told_apart(self.call.program.problem)}
-        found = set()
-        for (situation, key), value in targets.items():
-            parts = (*arguments_of(key), value)
-            found.add((situation, *(tuple(k for k, its in self.classes.items() if one in its) for one in parts)))
-        return level, frozenset(found)
-
-    def learn(
-        self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
-    ) -> bool:
-        """Learn rules at once from steps of a level that search found, done since a mark; whether there are new ones.
-
-        After each lesson twice as many are left out, until rules lead to such targets.
-        """
-        kind = self.kind(level, targets)
-        lessons, pause = self.taught.get(kind, (0, 0))
-        if pause:
-            self.taught[kind] = lessons, pause - 1
-            return False
-        self.taught[kind] = lessons + 1, 2**lessons
-        known = len(self.names)
-        done = [(step.behavior, step.arguments) for step in steps]
-        self.add(course(self.call, mark, targets, keep, done).rules_of())
-        return len(self.names) > known
-
 
 def by_rules(guide: Guide) -> None:
     """Achieve goals by rules alone, as many as they can."""
@@ -260,21 +208,6 @@ def by_rules(guide: Guide) -> None:
                     call.steps += steps
                     call.kept[cell] = value
                     reached = True
-
-
-def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
-    """Return steps of a level, done since a mark, as a way from the state there to what they should leave."""
-    before, state = call.table.before(mark), call.table.state()
-    goal = {}
-    for cell, first in before.items():
-        symbol = Symbol(cell[0], arguments_of(cell[1]))
-        state[symbol] = first
-        wanted = targets.get(cell) or keep(cell, first)
-        if wanted is not None:
-            goal[symbol] = wanted
-    for cell in targets.keys() - before.keys():
-        goal[Symbol(cell[0], arguments_of(cell[1]))] = targets[cell]
-    return Course(replace(call.problem, initial=state, goal=goal), done)
 
 
 def rules_in(experience: Experience) -> list[Rule]:

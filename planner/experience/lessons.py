@@ -9,22 +9,23 @@ orders     a teacher plans for the same goals in other orders, too: only what is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 from planner.experience.chaining import Candidate
 from planner.experience.evidence import View
-from planner.experience.leading import Guide, by_rules, course, rules_in, usable
+from planner.experience.leading import Guide, by_rules, rules_in, usable
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner
 from planner.hierarchical.serialization import Call, Compiled, compiled
+from planner.hierarchical.subplans import Keep
 from planner.paper.learning import LearningError
 from planner.plan import LimitError, Limits, Plan, Step
-from planner.transitions import Cell
-from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Rule, Tally
-from reasoner.symbols import Problem
+from planner.transitions import Cell, arguments_of
+from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
+from reasoner.symbols import Problem, Symbol
 
 SINGLE, OTHERS = 6, 2
 """So many goals are taught one by one, and so many other orders of all."""
@@ -135,8 +136,6 @@ def tried(experience: Experience, problem: Problem, using: Compiled, new: Sequen
 
 def about(kind: GoalKind, cell: Cell, problem: Problem) -> bool:
     """Whether a goal is of a kind."""
-    from planner.transitions import arguments_of
-
     return kind.situation == cell[0] and all(
         who in problem.members(of) or who == of for who, of in zip(arguments_of(cell[1]), kind.classes, strict=True)
     )
@@ -187,6 +186,21 @@ def refined(call: Call, steps: Iterable[Step]) -> Iterator[Method | Rule]:
             yield from course(call, mark, targets, keep, grounds(step.steps)).rules_of()
 
 
+def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
+    """Return steps of a level, done since a mark, as a way from the state there to what they should leave."""
+    before, state = call.table.before(mark), call.table.state()
+    goal = {}
+    for cell, first in before.items():
+        symbol = Symbol(cell[0], arguments_of(cell[1]))
+        state[symbol] = first
+        wanted = targets.get(cell) or keep(cell, first)
+        if wanted is not None:
+            goal[symbol] = wanted
+    for cell in targets.keys() - before.keys():
+        goal[Symbol(cell[0], arguments_of(cell[1]))] = targets[cell]
+    return Course(replace(call.problem, initial=state, goal=goal), done)
+
+
 def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> Method:
     """Return a step's refinement over roles."""
     template = refiner.template(grounds(step.steps), own)
@@ -205,7 +219,7 @@ def chosen(
     for number, ground in enumerate(later):
         open_ = guide.open()
         ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
-        tried_ = guide.candidates(ready) or guide.candidates(open_)
+        tried_ = list(guide.every(ready)) or list(guide.every(open_))
         done = [c for c in tried_ if c.ground == ground]
         if done:
             rest = set(later[number + 1 :])

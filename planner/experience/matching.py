@@ -1,9 +1,8 @@
 """A rule as a join over the table: generated Python that yields the ways to fill its roles now, each with what it still lacks.
 
-What is static must hold. Of a rule for the last step the rest may be *unmet*: it can be brought about first. A longer rule is
-followed only where all that it asks holds. What fills a role is, in this order of preference: the value that a symbol has, or who
-has a value; a static relation; a class. If nobody of the first kind fits, or everybody is asked for, the others are taken, one of
-each sort. Different roles are different individuals.
+What is static must hold; the rest may be *unmet*: it can be brought about first. What fills a role is, in this order of
+preference: the value that a symbol has, or who has a value; a static relation; a class. If nobody of the first kind fits, or
+everybody is asked for, the others are taken, one of each sort. Different roles are different individuals.
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ DEEPEST = 18
 
 def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
     """Return what may be brought about before a rule's step: what it asks of the state, and what the step compares."""
-    if rule.steps > 1:
-        return ()
     behavior = problem.domain.behaviors[rule.does[0]]
     put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
     compared = (c for c in behavior.preconditions if isinstance(c, Comparison) and mentions(c) <= put.keys())

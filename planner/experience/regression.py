@@ -1,13 +1,14 @@
-"""From a plan to rules: what a goal needed before each step that led to it, over roles instead of individuals.
+"""From a plan to rules: which step brought about what was needed, and what it asked, over roles instead of individuals.
 
-need     the conditions under which the rest of the steps leads to the goal; in the end the goal alone
+need     the conditions under which the rest of the steps leads to the goals; in the end the goals alone
 back     a step serves the need if some of it doesn't hold before the step: that is replaced by what the step asks
+link     each change of a step that served something is a goal for rules, and the step what to do for it
 lift     each individual that no behaviour names becomes a role of the narrowest class that is asked of it
 
 Goal regression as R. Waldinger had it, "Achieving several goals simultaneously", Machine Intelligence 8 (1977), to lifted rules as
-Moose learns them: D. Z. Chen et al., AAAI 2026. What a condition is isn't looked at but for those that look for an individual or
-offer alternatives: of these the individual, or the alternative, that there was is asked for. The checker's reading of conditions
-is used, so that a new kind of condition needs nothing here.
+Moose learns them: D. Z. Chen et al., AAAI 2026; but a rule is for one causal link, since rules for links make up all chains. What
+a condition is isn't looked at but for those that look for an individual or offer alternatives: of these the individual, or the
+alternative, that there was is asked for. The checker's reading of conditions is used, so that a new kind needs nothing here.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from planner.hierarchical.operators import named
 from planner.language import terms, walk
 from planner.paper.learning import LearningError
 from planner.validation import Facts, Rules
-from reasoner.amounts import meets, towards
+from reasoner.amounts import Amount, inside, meets, towards
 from reasoner.derivation import strata
 from reasoner.memory.experience import Ground, Order, Rule
 from reasoner.symbols import (
@@ -42,10 +43,6 @@ from reasoner.symbols import (
 WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf
 """What memory's files have words for; a rule that asks for anything else isn't learned."""
 STATIC = RelationCondition, ClassCondition
-LONGEST = 12
-"""Rules for more steps than this ask for so much that they seldom apply."""
-
-
 BINDINGS = 100
 """So many ways in which something that is defined may follow from others are looked at, for one that isn't circular."""
 
@@ -76,8 +73,6 @@ class Course:
         """Who is asked for by name; all others, those with whom something rests included, become roles."""
         self.done: list[Done] = []
         self.achieved: dict[Fact, int] = {}
-        self.lost: dict[Fact, int] = {}
-        """The last step after which a goal didn't hold any more."""
         for number, (name, arguments) in enumerate(steps):
             self._do(number, name, arguments)
 
@@ -88,7 +83,7 @@ class Course:
         if bound is None:
             raise LearningError(f"step {number} ({' '.join((name, *arguments))}): its preconditions don't hold there")
         asked = list(self.plain(behavior.preconditions, bound, behavior.kinds, facts))
-        kinds = [ClassCondition(argument, p.kind) for p, argument in zip(behavior.parameters, arguments, strict=True)]
+        kinds = [ClassCondition(bound[who], kind) for who, kind in behavior.kinds.items() if who in bound]
         because: dict[tuple[str, tuple[str, ...]], list[Condition]] = {}
         for effect in behavior.effects:
             inner = self.rules.satisfied(effect.when, bound, behavior.kinds, facts) if effect.when else None
@@ -105,16 +100,13 @@ class Course:
         for situation, key, value, _ in changes:
             facts.put(situation, key, value)
         for symbol, value in goals.items():
-            holds = meets(facts.value(symbol.situation, symbol.arguments), value)
-            if holds and symbol not in before:
+            if symbol not in before and meets(facts.value(symbol.situation, symbol.arguments), value):
                 self.achieved[Fact(symbol, value)] = number
-            elif symbol in before and not holds:
-                self.lost[Fact(symbol, value)] = number
 
     def plain(
         self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: Facts
     ) -> Iterator[Condition]:
-        """Yield conditions that hold without choices: the individual and the alternative that there are; no comparison."""
+        """Yield conditions that hold without choices: the individual and the alternative that there are."""
         for condition in (substituted(lifted, bound) for lifted in conditions):
             if isinstance(condition, Witness) and not condition.negated:
                 inner = {**kinds, condition.variable: condition.kind}
@@ -126,7 +118,7 @@ class Course:
                 ways = ((group, self.rules.satisfied(group, {}, kinds, facts)) for group in condition.alternatives)
                 group, found = next((way for way in ways if way[1] is not None), ((), None))
                 yield from self.plain(group, found or {}, kinds, facts)
-            elif not isinstance(condition, Comparison):
+            else:
                 yield condition
 
     def because(self, condition: ValueCondition, facts: Facts) -> Iterator[list[Condition]]:
@@ -151,51 +143,26 @@ class Course:
     # -------------------------------------------------------------------------------------------------------- regressing
 
     def rules_of(self) -> Iterator[Rule]:
-        """Yield the rules of each goal: over the steps since the goal before it was achieved; of one that was lost, since then."""
-        new = {number for fact, number in self.achieved.items() if not self._held(fact)}
-        for fact, number in sorted(self.achieved.items()):
-            before = [self.lost.get(fact, -1)]
-            if not self._held(fact):
-                before += [other for other in new if other < number]
-            yield from self.regressed(fact, max(before) + 1, number)
+        """Yield for each change of a step that a goal or a later step needed the rule that the step brings it about.
 
-    def _held(self, goal: Fact) -> bool:
-        """Whether a goal held in the beginning."""
-        return meets(self.problem.initial.get(goal.symbol), goal.value)
-
-    def regressed(self, goal: Fact, start: int, end: int) -> Iterator[Rule]:
-        """Yield the rules for a goal from the step that achieves it backwards."""
-        facts, later = (Facts(self.problem, self.problem.initial) for _ in range(2))
-        for number, done in enumerate(self.done[: end + 1]):
+        The facts are as in the beginning then.
+        """
+        later, facts = self.facts, Facts(self.problem, self.problem.initial)
+        for done in self.done:
             for situation, key, value, _ in done.changes:
-                later.put(situation, key, value)
-                if number < end:
-                    facts.put(situation, key, value)
-        wanted = ValueCondition(goal.symbol.situation, goal.symbol.arguments, goal.value)
-        need: dict[Condition, None] = {wanted: None}
-        order: dict[str, None] = dict.fromkeys((*wanted.arguments, wanted.value))
-        steps, level = 0, self.problem.domain.behaviors[self.done[end].ground[0]].level
-        aim = self.aimed(wanted, facts)
-        for position in range(end, start - 1, -1):
-            done, after = self.done[position], need
-            if self.problem.domain.behaviors[done.ground[0]].level != level:
-                return  # part of the way left the level: what must be at rest after it, goals don't say
-            need, served = self.needed(after, done, facts, later)
-            linked = list(self.links(done, served, facts, later)) if served else []
+                facts.put(situation, key, value)
+        need: dict[Condition, None] = {
+            ValueCondition(s.situation, s.arguments, value): None
+            for s, value in self.problem.goal.items()
+            if meets(later.value(s.situation, s.arguments), value)
+        }
+        for done in reversed(self.done):
+            undo(facts, done.mark)
+            before, served = self.needed(need, done, facts, later)
+            if served:
+                yield from self.links(done, served, facts, later)
+                need = {c: None for c in before if not isinstance(c, (*STATIC, EqualityCondition))}
             undo(later, done.mark)
-            if position > start:
-                undo(facts, self.done[position - 1].mark)
-            if not served:
-                continue
-            steps += 1
-            if steps > LONGEST:
-                return
-            order.update(dict.fromkeys(done.ground[1]))
-            order.update((t, None) for c in need for inner in walk(c) for t in terms(inner) if not t.startswith("?"))
-            yield from linked
-            rule = self.lifted(aim, tuple(need), done.ground, steps, tuple(order))
-            if rule is not None:
-                yield rule
 
     def needed(
         self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
@@ -229,16 +196,17 @@ class Course:
                     return found
             return None
 
+        changed, defined = {(situation, key) for situation, key, _, _ in done.changes}, self.problem.domain.rules
         for c in after:
+            if isinstance(c, ValueCondition) and not (c.situation in defined or (c.situation, c.arguments) in changed):
+                need[c] = None
+                continue
             for other, holds in rests(c, ()) or [(c, False)]:
                 (need if holds else served)[other] = None
         if served:
-            for c in (*need, *served):
-                if isinstance(c, Witness) and c.negated:
-                    need.update(dict.fromkeys(self.apart(c, done, facts)))
             need.update(dict.fromkeys(done.asked))
             for c in served:
-                need.update(dict.fromkeys(self.before(c, done, facts)))
+                need.update(dict.fromkeys(self.before(c, done)))
         return need, served
 
     def links(self, done: Done, served: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
@@ -249,7 +217,7 @@ class Course:
                 value = c.value if not c.negated else FALSE if c.value == TRUE else TRUE
                 goals[ValueCondition(c.situation, c.arguments, value)] = None
                 continue
-            about = [i for i in walk(c) if isinstance(i, ValueCondition)]
+            about = list(asked(c))
             for situation, key, value, _ in done.changes:
                 if any(i.situation == situation and (i is not c or i.arguments == key) for i in about):
                     goals[ValueCondition(situation, key, value)] = None
@@ -258,7 +226,7 @@ class Course:
             if own:
                 order = dict.fromkeys((*goal.arguments, goal.value, *done.ground[1]))
                 order.update((t, None) for c in need for i in walk(c) for t in terms(i) if not t.startswith("?"))
-                rule = self.lifted(self.aimed(goal, facts), tuple(need), done.ground, 1, tuple(order))
+                rule = self.lifted(self.aimed(goal, facts), tuple(need), done.ground, tuple(order))
                 if rule is not None:
                     yield rule
 
@@ -268,51 +236,21 @@ class Course:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
 
-    def apart(self, condition: Witness, done: Done, facts: Facts) -> Iterator[Condition]:
-        """Yield why a step doesn't bring about what nobody may be: what is static and doesn't hold of those whom it changes."""
-        conditions, kinds = opened([replace(condition, negated=False)], {})
-        for situation, key, value, _ in done.changes:
-            for c in conditions:
-                if not isinstance(c, ValueCondition) or c.negated or c.situation != situation:
-                    continue
-                pairs = list(zip((*c.arguments, c.value), (*key, value), strict=True))
-                who = {term: one for term, one in pairs if term in kinds}
-                if any(who.get(term, term) != one for term, one in pairs):
-                    continue
-                static = (
-                    substituted(other, who) for other in conditions if isinstance(other, STATIC) and not other.negated
-                )
-                ground = (one for one in static if not any(term in kinds for term in terms(one)))
-                wrong = next((one for one in ground if self.rules.satisfied([one], {}, {}, facts) is None), None)
-                if wrong is not None:
-                    yield replace(wrong, negated=True)
-
-    def before(self, condition: Condition, done: Done, facts: Facts) -> Iterator[Condition]:
-        """Yield what must hold before a step for what it makes true: its effects' conditions, and none but those it took away."""
+    def before(self, condition: Condition, done: Done) -> Iterator[Condition]:
+        """Yield what must hold before a step for what it makes true: the conditions of its effects."""
         about = {(c.situation, c.arguments) for c in walk(condition) if isinstance(c, ValueCondition)}
         situations = {situation for situation, _ in about}
         plain = isinstance(condition, ValueCondition)
         for situation, key, _, when in done.changes:
             if when and ((situation, key) in about if plain else situation in situations):
                 yield from when
-        if isinstance(condition, Witness) and condition.negated:
-            kinds = {condition.variable: condition.kind}
-            others = condition.conditions
-            for _ in range(len(self.problem.classes.get(condition.kind, ()))):
-                wanted = (*others, ClassCondition(condition.variable, condition.kind))
-                found = self.rules.satisfied(wanted, {}, kinds, facts)
-                if found is None:
-                    break
-                who = found[condition.variable]
-                others = (*others, EqualityCondition(condition.variable, who, negated=True))
-            yield replace(condition, conditions=others)
 
     def lifted(
-        self, goal: ValueCondition, need: Sequence[Condition], step: Ground, steps: int, order: Sequence[str]
+        self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]
     ) -> Rule | None:
         """Return a rule: the individuals of a need as roles, and no condition that others imply; None if it says too little."""
         members = self.problem.members
-        if not all(isinstance(inner, WRITABLE) for c in need for inner in walk(c)):
+        if not all(isinstance(inner, WRITABLE) for c in need if not isinstance(c, Comparison) for inner in walk(c)):
             return None
         kinds: dict[str, str] = {}
 
@@ -348,8 +286,8 @@ class Course:
         known = {(c.situation, c.arguments) for c in need if isinstance(c, ValueCondition) and not c.negated}
         asks: dict[Condition, None] = {}
         for c in need:
-            if isinstance(c, EqualityCondition):
-                continue  # different roles are different individuals
+            if isinstance(c, EqualityCondition | Comparison):
+                continue  # different roles are different individuals; comparisons are the behaviour's
             if isinstance(c, ValueCondition) and c.negated and (c.situation, c.arguments) in known:
                 continue
             if isinstance(c, ClassCondition) and not c.negated:
@@ -362,7 +300,6 @@ class Course:
             ValueCondition(goal.situation, tuple(own[a] for a in goal.arguments), own[goal.value]),
             tuple(sorted(asks, key=repr)),
             (step[0], tuple(own[a] for a in step[1])),
-            steps,
             tuple((role, kinds[who]) for who, role in roles.items() if self._used(role, asks, own)),
         )
 
@@ -410,6 +347,15 @@ def situations_of(conditions: Iterable[Condition]) -> Iterator[str]:
     """Yield the situation types that conditions ask for."""
     for condition in conditions:
         yield from (inner.situation for inner in walk(condition) if isinstance(inner, ValueCondition))
+
+
+def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
+    """Yield the conditions on symbols, and the amounts, that a condition is made of."""
+    for inner in walk(condition):
+        if isinstance(inner, ValueCondition):
+            yield inner
+        elif isinstance(inner, Comparison):
+            yield from (i for e in (inner.left, inner.right) for i in inside(e) if isinstance(i, Amount))
 
 
 def undo(facts: Facts, mark: int) -> None:

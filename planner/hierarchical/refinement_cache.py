@@ -55,15 +55,10 @@ class Template:
 
 
 class Advice(Protocol):
-    """What may know steps before they are searched, and learns from those that were found."""
+    """What may know steps before they are searched."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps that achieve the targets and keep the rest; None, and the table as it was, without any."""
-
-    def learn(
-        self, level: int, mark: int, targets: Mapping[Cell, str], keep: Keep, steps: Sequence[RefinedStep]
-    ) -> bool:
-        """Learn from steps that search found, done since a mark; whether that was new."""
 
 
 class Refiner:
@@ -195,14 +190,11 @@ class Refiner:
                 return None
         self.misses += 1
         widths = self.worlds(below)
-        mark = len(self.table.trail)
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
             attempts: list[Effort | Sequence[Width]] = [SHORT, widths]
             for attempt in reversed(attempts) if name in self.long else attempts:
                 found = found or self.achieve(below, targets, keep, attempt)
-            if found and self.advice is not None:
-                self.advice.learn(below, mark, targets, keep, found)
         if found is None:
             around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]

@@ -196,9 +196,6 @@ class Call:
             steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
         else:
             steps = self.refiner.achieve(level, targets, keep, attempt)
-            if steps and self.advice is not None and self.advice.learn(level, mark, targets, keep, steps):
-                for attempts in self.failed.values():
-                    attempts.discard((self.program.levels[0], ADVISED))
         if steps is not None and self.wary is not None:
             steps = self.wary(steps, mark, lambda: self.refiner.achieve(level, targets, keep, attempt))
         if steps is None:

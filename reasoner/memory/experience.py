@@ -1,7 +1,7 @@
 """Experience as values that people can read: rules, orders of goals, refinements, and how often each proved good.
 
 ==========  ===================================================================================================
-Rule        for a goal of this kind, where this is so, do this behaviour: so many steps are left then
+Rule        a goal of this kind is brought about by this behaviour, where this is so
 Order       a goal of one kind is achieved before one of another kind, where both speak of the same individual
 Method      a behaviour is refined by these steps, over its roles and others
 GoalKind    the goals of one situation type about individuals of one class
@@ -39,7 +39,7 @@ def _named(kind: str, said: object) -> str:
 
 @dataclass(frozen=True)
 class Rule:
-    """What to do first for a goal, over roles; different roles are different individuals.
+    """What to do for a goal, over roles; different roles are different individuals.
 
     Attributes
     ----------
@@ -48,21 +48,18 @@ class Rule:
     asks : tuple of Condition
         What must hold now.
     does : behaviour and terms
-    steps : int
-        So many steps, this one included, lead to the goal.
     kinds : tuple of (role, class)
     """
 
     goal: ValueCondition
     asks: tuple[Condition, ...]
     does: Ground
-    steps: int
     kinds: tuple[tuple[str, str], ...]
 
     @cached_property
     def name(self) -> str:
         """The rule's name."""
-        return _named("rule", (self.goal, self.asks, self.does, self.steps, self.kinds))
+        return _named("rule", (self.goal, self.asks, self.does, self.kinds))
 
     @property
     def goals(self) -> GoalKind:

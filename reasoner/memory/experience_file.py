@@ -29,7 +29,7 @@ from reasoner.memory.rules_file import Reader, Words, Writer, label
 from reasoner.names import Names
 from reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
 
-FORMAT = 4
+FORMAT = 5
 TALLY = ("chosen", "passedOver", "failed")
 PRIOR = 1.0  # pseudo-counts, half a choice and half a pass, behind every probability
 

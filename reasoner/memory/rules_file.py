@@ -1,6 +1,6 @@
 """Rules, orders and methods as triples, in the words in which ontologies say conditions and behaviours, for people to edit.
 
-A `:LearnedRule` has a `:forGoal`, what it `:asksFor`, the behaviour that it `:does` with its arguments, and its `:stepsToGo`. Its
+A `:LearnedRule` has a `:forGoal`, what it `:asksFor`, and the behaviour that it `:does` with its arguments. Its
 roles are parameters of its own. A `:LearnedMethod` has the behaviour that it `:refines` and steps with an index; a `:LearnedOrder`
 what comes `:first` and `:then`. ``:enabled false`` keeps something from being followed.
 """
@@ -38,9 +38,9 @@ MOST_INSIDE = 50
 def label(one: Said) -> str:
     """Return in a few names what something says."""
     match one:
-        case Rule(goal, _, does, steps):
+        case Rule(goal, _, does):
             wanted = " ".join((*goal.arguments[:1], goal.situation, *goal.arguments[1:], goal.value))
-            return f"for {wanted}: {' '.join((does[0], *does[1]))} ({steps} to go)".replace("?", "")
+            return f"for {wanted}: {' '.join((does[0], *does[1]))}".replace("?", "")
         case Order(first, then, shared):
             return f"{first} before {then}" + (" of the same" if shared else "")
         case Method(behavior, _, steps, _):
@@ -86,7 +86,7 @@ class Writer:
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
         goal = self.condition(rule.goal, terms, me, parts)
         asks = [self.condition(c, terms, me, parts) for c in rule.asks]
-        said = [f":forGoal {goal} ; :stepsToGo {rule.steps} ; {self.step(rule.does, terms)}"]
+        said = [f":forGoal {goal} ; {self.step(rule.does, terms)}"]
         said += [f":asksFor {', '.join(asks)}"] if asks else []
         said += [f":role {', '.join(terms.values())}"] if terms else []
         roles = [
@@ -217,7 +217,7 @@ class Reader:
         asks = tuple(sorted((self.condition(c, terms) for c in node.get("asksFor", ())), key=repr))
         does = self.short(self.one(iri, "does")), tuple(self.term(a, terms) for a in self.arguments(iri))
         kinds = tuple((terms[role], self.short(self.one(role, "termType"))) for role in roles)
-        return Rule(goal, asks, does, int(self.one(iri, "stepsToGo")), kinds)
+        return Rule(goal, asks, does, kinds)
 
     def method(self, iri: str, node: Node) -> Method:
         """Return a method."""

@@ -35,7 +35,6 @@ RULE = Rule(
         Witness("?anyone", "Cup", (NOBODY,), True),
     ),
     ("B1_MOVE", ("?cup", "?place")),
-    3,
     (("?cup", "Cup"), ("?place", "A|B"), ("?hand", "Hand")),
 )
 METHOD = Method(
@@ -69,12 +68,12 @@ def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: P
 def test_a_rule_can_be_asked_for_in_the_words_of_conditions(tmp_path: Path) -> None:
     save(tmp_path / "now.ttl", lived("robot", 2), NAMES, DOMAIN)
     graph = rdflib.Graph().parse(tmp_path / "now.ttl")
-    asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?steps ?class ?failed WHERE {
-      ?rule a :LearnedRule ; :does <https://x.org/k#B1_MOVE> ; :stepsToGo ?steps ; :asksFor ?condition .
+    asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?class ?failed WHERE {
+      ?rule a :LearnedRule ; :does <https://x.org/k#B1_MOVE> ; :asksFor ?condition .
       ?condition a :ClassCondition ; :negated true ; :ofClass ?class .
       ?counter :countsFor ?rule . [] owl:annotatedSource ?counter ; owl:annotatedTarget ?rule ; :failed ?failed }"""
     assert [tuple(map(str, row)) for row in graph.query(asked) if isinstance(row, tuple)] == [
-        ("3", "https://x.org/k#Bottle", "1")
+        ("https://x.org/k#Bottle", "1")
     ]
 
 
@@ -82,10 +81,10 @@ def test_an_edited_rule_keeps_its_counts_a_disabled_one_says_so_and_a_deleted_on
     path, experience = tmp_path / "memory.ttl", lived("robot", 2)
     save(path, experience, NAMES, DOMAIN)
     text = path.read_text()
-    path.write_text(text.replace(":stepsToGo 3", ":stepsToGo 2 ; :enabled false"))
+    path.write_text(text.replace(":asksFor", ":enabled false ; :asksFor").replace("k#Bottle", "k#Cup"))
     edited = load(path, NAMES)
     rule = next(one for one in edited.said.values() if isinstance(one, Rule))
-    assert (rule.steps, edited.disabled) == (2, {rule.name})
+    assert (ClassCondition("?cup", "Cup", True) in rule.asks, edited.disabled) == (True, {rule.name})
     assert edited.totals()[rule.name] == experience.totals()[RULE.name]
     save(path, edited, NAMES, DOMAIN)
     assert load(path, NAMES) == edited
@@ -110,7 +109,7 @@ def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> No
     [
         ("<a> <b", "broken memory"),
         ("<a> <b> <c> .", "says no :memoryFormat"),
-        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 4"),
+        ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 5"),
     ],
 )
 def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content: str, message: str) -> None:
