@@ -102,8 +102,8 @@ class Definitions:
     numbers : set of properties that lead to numbers
     kinds : mapping of property to the classes of subject and value, as names; "" where nothing says it
     concluded : mapping of class to situation type and owner
-        Classes that rules conclude, SWRL's (`reasoner.reading.swrl`) or others, the situation type that holds of each, and the
-        class that has it, "" if several do.
+        Classes that rules conclude, SWRL's (`reasoner.reading.swrl`) or others, or that are defined by themselves, the situation
+        type that holds of each, and the class that has it, "" if several do.
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
@@ -116,6 +116,21 @@ class Definitions:
     def changes(self, iri: str) -> bool:
         """Tell whether a class is tested by its definition: its individuals change, or OWL 2 RL doesn't find all of them."""
         return iri in self._changing
+
+    @cached_property
+    def recursive(self) -> frozenset[str]:
+        """The classes that their own definition names, directly or in those of others."""
+        names = {iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
+        found = set()
+        for iri in names:
+            waiting, seen = [iri], set[str]()
+            while waiting:
+                new = names[waiting.pop()] & names.keys() - seen
+                seen |= new
+                waiting += new
+            if iri in seen:
+                found.add(iri)
+        return frozenset(found)
 
     @cached_property
     def _changing(self) -> frozenset[str]:
@@ -199,6 +214,12 @@ class Definitions:
         """Return what it takes for a term to be in a class: one class condition, or the definition of a changing class."""
         if not self.changes(iri):
             return (ClassCondition(term, self.names.short(iri), negated),)
+        if iri in self.recursive - self.concluded.keys():
+            raise KnowledgeError(
+                f"{local_name(iri)} is defined by itself; let a situation type hold of it (:holdsOf {local_name(iri)}), so that "
+                "who is in it follows step by step, or take it out of its definition",
+                iri,
+            )
         if iri in self.concluded:
             return (ValueCondition(self.names.short(self.concluded[iri][0]), (term,), TRUE, negated),)
         found = tuple(self.expression(term, self._one_definition(iri)))

@@ -399,15 +399,16 @@ def _definitions(schema: Schema, names: Names) -> Definitions:
         ends = (schema.nodes[iri].get(RDFS + end, ()) for end in ("domain", "range"))
         one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] else "" for end in ends)
         kinds[iri] = one, other
+    nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
+    found = Definitions(nodes, properties, names, schema.numbers, kinds)
     concluded = {}
-    of_rules = swrl.heads(schema.swrl) if schema.swrl else ()
+    of_rules = {*found.recursive, *(swrl.heads(schema.swrl) if schema.swrl else ())}
     ruled = {one for rule in schema.of_kind("Rule") for one in schema.nodes[rule].get(CORE + "situationType", ())}
     for iri in schema.of_kind("SituationType") if of_rules or ruled else ():
         for kind in schema.nodes[iri].get(CORE + "holdsOf", ()):
             if kind in of_rules or iri in ruled:
                 concluded[kind] = iri, owners[iri][0] if len(owners[iri]) == 1 else ""
-    nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
-    return Definitions(nodes, properties, names, schema.numbers, kinds, concluded)
+    return replace(found, concluded=concluded)
 
 
 def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:

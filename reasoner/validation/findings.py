@@ -129,8 +129,13 @@ class Places:
 
     def _naming(self, node: str) -> Path | None:
         """Return a file that names a node of which no file says anything."""
-        texts = (file for file in self.graph.files.values() if file.suffix == ".ttl")
-        return next((file for file in texts if f"<{node}>" in file.read_text(encoding="utf-8")), None)
+        name = local_name(node)
+        for file in self.graph.files.values():
+            text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
+            short = f"<{node.removesuffix(name)}>" in text and re.search(rf":{re.escape(name)}\b", text)
+            if short or f"<{node}>" in text:
+                return file
+        return None
 
     @cached_property
     def _files(self) -> Mapping[str, Path]:

@@ -48,6 +48,12 @@ ATOMS = (SWRL + "argument1", SWRL + "argument2")
 EVERY_OTHER = re.compile(r"\?each\d")
 """Who a class stands for where another one stands for somebody already (`reasoner.reading.parts`)."""
 OF_A_RULE = "a variable or an individual of a SWRL rule"
+OF_CLASSES = {RDF + "type", RDFS + "subClassOf", SWRL + "classPredicate"}
+OF_CLASSES |= {
+    OWL + name
+    for name in ("disjointWith", "equivalentClass", "complementOf", "someValuesFrom", "allValuesFrom", "onClass")
+}
+OF_PROPERTIES = {OWL + "onProperty", RDFS + "subPropertyOf", OWL + "inverseOf", SWRL + "propertyPredicate"}
 PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
 
 
@@ -125,13 +131,13 @@ def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str
     yield predicate, "a property", PROPERTIES
     if not isinstance(value, ox.NamedNode):
         return
-    if predicate in (RDF + "type", RDFS + "subClassOf", OWL + "disjointWith", OWL + "someValuesFrom"):
+    if predicate in OF_CLASSES:
         yield value.value, "a class", {OWL + "Class", RDFS + "Datatype"}
     elif predicate in ATOMS:
         yield value.value, OF_A_RULE, set()
     elif OWL + "ObjectProperty" in kinds_of_predicate or predicate in (RDF + "first", OWL + "hasValue"):
         yield value.value, "a term", set()
-    elif predicate in (OWL + "onProperty", RDFS + "subPropertyOf", OWL + "inverseOf"):
+    elif predicate in OF_PROPERTIES:
         yield value.value, "a property", PROPERTIES
 
 

@@ -156,6 +156,16 @@ def test_what_a_swrl_rule_names_is_a_declared_variable_or_an_individual(tmp_path
     assert "urn:swrl:var#porp" in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
 
 
+def test_a_class_that_a_swrl_rule_or_a_definition_names_is_declared(tmp_path: Path) -> None:
+    for more in (
+        SWRL + implies(":Stowed ?prop", ":Prob ?prop"),
+        ":Bare a owl:Class, owl:NamedIndividual ; owl:equivalentClass [ a owl:Class ; owl:complementOf :Prob ] .",
+    ):
+        (said,) = (one for one in theatre_with(tmp_path, "", "", more) if one.rule == "undeclared-term")
+        assert said.what == "Prob is used as a class, but isn't declared as one; did you mean 'Prop'?"
+        assert ":Prob" in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
+
+
 def test_a_cost_in_quotes_is_no_negative_one(tmp_path: Path) -> None:
     (said,) = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ':PUSH c:cost "2" ; a owl:NamedIndividual,', "")
     assert (said.rule, local_name(said.node)) == ("not-a-number", "PUSH")

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.entailed import NAMES, compared, derived, first_problem, in_state
 from planner.solve import Request, solve
-from planner.validation import Facts
+from planner.validation import Facts, validate
 from reasoner.graph.knowledge import KnowledgeError, load
 from reasoner.reading.goals import with_goals
 from reasoner.reading.problem import read
@@ -147,3 +147,39 @@ def test_a_class_counts_up_to_five(yard: Yard) -> None:
     path.write_text(path.read_text().replace('"2"^^xsd:nonNegativeInteger', '"9"^^xsd:nonNegativeInteger'))
     with pytest.raises(KnowledgeError, match=r"counts up to 9 values of \w+; planning counts up to 5"):
         read(load(path))
+
+
+KEPT = """
+:KEPT a owl:NamedIndividual, c:SituationType ; c:holdsOf :{held} . :Thing c:hasSituationType :KEPT .
+:Kept a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :Thing
+  [ a owl:Restriction ; owl:onProperty :liesIn ; owl:someValuesFrom
+    [ a owl:Class ; owl:unionOf ( [ a owl:Class ; owl:oneOf ( :box1 ) ] :{inner} ) ] ] ) ] .
+:Other a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :Thing {other} ) ] .
+"""
+
+
+def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) -> None:
+    path = yard(KEPT.format(held="Kept", inner="Kept", other="[ a owl:Class ; owl:complementOf :Kept ]"))
+    problem = with_goals(read(load(path)).problem, ["cup1 KEPT", "cup1 LIES_IN box3"])
+    plan = solve(Request(problem)).plan
+    assert plan is not None
+    assert len(plan.steps) == 2  # the cup into the third box, and that into the first
+    assert validate(problem, plan) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (KEPT.format(held="Other", inner="Kept", other=":Kept"), "Kept is defined by itself; let a situation type hold of it"),
+        (
+            KEPT.format(held="Kept", inner="Other", other="[ a owl:Class ; owl:complementOf :Kept ]")
+            + ":OTHER a owl:NamedIndividual, c:SituationType ; c:holdsOf :Other . :Thing c:hasSituationType :OTHER .",
+            "KEPT is defined by OTHER not being true|OTHER is defined by KEPT not being true",
+        ),
+    ],
+)  # fmt: skip
+def test_classes_that_are_defined_by_each_other_are_refused_where_nothing_tells_who_is_in_them(
+    yard: Yard, more: str, said: str
+) -> None:
+    with pytest.raises(KnowledgeError, match=said):
+        read(load(yard(more)))
