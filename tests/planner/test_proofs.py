@@ -440,22 +440,42 @@ FOUND = [(8, 3), (7, 4)]
 """How many of forty random worlds each of the proofs refutes."""
 
 
-def test_what_counts_says_how_many_there_can_be_and_parts_of_rules_have_no_names() -> None:
-    def dry(cup: str, *more: Condition) -> Witness:
-        return Witness(cup, "Cup", (has("DRY", cup, TRUE), *more))
+def so_many(many: int, of: str, kind: str = "Cup") -> Witness:
+    """Return a condition that asks for so many cups of which something holds, each another one."""
+    condition: Witness | None = None
+    names = [f"?c{number}" for number in range(many)]
+    for number in reversed(range(many)):
+        apart = [EqualityCondition(names[number], other, negated=True) for other in names[:number]]
+        more = (condition,) if condition is not None else ()
+        condition = Witness(names[number], kind, (has(of, names[number], TRUE), *apart, *more))
+    assert condition is not None
+    return condition
 
-    two = dry("?a", dry("?b", EqualityCondition("?b", "?a", negated=True)))
-    clean = Witness("?a", "Cup", (has("CLEAN", "?a", TRUE), Witness("?b", "Cup", (has("AT", "?b", "attic"),))))
-    for rule, why_not in (
-        (two, "PAIR asks for two Cup, each DRY true; there can be one"),
-        (
-            clean,
-            "PAIR could make it so, but AT(some Cup, attic) can't be: PUT could make it so, but no Hand canReach attic",
-        ),
-    ):
-        dry1 = behavior("DRY", 1, "", [has("CLEAN", "cup1", TRUE)], [becomes("DRY", "cup1", TRUE)])
-        problem = kitchen({"PAIR tray": TRUE}, behaviors=[PUT, WASH, dry1])
-        pair = SituationType("PAIR", ("Tray",), "Truth", boolean=True)
-        rules = {"PAIR": (Rule("PAIR", (Parameter("?t", "Tray"),), (), (rule,)),)}
-        domain = replace(problem.domain, situations={**problem.domain.situations, "PAIR": pair}, rules=rules)
-        assert why_grounded(replace(problem, domain=domain)) == f"tray PAIR true can't be reached: {why_not}"
+
+ATTIC = Witness("?a", "Cup", (has("CLEAN", "?a", TRUE), Witness("?b", "Cup", (has("AT", "?b", "attic"),))))
+NO_ATTIC = "PAIR could make it so, but AT(some Cup, attic) can't be: PUT could make it so, but no Hand canReach attic"
+
+
+@pytest.mark.parametrize(
+    ("rule", "why_not"),
+    [
+        ((so_many(2, "DRY"),), "PAIR asks for two Cup, each DRY true; there can be one"),
+        ((so_many(3, "DRY"),), "PAIR asks for three Cup, each DRY true; there can be one"),
+        ((so_many(5, "CLEAN"),), "PAIR asks for five Cup, each CLEAN true; there can be three"),
+        ((has("CLEAN", "cup1", TRUE), so_many(2, "DRY")), "PAIR asks for two Cup, each DRY true; there can be one"),
+        ((ATTIC,), NO_ATTIC),
+        ((so_many(2, "CLEAN"), ATTIC), NO_ATTIC),
+    ],
+)
+def test_what_counts_says_how_many_there_can_be_and_parts_of_rules_have_no_names(
+    rule: tuple[Condition, ...], why_not: str
+) -> None:
+    dry1 = behavior("DRY", 1, "", [has("CLEAN", "cup1", TRUE)], [becomes("DRY", "cup1", TRUE)])
+    problem = kitchen(
+        {"PAIR tray": TRUE}, behaviors=[PUT, WASH, dry1], initial={f"AT cup{n}": "shelf" for n in (1, 2, 3)}
+    )
+    problem = replace(problem, classes={**problem.classes, "Cup": ("cup1", "cup2", "cup3")})
+    pair = SituationType("PAIR", ("Tray",), "Truth", boolean=True)
+    rules = {"PAIR": (Rule("PAIR", (Parameter("?t", "Tray"),), (), rule),)}
+    domain = replace(problem.domain, situations={**problem.domain.situations, "PAIR": pair}, rules=rules)
+    assert why_grounded(replace(problem, domain=domain)) == f"tray PAIR true can't be reached: {why_not}"

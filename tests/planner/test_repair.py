@@ -106,6 +106,8 @@ def test_what_is_not_there_is_named() -> None:
 def test_done_in_another_order_counts_as_dropped_and_added() -> None:
     first, second, *others = planned().steps
     assert sum(difference(planned().steps, (second, first, *others))) == 12
+    assert difference((first, second), planned().steps) == (0, sum(len(Plan((step,)).primitives) for step in others))
+    assert difference(planned().steps, ()) == (len(planned().primitives), 0)
 
 
 def test_steps_that_the_checker_rejects_are_not_followed() -> None:
