@@ -5,7 +5,7 @@ mode       how it plans                                                 module
 =========  ==========================================================  ================================
 guarded    goals in series; rules lead where they have helped          `planner.experience.advice`
 leading    the same, and rules lead whatever their record is           `planner.experience.advice`
-strict     the same, and rules get a twentieth of the effort           `planner.experience.advice`
+strict     the same, and rules don't lead                              `planner.experience.advice`
 optimal    shortened until a lower bound is met, without memory         `planner.hierarchical.bounds`
 paper      A* with eq. (5) on each level                                `planner.paper.hierarchy`
 =========  ==========================================================  ================================

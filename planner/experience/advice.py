@@ -1,15 +1,14 @@
 """Planning with experience, which may lead but not spoil.
 
 =========  ====================================================================================================
-guarded    rules lead from the beginning on, for those kinds of goals that they have reached, and as often as not; where that
-           is none, they are tried beside the search, with a fifth of its expansions
+guarded    rules lead for those kinds of goals that they have reached, and as often as not
 leading    rules lead whatever their record is
-strict     rules are tried beside the search, with a twentieth of its expansions (`planner.experience.racing`)
+strict     rules don't lead; their record is kept all the same, wherever an episode is learned
 =========  ====================================================================================================
 
 Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`).
-That there is no plan is for search to prove. Memory that isn't trusted runs in strict mode whatever was asked for, and one that
-knows none of the goals isn't asked at all.
+That there is no plan is for search to prove. Where rules don't lead, planning is as without memory: memory that isn't trusted, has
+reached no such goals yet, or knows none of them.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from planner.experience.chaining import Candidate
 from planner.experience.evidence import Judge, View
 from planner.experience.leading import Guide, rules_in, usable
 from planner.experience.matching import Bind
-from planner.experience.racing import raced
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.serialization import Call, Compiled
@@ -30,9 +28,6 @@ from planner.plan import Limits, Outcome
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
-
-STRICT, GUARDED = 20, 5
-"""One of so many expansions rules may have beside the search: in strict mode, and where they have reached nothing yet."""
 
 
 @dataclass
@@ -43,7 +38,7 @@ class Memory:
     ----------
     experience : Experience
     trusted : bool
-        Whether it may lead; else it runs in strict mode.
+        Whether it may lead.
     """
 
     experience: Experience
@@ -69,11 +64,6 @@ class Memory:
         """What says how cogent a rule is."""
         return Judge(self.experience)
 
-    def knows(self, problem: Problem) -> bool:
-        """Whether there is a rule for some open goal."""
-        open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
-        return any(rule.goal.situation in open_ and rule.does[0] in problem.domain.behaviors for rule in self.rules)
-
     def record(self, rule: Rule) -> Tally:
         """Return how often rules for such goals of a task reached them, and how often not."""
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
@@ -86,14 +76,19 @@ class Memory:
         """Whether they have failed more often than not."""
         return self.record(rule).chosen < self.record(rule).failed
 
-    def share(self, problem: Problem, mode: str) -> int | None:
-        """Return one of how many expansions rules may have beside the search; None where they lead."""
-        if mode == "strict" or not self.trusted:
-            return STRICT
+    def leads(self, problem: Problem, mode: str) -> bool:
+        """Whether rules may lead: those for some open goal, if that is what they have reached before, or what is asked."""
         open_ = {s.situation for s, value in problem.goal.items() if not meets(problem.initial.get(s), value)}
-        if mode == "guarded" and not any(rule.goal.situation in open_ and self.helps(rule) for rule in self.rules):
-            return GUARDED
-        return None
+        return (
+            mode != "strict"
+            and self.trusted
+            and any(
+                rule.goal.situation in open_
+                and rule.does[0] in problem.domain.behaviors
+                and (mode == "leading" or self.helps(rule))
+                for rule in self.rules
+            )
+        )
 
     def guide(self, call: Call, mode: str, joins: dict[str, Bind | None] | None = None) -> Guide:
         """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
@@ -162,17 +157,9 @@ def plan(
         `search` counts the steps of rules that were tried as expansions.
     """
     using = using or fast.compiled(problem)
-    if memory is None or not memory.knows(problem):
+    if memory is None or not memory.leads(problem, mode):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
     joins: dict[str, Bind | None] = {}
-
-    share = memory.share(problem, mode)
-    if share is not None:
-
-        def guide(call: Call) -> Guide:
-            return memory.guide(call, "leading", joins)
-
-        return raced(problem, guide, share, limits, using, improve, leave_levels)
 
     def advised(call: Call) -> None:
         call.advise(memory.guide(call, mode, joins))

@@ -26,7 +26,6 @@ MUCH = 1_500_000
 """What a search in a large world may cost, in states times operators."""
 NEAR, WIDER, WIDE, WHOLE = Width(10, spares=0), Width(20), Width(160, 4, MUCH), Width(None, work=MUCH)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
-NOWHERE = Width(0, spares=0, work=0)
 """In which nothing is searched."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""
@@ -70,16 +69,13 @@ class Refiner:
         Its table is the state.
     templates : dict
         What was learned from earlier calls over the same program; grows.
-    searching : bool
-        Whether small worlds are searched.
     """
 
-    def __init__(self, segments: Segments, templates: dict[str, list[Template]], searching: bool = True) -> None:
+    def __init__(self, segments: Segments, templates: dict[str, list[Template]]) -> None:
         self.segments = segments
         self.table = segments.table
         self.levels = segments.program.levels
         self.templates = templates
-        self.searching = searching
         self.hits = 0
         self.misses = 0
         changed = frozenset[str]().union(*(b.changes for b in segments.program.domain.behaviors.values()))
@@ -208,9 +204,7 @@ class Refiner:
         return self.found[here]
 
     def worlds(self, level: int) -> tuple[Width, ...]:
-        """Return the worlds to look at one after the other, the last of them large; where none is searched, an empty one."""
-        if not self.searching:
-            return (NOWHERE,)
+        """Return the worlds to look at one after the other, the last of them large."""
         return (NEAR, WIDER, WHOLE if self.segments.program.size(level) <= MOST_OPERATORS else WIDE)
 
     def achieve(

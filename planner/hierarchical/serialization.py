@@ -72,16 +72,14 @@ class GoalAdvice(Advice, Protocol):
 class Call:
     """One planning call: the table, what is achieved, what sleeps, and the steps done so far."""
 
-    def __init__(
-        self, problem: Problem, using: Compiled, deadline: float | None, most: int, searching: bool = True
-    ) -> None:
+    def __init__(self, problem: Problem, using: Compiled, deadline: float | None, most: int) -> None:
         self.problem = problem
         self.using = using
         self.program = using.program
         self.goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
         self.table = Table(problem.domain.situations, problem.initial)
         self.segments = Segments(self.program, self.table, self.goal, deadline, most)
-        self.refiner = Refiner(self.segments, using.templates, searching)
+        self.refiner = Refiner(self.segments, using.templates)
         self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         first = self.program.levels[0]
         rests = {s.name: s.rest for s in problem.domain.situations.values()}

@@ -119,19 +119,13 @@ def spoiled(memory: Memory, seed: int) -> Memory:
     return Memory(experience)
 
 
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize(("mode", "share"), [("strict", 20), ("guarded", 5)])
-def test_rules_that_have_shown_nothing_have_their_share_of_the_expansions_of_each_kind_and_no_more(
-    seed: int, mode: str, share: int
-) -> None:
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("mode", ["strict", "guarded"])
+def test_rules_that_have_shown_nothing_do_not_lead(seed: int, mode: str) -> None:
     family = random.Random(seed).choice(FAMILIES)
     within = problem(family, 10, seed)
     alone, beside = fast.plan(within, improve=0), plan(within, spoiled(taught(), seed), mode, improve=0)
-    every = [sum(counts.expanded for counts in outcome.search.values()) for outcome in (alone, beside)]
-    assert beside.plan is not None
-    assert validate(within, beside.plan) == []
-    assert share * every[1] <= (share + 1) * every[0]
-    assert share * expanded(beside) <= (share + 1) * expanded(alone)
+    assert (beside.plan, beside.search) == (alone.plan, alone.search)
 
 
 def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
