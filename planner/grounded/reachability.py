@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
@@ -185,11 +185,25 @@ class Reached:
                 columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
             if not count:
                 return
+            wanted = {*schema.terms, *(t for j in waiting for t in schema.atoms[j].terms)}.union(
+                *(self._variables(f, schema) for f in filters)
+            )
+            columns, count = self._projected(columns, count, wanted)
         for condition in filters:  # without atoms, or with local variables only
             keep = self._decide(condition, columns, count, schema.kinds)
             columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
         if count:
             yield np.stack([columns[t] for t in schema.terms], axis=1) if schema.terms else np.zeros((1, 0), np.int64)
+
+    def _projected(self, columns: dict[str, Ints], count: int, wanted: Set[str]) -> tuple[dict[str, Ints], int]:
+        """Return columns without those that nothing asks for any more, each row once."""
+        left = {name: column for name, column in columns.items() if name in wanted}
+        if len(left) == len(columns):
+            return columns, count
+        if not left:
+            return {}, 1
+        _, first = np.unique(pack(np.stack([*left.values()], axis=1), self.radix), return_index=True)
+        return {name: column[first] for name, column in left.items()}, len(first)
 
     def check_time(self) -> None:
         """Raise `OutOfTimeError` when the deadline has passed."""

@@ -258,3 +258,22 @@ def test_what_a_condition_asks_of_one_place_is_worked_out_once_for_each_place() 
         task = ground(problem)
     assert isinstance(task, Task) and len(task) > size**2
     assert asked < 8 * size**2  # and not a thing for each pair of places
+
+
+def test_who_only_has_to_be_somewhere_is_forgotten_as_soon_as_nothing_asks_for_them() -> None:
+    places = tuple(f"p{i}" for i in range(30))
+    condition: Condition = RelationCondition("beside", ("?w4", "?w5"))
+    for i in range(5, 0, -1):
+        condition = Witness(f"?w{i}", "Place", (RelationCondition("beside", (f"?w{i - 1}", f"?w{i}")), condition))
+    light = Behavior("LIGHT", 1, (Parameter("?w0", "Place"),), (), (condition,), (ValueEffect("LIT", ("?w0",), TRUE),))
+    problem = Problem(
+        "scene",
+        Domain({"LIT": SITUATIONS["LIT"]}, {"LIGHT": light}),
+        {"Truth": (FALSE, TRUE), "Place": places},
+        {"beside": frozenset(itertools.product(places, places))},
+        {},
+        {Symbol("LIT", ("p3",)): TRUE},
+    )
+    task = grounded(problem)  # joined at once, 30 to the power of 6 rows
+    assert isinstance(task, Task)
+    assert len(task) == len(places)
