@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import logging
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -50,9 +51,24 @@ MODE = click.option(
     shell_complete=lambda *_: ["guarded", "leading", "strict", "optimal", "paper"],
     help="guarded, leading, strict, optimal, or paper (eq. 5).",
 )
+
+
+class Seconds(click.FloatRange):
+    """Seconds that a clock can wait for."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return them, if they are a number, and not too many."""
+        seconds = float(super().convert(value, param, ctx))
+        if not seconds <= LONGEST:  # as 'nan' isn't
+            self.fail(f"'{value}' is no time to wait; wanted seconds up to {LONGEST:,.0f}", param, ctx)
+        return seconds
+
+
+LONGEST = 1e9
+"""Seconds; without a limit there is no need for more."""
 TIME_LIMIT = click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0),
+    type=Seconds(min=0.0),
     metavar="S",
     help="Seconds from the start on after which it gives up (exit 3).",
 )
@@ -71,7 +87,7 @@ OUT = click.option(
 )
 QUERY_SECONDS = click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0),
+    type=Seconds(min=0.0),
     default=60.0,
     metavar="S",
     help="Seconds after which a query ends (exit 3).",

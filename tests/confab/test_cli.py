@@ -70,6 +70,12 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
     ("arguments", "code", "word"),
     [
         (["plan", "no-such-scene"], 2, "no scene 'no-such-scene'"),
+        (["plan", "beverage-serving", "--time-limit", "nan"], 2, "'nan' is no time to wait"),
+        (
+            ["query", "beverage-serving", "where-is-everything", "--time-limit", "1e300"],
+            2,
+            "seconds up to 1,000,000,000",
+        ),
         (["plan", "broken.ttl"], 2, "broken.ttl"),
         (["plan", "beverage-serving", "--goal", "cup9 LOCATION location8"], 2, "did you mean 'cup"),
         (["plan", "beverage-serving", "--goal", "bottle1 BEVERAGE no_beverage"], 1, "bottle1"),
