@@ -100,7 +100,7 @@ def read_arm(
     Raises
     ------
     ValueError
-        The robot has no such joint or tip, or the arm has too few or too many joints. The message says which.
+        The robot has no such joint or tip, the arm has too few or too many joints, or one that can't be. The message says which.
     """
     if missing := [
         *(f"joint '{name}'" for name in joints if name not in model.joints),
@@ -110,6 +110,13 @@ def read_arm(
     chain = [model.joints[name] for name in joints]
     if len(chain) not in (6, 7):
         raise ValueError(f"arm of '{tip}' has {len(chain)} joints; 6 or 7 are needed for a hand to be anywhere")
+    for joint in chain:
+        if joint.kind not in ("revolute", "continuous"):
+            raise ValueError(f"joint '{joint.name}' of the arm is {joint.kind}; wanted one that turns")
+        if joint.lower > joint.upper:
+            raise ValueError(
+                f"joint '{joint.name}' turns from {joint.lower:g} to {joint.upper:g}; wanted the lower limit first"
+            )
     origins, axes = np.array([joint.origin for joint in chain]), np.array([joint.axis for joint in chain])
     closed = _closed(origins, axes)
     shoulder, elbow, wrist = closed or (origins[1], origins[len(chain) // 2], origins[-1])

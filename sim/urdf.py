@@ -21,6 +21,8 @@ from sim.meshes import bounds, covered_mesh
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
 """So many links may hang on one another, and so many spheres cover one shape: more is a mistake."""
+FARTHEST = 1e6
+"""Metres: no robot is larger, and squares of what is larger by far have no number."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -158,8 +160,8 @@ def _end(joint: ET.Element, which: str) -> str:
 
 def _numbers(text: str | None, default: str = "0 0 0") -> Array:
     numbers = np.array([float(word) for word in (text or default).split()])
-    if len(numbers) != 3 or not np.isfinite(numbers).all():
-        raise ValueError(f"'{text}' where three numbers belong")
+    if len(numbers) != 3 or not (np.abs(numbers) <= FARTHEST).all():  # as nan isn't
+        raise ValueError(f"'{text}' where three numbers of at most {FARTHEST:,.0f} belong")
     return numbers
 
 

@@ -172,7 +172,10 @@ def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ('xyz="0 0 1"', 'xyz="0 0 0"', "an axis without direction"),
-        ('xyz="0 0 1"', 'xyz="0 1"', "'0 1' where three numbers belong"),
+        ('xyz="0 0 1"', 'xyz="0 1"', "'0 1' where three numbers of at most 1,000,000 belong"),
+        ('xyz="0 0 1"', 'xyz="1e300 0 1"', "'1e300 0 1' where three numbers"),
+        ('lower="', 'lower="99" was="', "wanted the lower limit first"),
+        ('type="revolute"', 'type="prismatic"', "is prismatic; wanted one that turns"),
         ('lower="', 'lower="nan" was="', "'lower' is nan"),
         ('radius="', 'radius="1e-9" was="', "give a thicker one"),
         ('<link name="left_tool"', '<link name="left_tol"', "no link 'left_tool', which the arm"),
