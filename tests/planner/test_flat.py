@@ -205,6 +205,33 @@ def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
     assert shorter(task, first, work=0) == shortened(task, first)
 
 
+def test_a_long_way_to_what_one_step_does_is_saved() -> None:
+    """To the end of a road and back for each door, where the doors open without."""
+    domain = """(define (domain mine) (:predicates (at ?x) (road ?x ?y) (store ?x) (bomb) (open ?x) (door ?x ?y))
+      (:action go :parameters (?x ?y) :precondition (and (at ?x) (road ?x ?y)) :effect (and (not (at ?x)) (at ?y)))
+      (:action take :parameters (?x) :precondition (and (at ?x) (store ?x)) :effect (bomb))
+      (:action blast :parameters (?x ?y) :precondition (and (at ?x) (door ?x ?y) (bomb)) :effect (and (open ?y) (not (bomb))))
+      (:action fire :parameters (?x ?y) :precondition (and (at ?x) (door ?x ?y)) :effect (open ?y)))"""
+    places, doors = [f"p{i}" for i in range(16)], [f"d{i}" for i in range(9)]
+    road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(15))
+    problem = imported(
+        parse(
+            domain,
+            f"(define (problem m) (:domain mine) (:objects {' '.join(places + doors)}) (:init (at p0) (store p15) {road} "
+            f"{' '.join(f'(door p0 {d})' for d in doors)}) (:goal (and {' '.join(f'(open {d})' for d in doors)})))",
+        )
+    ).problem
+    task = ground(problem)
+    assert isinstance(task, Task)
+    there = [("GO", (f"p{i}", f"p{i + 1}")) for i in range(15)]
+    back = [("GO", (f"p{i + 1}", f"p{i}")) for i in reversed(range(15))]
+    steps = [step for d in doors for step in (*there, ("TAKE", ("p15",)), *back, ("BLAST", ("p0", d)))]
+    plan = task.operators_of(steps)
+    assert plan is not None
+    assert len(plan) == 32 * len(doors)
+    assert len(shorter(task, plan, 200_000, restarts=False)) == len(doors)
+
+
 def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> None:
     task = ground(carrier(40))
     assert isinstance(task, Task)
