@@ -160,7 +160,7 @@ def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None
         scene = confab.load(f"{world}-small")
         memory = confab.Memory.of(scene)
         memory.teach(scene, scene.plan().plan)
-        print(f"\n**{world}**\n")
+        print(f"\n{world}")
         say, behaviors = memory.sayings(), scene.problem.domain.behaviors
         rules = [r for r in rules_in(memory.experience) if behaviors[r.does[0]].level == scene.problem.domain.levels[0]]
         for rule in sorted(rules, key=lambda rule: (rule.goal.situation, rule.does, rule.name)):
