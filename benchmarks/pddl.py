@@ -4,6 +4,7 @@
     CONFAB_PDDL=FOLDER python -m benchmarks pddl     with problems elsewhere
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
     CONFAB_ALL=1 …                                   every problem, not only four per folder
+    CONFAB_DOMAINS=ferry,satellite …                 these folders only
     CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``; ``enhsp``, which
                                                      takes numbers, where the peers' Python has up-enhsp)
 
@@ -81,7 +82,10 @@ def wanted() -> list[str]:
 
 def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
     """Yield (domain's name, domain, problem): four per folder, evenly spread, the first and the last included."""
+    named = os.environ.get("CONFAB_DOMAINS", "").split(",")
     for domain in sorted(folder.rglob("domain.pddl")):
+        if named != [""] and domain.parent.name not in named:
+            continue
         for place in [domain.parent, *sorted(p for p in domain.parent.iterdir() if p.is_dir() and _measured(p.name))]:
             here = sorted(file for file in place.glob("*.pddl") if file.name != "domain.pddl")
             chosen = {i * (len(here) - 1) // (PER_FOLDER - 1) for i in range(PER_FOLDER)} if here else set()
