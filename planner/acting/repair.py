@@ -32,6 +32,7 @@ from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 RESTING = Effort(depth=6)
+"""To bring what something happened to back to rest."""
 CLOSE = 1.1
 """A repair that costs more than replanning by more than this factor gives way to it."""
 

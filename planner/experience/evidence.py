@@ -23,6 +23,7 @@ from reasoner.memory.experience import ITSELF, Experience, Fact, Rule, Tally
 from reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
+"""What a case counts for when the next one came."""
 CROWD = 4
 """In roles of classes with at most so many members somebody himself may be preferred."""
 Reader: TypeAlias = "Callable[[tuple[str, ...]], list[Fact]]"

@@ -30,7 +30,9 @@ from reasoner.symbols import Problem, Symbol
 SINGLE, OTHERS = 6, 2
 """So many goals are taught one by one, and so many other orders of all."""
 SHORT = Limits(expansions=20_000, seconds=20.0)
+"""Of planning one lesson."""
 CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
+"""What one case adds."""
 
 
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:

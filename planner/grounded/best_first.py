@@ -40,13 +40,16 @@ from planner.grounded.unreachable import blocked
 from planner.plan import Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from reasoner.symbols import Problem, State
 
-BOOST = 1000  # turns that the preferred operators get on a new best h
-FAR = 1 << 40  # more than any h
-ENABLING = 8  # bits, at most, that are tried to have set where a relaxed plan is stuck
-SHORTEN, STEP, STEPS = 200_000, 1_000, 400  # operators looked at for the finished plan, and for each of its first steps
-WASTEFUL = 2  # relaxed plans as long as which a plan may be that isn't searched again without lookahead
-AGAIN = 40_000_000  # bits that this may take
-SHORTENING = 50  # and a fiftieth of the bits of the search's work
+BOOST = 1000
+"""Turns that the preferred operators get on a new best h."""
+FAR = 1 << 40
+"""More than any h."""
+ENABLING = 8
+"""Bits, at most, that are tried to have set where a relaxed plan is stuck."""
+SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
+"""Operators looked at to make a plan shorter: at all, for each of so many first steps, and as a part of the search's work."""
+WASTEFUL, AGAIN = 2, 40_000_000
+"""A plan so many times as long as the relaxed one is searched again without lookahead, by looking at so many bits."""
 
 Path: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators that lead to it."""

@@ -47,7 +47,8 @@ from reasoner.symbols import (
     Symbol,
 )
 
-MOST_ROWS = 20_000_000  # of one join: about 1 GB
+MOST_ROWS = 20_000_000
+"""Of one join: about 1 GB."""
 
 
 def ground(

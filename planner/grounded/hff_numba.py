@@ -17,7 +17,8 @@ from planner.grounded import hff as relaxed
 from planner.grounded.hff import Evaluate, Evaluation
 from planner.grounded.task import Grouped, Task
 
-PLAIN = 4_000_000  # operators looked at by the plain heuristic, about two seconds, before it is compiled
+PLAIN = 4_000_000
+"""Operators looked at by the plain heuristic, about two seconds, before it is compiled."""
 
 
 def automatic(task: Task) -> Evaluate:

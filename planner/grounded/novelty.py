@@ -22,10 +22,10 @@ from planner.grounded.hff import Evaluate
 from planner.grounded.task import Task
 from planner.plan import Counts
 
-MOST_BYTES = 800 * 2**20  # of the states kept by one search, about
-STATE_BYTES = 400  # that a state takes besides its bits
-# bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited
+MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
+"""What the states kept by one search may take, about, and what one of them takes besides its bits."""
 CHILD, VISIT = 20, 2
+"""Bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited."""
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""

@@ -32,14 +32,20 @@ from planner.grounded.joins import Ints
 from planner.grounded.shortest import shortest, ways
 from planner.grounded.task import Change, Grouped, Task, bits_of
 
-STATES, STEPS = 400, 12  # looked at for a cheapest plan, where the plan has no more steps
-WEIGHTS = (5, 3, 2)  # of h, in searches of the whole plan anew
-WAYS = 20  # of what follows from others, gone through in the time in which an operator is looked at
-SIZES = (8, 16, 32, 64)  # steps of a window; the long ones are for round trips that one step saves
-OPERATORS = 150  # of a window's search
-EVALUATIONS = 100  # of a window's search
-TRIALS = 2_000_000  # of a step that might be left out, in all
-LOOK = 50  # operators ranked for what one evaluated costs
+STATES, STEPS = 400, 12
+"""States looked at for a cheapest plan, where the plan has no more steps."""
+WEIGHTS = (5, 3, 2)
+"""Of h, in searches of the whole plan anew."""
+WAYS = 20
+"""Alternatives of what follows from others, gone through in the time in which an operator is looked at."""
+SIZES = (8, 16, 32, 64)
+"""Steps of a window; the long ones are for round trips that one step saves."""
+OPERATORS, EVALUATIONS = 150, 100
+"""Of a window's search, at most."""
+TRIALS = 2_000_000
+"""Operators done again, in all, to see which step might be left out."""
+LOOK = 50
+"""Operators ranked in the time in which one is evaluated."""
 
 
 def shorter(

@@ -26,8 +26,8 @@ from reasoner.symbols import (
     substituted,
 )
 
-DEPTH = 6
-MOST_ROWS = 1_000_000
+DEPTH, MOST_ROWS = 6, 1_000_000
+"""So many steps back it is asked why something can't be, in joins of at most so many rows."""
 ONE = "?one"
 """Who is counted."""
 WORDS = ("none", "one", "two", "three", "four", "five")
