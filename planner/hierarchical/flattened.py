@@ -5,10 +5,14 @@ Where a level is left, goals came one after the other on a level below, and noth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from planner.grounded.best_first import SHORTEN
 from planner.grounded.grounding import ground
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
 from planner.hierarchical.postoptimization import worth
+from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.regrouping import under_the_levels_above
 from planner.levels import levels_left
 from planner.plan import Plan, TooLargeError
@@ -34,13 +38,9 @@ def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Pl
         On the clock of `time.perf_counter`.
     """
     old = plan.primitives
-    lowest, most = problem.domain.levels[-1], min(OF_A_STEP * len(old), MOST_ROWS)
-    try:
-        task = ground(problem, lowest, goal=problem.goal_on(lowest), most=most, deadline=deadline)
-    except TooLargeError:
-        return plan
-    operators = task.operators_of([(s.behavior, s.arguments) for s in old]) if isinstance(task, Task) else None
-    if not isinstance(task, Task) or operators is None:
+    task = small(problem, problem.domain.levels[-1], deadline, OF_A_STEP * len(old))
+    operators = task.operators_of([(s.behavior, s.arguments) for s in old]) if task is not None else None
+    if task is None or operators is None:
         return plan
     new = shorter(task, operators, WORK, deadline)
     if len(new) >= len(old):
@@ -62,6 +62,35 @@ def regrouped(problem: Problem, plan: Plan) -> Plan:
     """Return a plan of the lowest level under the levels above wherever these say what it does; as it is if that isn't one."""
     found = under_the_levels_above(problem, plan)
     return plan if validate(problem, found) else found
+
+
+def shortest_known(
+    problem: Problem, steps: Sequence[RefinedStep], deadline: float | None = None
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Return as few steps of the most abstract level as are found in the place of some, not refined.
+
+    Raises
+    ------
+    OutOfTimeError
+        The deadline came before grounding was done.
+    """
+    level = problem.domain.levels[0]
+    known = [(step.behavior, step.arguments) for step in steps]
+    task = small(problem, level, deadline) if all(step.level == level for step in steps) else None
+    operators = task.operators_of(known) if task is not None else None
+    if task is None or operators is None:
+        return known
+    return [task.describe(operator)[:2] for operator in shorter(task, operators, SHORTEN, deadline)]
+
+
+def small(problem: Problem, level: int, deadline: float | None, most: int = MOST_ROWS) -> Task | None:
+    """Return the task of a level, with what it sees of the goal and of what is at rest; None if it is large."""
+    goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
+    try:
+        task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=deadline)
+    except TooLargeError:
+        return None
+    return task if isinstance(task, Task) else None
 
 
 def broken(problem: Problem, plan: Plan) -> int:

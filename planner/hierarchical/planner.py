@@ -161,6 +161,7 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> bool:
     """Make the steps of a call shorter; whether some were left out that came to nothing, so that there may be more."""
+    first, call.steps = call.steps, fewer(call)
     concerned = concerns(call.refiner, call.steps)
     aside = put_aside(concerned)
     before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
@@ -168,7 +169,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
         return False
     kept = call.steps
     if aside:
-        improver = Improver(call.refiner, call.using.shapes, improve if kept is before else (improve + 1) // 2)
+        improver = Improver(call.refiner, call.using.shapes, improve if kept is first else (improve + 1) // 2)
         call.steps = improver.improve(kept, concerned if kept is before else ())
         without = without_detours(call.refiner, call.steps, call.program.levels[-2])
         call.steps = without if worth_it(call.steps, without) else call.steps
@@ -198,6 +199,26 @@ def beside(call: Call, problem: Problem) -> Call:
     known = call.refiner
     other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
     return other
+
+
+def fewer(call: Call) -> list[RefinedStep]:
+    """Return a call's steps with fewer of the most abstract level, where that level is small and has more steps than goals."""
+    if len(call.steps) <= unmet(call):
+        return call.steps
+    from planner.hierarchical.flattened import shortest_known
+
+    found = shortest_known(call.problem, call.steps, call.segments.deadline)
+    if len(found) == len(call.steps):
+        return call.steps
+    other = beside(call, call.problem)
+    for step in found:
+        done = other.refiner.do(call.program.levels[0], *step)
+        if done is None:
+            return call.steps
+        other.steps.append(done)
+    if not all(map(other.met, other.goal)):  # what the first level doesn't see
+        Recovery(other, solvable=True).finish()
+    return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
 
 
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
