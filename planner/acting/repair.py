@@ -22,7 +22,7 @@ from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
-from planner.hierarchical.subplans import Effort
+from planner.hierarchical.settling import settle
 from planner.hierarchical.unsolvability import refuted
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from planner.plan_costs import cost_of, costs_of_steps
@@ -31,8 +31,6 @@ from planner.validation import validate
 from reasoner.amounts import meets
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
-RESTING = Effort(depth=6)
-"""To bring what something happened to back to rest."""
 CLOSE = 1.1
 """A repair that costs more than replanning by more than this factor gives way to it."""
 
@@ -116,7 +114,7 @@ def repair(
     recovery = Recovery(call, solvable=True, forward=True)
     pending = list(rest)
     try:
-        if not _at_rest(call):
+        if not call.at_rest():
             if in_progress:
                 _finish(call, pending, wanted)
             else:
@@ -159,7 +157,7 @@ def replan(
     """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
     first: tuple[Step, ...] = ()
     now, call = problem, _call(problem, using, limits)
-    if not _at_rest(call):
+    if not call.at_rest():
         try:
             settle(call)
         except LimitError as limit:
@@ -196,30 +194,6 @@ def vanished(problem: Problem) -> list[tuple[Symbol, Reason]]:
     ]
 
 
-def settle(call: Call) -> bool:
-    """Bring everything that the upper levels don't know of to rest, the lowest level first; whether that succeeded.
-
-    What a hand holds goes where it is wanted if that takes no longer, else to any place.
-    """
-    for level in reversed(call.program.levels[1:]):
-        targets = _restless(call, level)
-        if not targets:
-            continue
-        hidden = {
-            (name, key): call.goal[name, key]
-            for name, cells in call.table.now.items()
-            for key, value in cells.items()
-            if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
-        }
-        keep = call.segments.keeping({})
-        for wanted in ({**targets, **hidden}, targets):
-            steps = call.refiner.achieve(level, wanted, keep, RESTING)
-            if steps is not None:
-                call.steps.extend(steps)
-                break
-    return _at_rest(call)
-
-
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
     """Return how many primitives of the old steps are dropped, and how many of the new ones are added.
 
@@ -244,7 +218,7 @@ def _finish(call: Call, pending: list[Step], wanted: State) -> None:
         if done is None:
             break
         call.steps.append(done)
-        if _at_rest(call):
+        if call.at_rest():
             if _useless(call, call.table.since(mark), wanted):
                 break  # nor is it to be finished if it changes nothing that the upper levels know of
             del pending[:count]
@@ -348,22 +322,6 @@ def _effects(call: Call, behavior: str, arguments: Sequence[str], bindings: Mapp
         (effect.situation, key_of(tuple(env.get(a, a) for a in effect.arguments))): env.get(effect.value, effect.value)
         for effect in lifted.effects
         if not effect.when
-    }
-
-
-def _at_rest(call: Call) -> bool:
-    """Whether everything that the uppermost level doesn't know of rests."""
-    return not any(_restless(call, level) for level in call.program.levels[1:])
-
-
-def _restless(call: Call, level: int) -> dict[Cell, str]:
-    """Return the values of rest of what a level knows of and what doesn't rest."""
-    return {
-        (name, key): situation.rest
-        for name, situation in call.problem.domain.situations.items()
-        if situation.level == level and situation.rest is not None
-        for key, value in call.table.now[name].items()
-        if value != situation.rest
     }
 
 

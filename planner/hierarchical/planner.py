@@ -16,6 +16,7 @@ flat search             the rest, both ways, until a limit comes        `planner
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -25,7 +26,7 @@ from planner.hierarchical.concerns import concerns, put_aside
 from planner.hierarchical.detours import without_detours
 from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import MUCH, RefinedStep
+from planner.hierarchical.refinement_cache import MUCH, NEAR, RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.subplans import Watch, nobody
 from planner.levels import levels_left
@@ -108,10 +109,19 @@ def _plan(
     try:
         levels = call.program.levels if leave_levels else call.program.levels[:1]
         recovery = Recovery(call, levels)
-        call.segments.doubt = recovery.doubt
-        if call.serialise(recovery.harder) or (recovery.anew(levels) and call.serialise(recovery.harder)):
-            recovery.solvable = True
-            return outcome(Status.SOLVED, shortened(call, improve, leave_levels, advised) if improve else call.tree())
+        solved = False
+        if len(levels) > 1 and not call.at_rest():
+            solved = soon(recovery)
+            if not solved:
+                call = rested(call, advised)
+                recovery = Recovery(call, levels)
+        if solved or achieved(recovery):
+            made = shortened(call, improve, leave_levels, advised) if improve else call.tree()
+            if call.settled:
+                call.given_up.insert(
+                    0, "steps of a lower level come first: they bring to rest what isn't in the beginning"
+                )
+            return outcome(Status.SOLVED, made)
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
@@ -136,6 +146,39 @@ def _plan(
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
     return outcome(flat.status, found, flat.reason)
+
+
+def achieved(recovery: Recovery) -> bool:
+    """Do steps after which all goals hold; whether there are some."""
+    call, levels = recovery.call, recovery.levels or ()
+    call.segments.doubt = recovery.doubt
+    done = call.serialise(recovery.harder) or (recovery.anew(levels) and call.serialise(recovery.harder))
+    recovery.solvable = recovery.solvable or done
+    return done
+
+
+def soon(recovery: Recovery) -> bool:
+    """Do steps after which all goals hold by no more work than one small world; whether there are some."""
+    segments = recovery.call.segments
+    segments.most_work = NEAR.work
+    try:
+        return achieved(recovery)
+    except LimitError:
+        return False
+    finally:
+        segments.most_work = math.inf
+
+
+def rested(call: Call, advised: Callable[[Call], None]) -> Call:
+    """Return a call from the beginning once more that first brings to rest what isn't.
+
+    An object in a hand is at no place that the first level knows, so that none of its steps may begin there.
+    """
+    call.settled = True
+    other = beside(call, call.problem)
+    other.segments.watch, other.segments.expanded = call.segments.watch, call.segments.expanded
+    advised(other)
+    return other
 
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None] = alone) -> Plan:
@@ -198,6 +241,10 @@ def beside(call: Call, problem: Problem) -> Call:
     other = Call(problem, call.using, call.segments.deadline, call.segments.most)
     known = call.refiner
     other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
+    if call.settled:
+        from planner.hierarchical.settling import settle
+
+        other.settled = settle(other)
     return other
 
 

@@ -97,6 +97,8 @@ class Call:
         self.vain = 0
         """Work of small worlds that came to nothing since it was last asked whether steps led astray."""
         self.restarts = 0
+        self.settled = False
+        """Whether the first steps bring to rest what isn't in the beginning."""
         self.at_once = False
         """Whether the first steps are to all goals at once."""
         self.wary: Callable[[list[RefinedStep], int, Again], list[RefinedStep] | None] | None = None
@@ -213,6 +215,20 @@ class Call:
     def met(self, cell: Cell) -> bool:
         """Whether a goal holds now."""
         return meets(self.table.now[cell[0]].get(cell[1], FALSE), self.goal[cell])
+
+    def at_rest(self) -> bool:
+        """Whether everything that the uppermost level doesn't know of rests."""
+        return not any(self.restless(level) for level in self.program.levels[1:])
+
+    def restless(self, level: int) -> dict[Cell, str]:
+        """Return the values of rest of what a level knows of and what doesn't rest."""
+        return {
+            (name, key): situation.rest
+            for name, situation in self.problem.domain.situations.items()
+            if situation.level == level and situation.rest is not None
+            for key, value in self.table.now[name].items()
+            if value != situation.rest
+        }
 
     def order(self) -> dict[Cell, list[Cell]]:
         """Return for each goal those that must come before it: once it holds, they couldn't be achieved any more."""

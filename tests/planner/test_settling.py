@@ -1,0 +1,43 @@
+"""Planning from the middle of something: a hand that holds a bottle, which is at no place that the first level knows."""
+
+from dataclasses import replace
+
+import pytest
+
+from planner.hierarchical.planner import plan
+from planner.plan import Limits, Status
+from planner.validation import successor, validate
+from reasoner.symbols import Problem, State
+from worlds.families import family
+
+
+def course(problem: Problem) -> list[State]:
+    """Return the states that a plan leads through."""
+    found = plan(problem).plan
+    assert found is not None
+    states: list[State] = [dict(problem.initial)]
+    for step in found.primitives:
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, states[-1])
+        assert after is not None
+        states.append(after)
+    return states
+
+
+@pytest.mark.parametrize("number", range(2, 60, 6))
+def test_from_any_state_of_a_plan_the_rest_is_planned_soon(number: int) -> None:
+    problem = family("served", 8)
+    here = replace(problem, initial=course(problem)[number])
+    outcome = plan(here, limits=Limits(expansions=2_000))
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert validate(here, outcome.plan) == []
+
+
+def test_that_a_lower_level_comes_first_is_told() -> None:
+    problem = family("served", 8)
+    held = next(state for state in course(problem) if "in_hand" in state.values())
+    outcome = plan(replace(problem, initial=held))
+    assert outcome.plan is not None
+    assert (
+        [step.level for step in outcome.plan.steps].index(1) == sum(step.level > 1 for step in outcome.plan.steps) > 0
+    )
+    assert [text[:34] for text in outcome.given_up] == ["steps of a lower level come first:"]
