@@ -26,7 +26,7 @@ from planner.hierarchical.concerns import concerns, put_aside
 from planner.hierarchical.detours import without_detours
 from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import MUCH, NEAR, RefinedStep
+from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.subplans import Watch, nobody
 from planner.levels import levels_left
@@ -158,9 +158,9 @@ def achieved(recovery: Recovery) -> bool:
 
 
 def soon(recovery: Recovery) -> bool:
-    """Do steps after which all goals hold by no more work than one small world; whether there are some."""
+    """Do steps after which all goals hold by no more work than one large world; whether there are some."""
     segments = recovery.call.segments
-    segments.most_work = NEAR.work
+    segments.most_work = MUCH
     try:
         return achieved(recovery)
     except LimitError:
