@@ -89,6 +89,7 @@ class Formulas:
         self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # by part and what it has from outside
         self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Part]]]] = {}
         self._relations: dict[tuple[str, int, int, tuple[int, ...]], dict[tuple[str, ...], dict[str, None]]] = {}
+        self._members: dict[str, dict[str, None]] = {}
         self._names = count()
 
     def condition(
@@ -241,10 +242,6 @@ class Formulas:
         if kind not in self._members:
             self._members[kind] = dict.fromkeys(self.reached.problem.classes.get(kind, ()))
         return self._members[kind]
-
-    @cached_property
-    def _members(self) -> dict[str, dict[str, None]]:
-        return {}
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
         """Return what must hold for a symbol to have a value (negated: not to have it)."""

@@ -117,7 +117,7 @@ def _plan(
                 recovery = Recovery(call, levels)
         if solved or achieved(recovery):
             made = shortened(call, improve, leave_levels, advised) if improve else call.tree()
-            if call.settled:
+            if call.settled and made.steps and made.steps[0].level != call.program.levels[0]:
                 call.given_up.insert(
                     0, "steps of a lower level come first: they bring to rest what isn't in the beginning"
                 )
@@ -174,9 +174,9 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
 
     An object in a hand is at no place that the first level knows, so that none of its steps may begin there.
     """
-    call.settled = True
-    other = beside(call, call.problem)
-    other.segments.watch, other.segments.expanded = call.segments.watch, call.segments.expanded
+    other = beside(call, call.problem, settled=True)
+    other.segments.watch = call.segments.watch
+    other.segments.expanded += call.segments.expanded
     advised(other)
     return other
 
@@ -236,15 +236,19 @@ def unmet(call: Call) -> int:
     return sum(not meets(initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items())
 
 
-def beside(call: Call, problem: Problem) -> Call:
-    """Return a call from the beginning once more, that knows which refinements were found and which weren't."""
+def beside(call: Call, problem: Problem, settled: bool = False) -> Call:
+    """Return a call from the beginning once more, that knows which refinements were found and which weren't.
+
+    If `settled`, what isn't at rest is brought to rest first.
+    """
     other = Call(problem, call.using, call.segments.deadline, call.segments.most)
     known = call.refiner
     other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
-    if call.settled:
+    if settled:
         from planner.hierarchical.settling import settle
 
-        other.settled = settle(other)
+        settle(other)
+        other.settled = bool(other.steps)
     return other
 
 
@@ -257,7 +261,7 @@ def fewer(call: Call) -> list[RefinedStep]:
     found = shortest_known(call.problem, call.steps, call.segments.deadline)
     if len(found) == len(call.steps):
         return call.steps
-    other = beside(call, call.problem)
+    other = beside(call, call.problem, call.settled)
     for step in found:
         done = other.refiner.do(call.program.levels[0], *step)
         if done is None:
@@ -281,7 +285,7 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     left = max(call.segments.worked, MUCH)  # for both together
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
-        other = beside(call, replace(call.problem, goal=goal))
+        other = beside(call, replace(call.problem, goal=goal), call.settled)
         other.segments.most_work = left
         advised(other)
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
