@@ -69,8 +69,9 @@ class _Sums:
     def wanted_of(self, places: Sequence[int], left: Fraction) -> Reason | None:
         """Return that some amounts together can't become what the goals take, and what has to be left."""
         touched = {o for place in places for o, _ in self.of[place]}
-        used = {o: -found for o in touched if (found := _change(self.moves[o], places, False))}
-        gains = {o: gain for o in touched if (gain := _change(self.moves[o], places, True)) != 0}
+        most = {o: _change(self.moves[o], places) for o in touched}
+        used = {o: -change for o, change in most.items() if change is not None and change < 0}
+        gains = {o: change for o, change in most.items() if change is None or change > 0}
         for bits in self.counted(used):
             worth = self.worth(bits, used)
             if any(gain is None or gain > self.undone(o, worth) for o, gain in gains.items()):
@@ -220,8 +221,8 @@ def _extent(
     return max(limits, default=None), min(most, default=None)
 
 
-def _change(moves: Sequence[Move], places: Sequence[int], most: bool) -> Exact | None:
-    """Return what an operator makes of a sum: at most, if that is more than nothing, else what it surely uses up.
+def _change(moves: Sequence[Move], places: Sequence[int]) -> Exact | None:
+    """Return what an operator makes of a sum, at most: what it adds under a condition counts, what it takes so doesn't.
 
     None where that depends on the state.
     """
@@ -230,8 +231,8 @@ def _change(moves: Sequence[Move], places: Sequence[int], most: bool) -> Exact |
         if move.place not in places:
             continue
         if move.operation not in ("increase", "decrease") or move.by is None or move.by.terms:
-            return None if most else 0
+            return None
         by = move.by.constant if move.operation == "increase" else -move.by.constant
-        if not move.when or (by > 0) is most:
+        if by > 0 or not move.when:
             total += by
-    return max(total, 0) if most else min(total, 0)
+    return total

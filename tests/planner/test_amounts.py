@@ -10,6 +10,8 @@ from planner.grounded.best_first import plan_level
 from planner.plan import Outcome, Status
 from planner.solve import Request, solve
 from reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
+from reasoner.pddl.importing import imported
+from reasoner.pddl.syntax import parse
 from reasoner.symbols import AmountEffect, Behavior, Comparison, Parameter, Problem, SituationType, Symbol, ValueEffect
 from worlds.writing import becomes, has, world
 
@@ -166,3 +168,17 @@ def test_what_is_set_to_too_little_is_known_to_bring_nothing_about() -> None:
         outcome = plan_level(replace(problem, domain=domain), 2)
         assert outcome.status is status
         assert outcome.search[2].expanded == 0 or outcome.plan is not None
+
+
+def test_what_is_taken_only_under_a_condition_is_not_counted_as_used_up() -> None:
+    domain = """(define (domain shelf) (:requirements :typing :numeric-fluents :conditional-effects) (:types book)
+      (:predicates (there ?b - book) (out ?b - book) (lent ?b - book)) (:functions (free))
+      (:action tidy :parameters (?b - book) :precondition (>= (free) 1) :effect
+        (and (decrease (free) 1) (when (out ?b) (and (there ?b) (not (out ?b)))) (when (lent ?b) (increase (free) 1))))
+      (:action put :parameters (?b - book) :precondition (and (out ?b) (>= (free) 1))
+        :effect (and (there ?b) (decrease (free) 1)))
+      (:action lend :parameters (?b - book) :precondition (there ?b)
+        :effect (and (not (there ?b)) (lent ?b) (increase (free) 1))))"""
+    task = """(define (problem p) (:domain shelf) (:objects b0 b1 - book)
+      (:init (out b0) (out b1) (= (free) 1)) (:goal (and (there b0) (there b1))))"""
+    assert plan_level(imported(parse(domain, task)).problem).status is Status.SOLVED
