@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,8 @@ from confab.interchange import step_json
 from planner.acting.episode import Change, End, Episode, Intervention, World
 from planner.acting.executive import Moment, Patience, act
 from planner.acting.failure_memory import Caution
-from planner.acting.repair import Planner
 from planner.acting.symbolic_world import SymbolicWorld
-from planner.plan import Plan, Step, renumbered
+from planner.plan import Plan, Planner, Step, renumbered
 from planner.solve import DEFAULT_MODE
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.links import Links
@@ -340,9 +340,9 @@ def carry_out(
         memory = Memory.load(memory, scene)
     planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
     if planner is None and memory is not None and not isinstance(memory, Links):
-        from planner.experience.advice import planner_with
+        from planner.experience.advice import plan as plan_with
 
-        planner = planner_with(memory.advisor, mode)
+        planner = partial(plan_with, memory=memory.advisor, mode=mode)
     number("seed", seed, "an integer")
     texts = several(interventions)
     with spectator(watch, tell) as heard:
@@ -365,7 +365,7 @@ def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
         return None
     from planner.paper.hierarchy import plan as paper_plan
 
-    return lambda problem: paper_plan(problem, memory)
+    return partial(paper_plan, links=memory)
 
 
 def execute(
@@ -463,8 +463,10 @@ def _with_both_hands(
     from sim.together import perform
 
     if plan is None:
-        known = problem if caution is None else caution.applied(problem, planner or fast_plan)
-        plan = (planner or fast_plan)(known).plan or Plan(())
+        begin, limits = planner or fast_plan, patience.planning
+        end = limits.end()
+        known = problem if caution is None else caution.applied(problem, begin, limits)
+        plan = begin(known, limits=limits.until(end)).plan or Plan(())
     done = perform(live.world, problem, plan.primitives)
     if not done.ok:
         live.take_stock()

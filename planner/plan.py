@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from time import perf_counter
+from typing import Protocol
 
-from reasoner.symbols import Condition, Fact, State
+from reasoner.symbols import Condition, Fact, Problem, State
 
 
 class Status(Enum):
@@ -167,6 +168,17 @@ class Limits:
     def end(self, share: float = 1.0) -> float | None:
         """Return when a share of the seconds from now on is over, as `perf_counter` counts; None: never."""
         return None if self.seconds is None else perf_counter() + share * self.seconds
+
+    def until(self, end: float | None) -> Limits:
+        """Return the same limits with the seconds that are left until then, for a step of a longer call."""
+        return self if end is None else replace(self, seconds=max(end - perf_counter(), 0.0))
+
+
+class Planner(Protocol):
+    """Plans from scratch within limits."""
+
+    def __call__(self, problem: Problem, /, *, limits: Limits) -> Outcome:
+        """Return a plan, or why there is none."""
 
 
 class UnsolvableError(Exception):

@@ -33,11 +33,11 @@ from planner.acting.episode import (
     WorldError,
 )
 from planner.acting.failure_memory import Caution, Static, refuted_by, without_relations
-from planner.acting.repair import Planner, difference, mend, replan, vanished
+from planner.acting.repair import difference, mend, replan, vanished
 from planner.acting.symbolic_world import with_individual
 from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import Limits, Outcome, Plan, Reason, Status, Step, renumbered
+from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from planner.validation import successor
 from reasoner.amounts import meets
 from reasoner.refutations import Refutation, with_refuted
@@ -112,7 +112,7 @@ def act(
     Episode
     """
     if caution is not None and plan is None:
-        problem = caution.applied(problem, planner or fast_plan)
+        problem = caution.applied(problem, planner or fast_plan, patience.planning)
     run = _Run(problem, Guarded(world), list(interventions), planner, patience, tell, mending)
     try:
         run.look(dict(problem.initial))
@@ -425,6 +425,7 @@ class _Run:
         assert self.planned_for is not None
         begin = perf_counter()
         limits, old = self.patience.planning, self.agenda
+        end = limits.end()
         if self.mending:
             expected = {s: v for s, v in {**self.belief.initial, **self.missed}.items() if v is not None}
             planned = replace(self.planned_for, initial=expected)
@@ -437,7 +438,7 @@ class _Run:
         self.seconds["repairing"] += seconds
         self.planned_for, self.sound, self.missed = self.belief, True, {}
         if steps is None:
-            self.despair(outcome)
+            self.despair(outcome, limits.until(end))
             return
         self.agenda = self.numbered(steps)
         dropped, added = difference(old, steps)
@@ -462,16 +463,16 @@ class _Run:
             self.reasons.extend(reason for _, reason in impossible)
             self.belief = replace(self.belief, goal={s: v for s, v in self.belief.goal.items() if s not in gone})
 
-    def despair(self, outcome: Outcome | None) -> None:
+    def despair(self, outcome: Outcome | None, limits: Limits) -> None:
         """Set aside the goals that can't be reached even one by one; if that explains nothing, come to rest and stop."""
         reason = outcome.reason if outcome is not None and outcome.reason else Reason("no plan was found")
         doubted = self.withdrawn or self.refuted
         proved = outcome is not None and outcome.status is Status.UNSOLVABLE and not doubted
-        hopeless = []
+        hopeless, end = [], limits.end()
         for symbol, value in self.belief.goal.items():
             if proved and not meets(self.belief.initial.get(symbol, FALSE), value):
                 alone = replace(self.belief, goal={symbol: value})
-                steps, single = replan(alone, None, self.using, self.patience.planning)
+                steps, single = replan(alone, None, self.using, limits.until(end))
                 if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
                     hopeless.append((symbol, single.reason))
         if hopeless:

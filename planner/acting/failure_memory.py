@@ -10,12 +10,12 @@ What a planner of motions refutes is known at once, and more exactly: there is n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from planner.acting.episode import Episode
-from planner.plan import Outcome, Plan, Status, Step
+from planner.plan import Limits, Plan, Planner, Status, Step
 from reasoner.refutations import Refutation
 from reasoner.symbols import Fact, Problem
 
@@ -58,12 +58,13 @@ class Caution:
         pairs = {fact: (self.counts.get(fact, (0, 0)), other.counts.get(fact, (0, 0))) for fact in facts}
         return Caution({fact: (a[0] + b[0], a[1] + b[1]) for fact, (a, b) in pairs.items()})
 
-    def applied(self, problem: Problem, planner: Callable[[Problem], Outcome]) -> Problem:
+    def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
         """Return the problem without the doubtful facts, the most doubtful first, as long as a plan is left."""
+        end = limits.end()
         doubtful = [fact for fact in self.counts if self.doubt(fact) > DOUBTFUL]
         for fact in sorted(doubtful, key=lambda fact: (-self.doubt(fact), fact)):
             without = without_relations(problem, [fact])
-            if planner(without).status is Status.SOLVED:
+            if planner(without, limits=limits.until(end)).status is Status.SOLVED:
                 problem = without
         return problem
 

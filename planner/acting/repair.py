@@ -14,7 +14,7 @@ Nothing leaves here to be followed that `planner.validation` doesn't accept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
@@ -24,7 +24,7 @@ from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.settling import settle
 from planner.hierarchical.unsolvability import refuted
-from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
+from planner.plan import LimitError, Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from planner.plan_costs import cost_of, costs_of_steps
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
@@ -37,7 +37,8 @@ CLOSE = 1.1
 MOST = 5_000
 """So many expansions a repair may take, before the whole is planned anew."""
 
-Planner = Callable[[Problem], Outcome]
+SHARE = 0.5
+"""Of the time a repair may take, so that as much is left for planning anew."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +86,16 @@ def mend(
     in_progress : bool
         Whether the first step of `rest` may be finished as it was planned.
     limits : Limits
+        Of the whole call, whether it repairs, plans anew, or does both.
     """
-    using = using or compiled(problem)
+    using, end = using or compiled(problem), limits.end()
     repaired = repair(problem, rest, planned, using, in_progress, limits)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
     fewer = planned.goal.keys() - problem.goal.keys()  # then what was needed before may be needless
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return Mended("repair", repaired.steps, repaired.cost)
-    anew, outcome = replan(problem, planner, using, limits)
+    anew, outcome = replan(problem, planner, using, limits.until(end))
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
         return Mended("repair", repaired.steps, repaired.cost)
     return Mended("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
@@ -109,7 +111,7 @@ def repair(
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
-    call = _call(problem, using, replace(limits, expansions=min(limits.expansions, MOST)))
+    call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
     # What is impossible is proved by replanning; nor is anything kept undone here: beginning anew is replanning, too.
     recovery = Recovery(call, solvable=True, forward=True)
     pending = list(rest)
@@ -156,14 +158,16 @@ def replan(
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
     """Return what is to be done as planned from scratch: bring the hands to rest, then plan."""
     first: tuple[Step, ...] = ()
-    now, call = problem, _call(problem, using, limits)
+    now, end = problem, limits.end()
+    call = Call(problem, using, end, limits.expansions)
     if not call.at_rest():
         try:
             settle(call)
         except LimitError as limit:
             return None, Outcome(Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}"))
         first, problem = call.tree().steps, replace(problem, initial=call.table.state())
-    outcome = planner(problem) if planner is not None else fast_plan(problem, limits=limits, using=using)
+    left = limits.until(end)
+    outcome = planner(problem, limits=left) if planner else fast_plan(problem, limits=left, using=using)
     if outcome.plan is None:
         return None, outcome
     steps = renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps
@@ -345,7 +349,3 @@ def _last_steps(call: Call) -> set[int]:
         if cell in last and not meets(start.get(symbol, FALSE), value):
             found |= together[last[cell]]
     return found
-
-
-def _call(problem: Problem, using: Compiled, limits: Limits) -> Call:
-    return Call(problem, using, limits.end(), limits.expansions)

@@ -13,7 +13,6 @@ reached no such goals yet, or knows none of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -166,8 +165,3 @@ def plan(
 
     warm = memory.warmed(using)
     return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)
-
-
-def planner_with(memory: Memory, mode: str = "guarded") -> Callable[[Problem], Outcome]:
-    """Return what plans any problem of one domain with experience."""
-    return lambda problem: plan(problem, memory, mode)

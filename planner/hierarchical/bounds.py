@@ -54,7 +54,7 @@ def plan(
     begin = perf_counter()
     deadline = limits.end(SEARCHING)
     using = using or compiled(problem)
-    best = fast_plan(problem, limits=_left(limits, deadline), using=using)
+    best = fast_plan(problem, limits=limits.until(deadline), using=using)
     best = _shortened(problem, best, limits, using, deadline)
     if best.status is Status.UNSOLVABLE:
         return best
@@ -72,10 +72,6 @@ def plan(
     )
 
 
-def _left(limits: Limits, deadline: float | None) -> Limits:
-    return limits if deadline is None else Limits(limits.expansions, max(deadline - perf_counter(), 0.0))
-
-
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
     """Improve a plan by ever more clusters, until that stops helping or half of the time is gone."""
     begin = perf_counter()
@@ -83,7 +79,7 @@ def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled,
     while best.plan is not None and shapes <= 512:
         if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
             break
-        again = fast_plan(problem, limits=_left(limits, deadline), using=using, improve=shapes)
+        again = fast_plan(problem, limits=limits.until(deadline), using=using, improve=shapes)
         shapes *= 4
         if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again

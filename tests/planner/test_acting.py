@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import pytest
 from hypothesis import given, settings
@@ -104,7 +104,7 @@ def test_in_the_papers_mode_after_a_demonstration_the_whole_course_is_that_of_th
         moved("cup2", "location8", after=28),
         wanted("cup2", "location8", after=28),
         plan=None,
-        planner=lambda problem: paper_plan(problem, links),
+        planner=partial(paper_plan, links=links),
     )
     assert [step.id for step in episode.done.steps] == [22, 34, 28, 39]
     assert tree(episode.done) == SERVED_AS_IN_FIGURE_8

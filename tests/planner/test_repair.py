@@ -4,6 +4,7 @@ import random
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from time import sleep
 
 import pytest
 
@@ -167,6 +168,32 @@ def test_a_limit_of_time_is_kept_to() -> None:
     assert mend(now, planned().steps, serving(), using=using(), limits=Limits(seconds=60.0)).steps is not None
 
 
+def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
+    left: list[float | None] = []
+
+    def planner(problem: Problem, /, *, limits: Limits) -> Outcome:
+        left.append(limits.seconds)
+        return plan(problem, limits=limits)
+
+    def in_vain(*_: object) -> None:
+        sleep(0.05)
+
+    monkeypatch.setattr("planner.acting.repair.repair", in_vain)
+    mended = mend(now, planned().steps, serving(), planner, using(), limits=Limits(seconds=60.0))
+    assert mended.kind == "replan"
+    assert mended.steps is not None
+    begun = replace(serving(), initial=carried_out(serving(), serving().initial, planned().steps[0].steps[:1]))
+    mend(begun, (), begun, planner, using(), limits=Limits(seconds=60.0))  # something is brought to rest first
+    mend(now, planned().steps, serving(), planner, using())
+    first, second, unlimited = left
+    assert first is not None
+    assert second is not None
+    assert 0 < first <= 60.0 - 0.05
+    assert 0 < second <= 60.0 - 0.05
+    assert unlimited is None
+
+
 def in_the_hand(done: int, goal: State | None = None) -> tuple[Problem, tuple[Step, ...]]:
     """Return the situation after some primitives of the paper's plan, with another goal perhaps, and what is left to do."""
     now = replace(serving(), initial=carried_out(serving(), serving().initial, planned().primitives[:done]))
@@ -256,9 +283,9 @@ def test_whatever_happens_whenever_little_is_done_otherwise(
         rest, before = rest_after(trial.plan, done), replace(problem, initial=trial.states[done])
         now = after_somebody(before, draw)
 
-        def planner(there: Problem) -> Outcome:
+        def planner(there: Problem, /, *, limits: Limits) -> Outcome:
             anew.append(there)
-            return plan(there, using=uses)
+            return plan(there, limits=limits, using=uses)
 
         mended = mend(now, rest, before, planner, uses)
         if mended.steps is None:
