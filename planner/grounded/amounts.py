@@ -18,7 +18,7 @@ from math import inf
 from typing import TypeAlias
 
 from planner.language import DomainError
-from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, written
+from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, situations_in, written
 from reasoner.symbols import Fact, Problem, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"
@@ -136,7 +136,11 @@ class AmountTable:
                 if sign in "+-":
                     return one.plus(other, 1 if sign == "+" else -1)
                 if other.terms and (one.terms or sign == "/"):
-                    raise DomainError(f"amounts that change are multiplied or divided by one another: {expression}")
+                    one_of, by = (" and ".join(sorted(situations_in(side))) for side in (left, right))
+                    did = f"multiplies {one_of} by {by}, which both" if sign == "*" else f"divides by {by}, which"
+                    raise DomainError(
+                        f"a calculation {did} change; a whole level isn't searched with that: multiply by what never changes"
+                    )
                 if sign == "/":
                     return one.times(_exact(Fraction(1) / other.constant)) if other.constant else None
                 return other.times(one.constant) if other.terms else one.times(other.constant)

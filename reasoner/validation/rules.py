@@ -33,7 +33,10 @@ from reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Domain,
+    Parameter,
     Problem,
+    Rule,
     ValueCondition,
     ValueEffect,
     Witness,
@@ -549,6 +552,55 @@ def defined(case: Case) -> Iterator[Fault]:
             yield names.iri(name), what, why, "nothing, if it is meant; else define it by what behaviours change"
 
 
+def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
+    """Find rules that conclude something of who can't have it, as where the arguments of a conclusion have changed places."""
+    if case.reading is None:
+        return
+    domain, names = case.reading.problem.domain, case.reading.names
+    for name, rules in domain.rules.items():
+        for rule in rules:
+            for parameter, wanted in zip(rule.parameters, domain.situations[name].arguments, strict=True):
+                of = next((kind for kind in _asked(rule, parameter, domain) if not _both(case, kind, wanted)), None)
+                if of is not None:
+                    said = ", ".join(p.name.removeprefix("?") for p in rule.parameters)
+                    yield (
+                        names.iri(name),
+                        f"a rule concludes {name}({said}), where {parameter.name.removeprefix('?')} has to be a "
+                        f"{wanted.replace('|', ' or ')}; its conditions make it a {of.replace('|', ' or ')}, and nothing is both",
+                        "the rule never concludes anything",
+                        "mend the rule: the arguments of its conclusion may have changed places, or a class or property in its "
+                        f"conditions may be another; or say that a {of.split('|')[0]} has {name}, too",
+                    )
+
+
+def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
+    """Yield the classes of which the conditions of a rule ask that a parameter is."""
+    yield parameter.kind
+    for condition in rule.conditions:
+        match condition:
+            case ClassCondition(term, kind, False) if term == parameter.name:
+                yield kind
+            case ValueCondition(situation, arguments, _, False):
+                for term, kind in zip(arguments, domain.situations[situation].arguments, strict=True):
+                    if term == parameter.name:
+                        yield kind
+
+
+def _both(case: Case, one: str, other: str) -> bool:
+    """Whether something is in both of two classes, each of which may be any of several, or could be: a class is below both."""
+    assert case.reading is not None
+    problem = case.reading.problem
+    if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
+        return True
+    below = []
+    for kinds in (one.split("|"), other.split("|")):
+        found = {*kinds}
+        while more := {sub for sub, above in problem.parents.items() if not found.isdisjoint(above)} - found:
+            found |= more
+        below.append(found)
+    return not below[0].isdisjoint(below[1])
+
+
 WATCHED_BY_NOBODY = {
     OWL + "InverseFunctionalProperty": "leads to no two from one",
     OWL + "AsymmetricProperty": "never leads both ways",
@@ -674,22 +726,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
         return "", ""
 
     for name, behavior in reading.problem.domain.behaviors.items():
-        pairs: list[tuple[Expression, Expression, str]] = []
-        waiting = list(behavior.conditions)
-        while waiting:
-            match waiting.pop():
-                case Comparison(left, _, right):
-                    pairs.append((left, right, "compares"))
-                case Witness(_, _, inner):
-                    waiting += inner
-                case AnyOf(alternatives):
-                    waiting += [condition for group in alternatives for condition in group]
-        for effect in behavior.amounts:
-            by: Expression = effect.amount
-            if effect.operation == "scale":  # by a number without a unit
-                by = Calculation("*", Amount(effect.situation, effect.arguments), effect.amount)
-            pairs.append((Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"))
-        for left, right, does in pairs:
+        for left, right, does in _together(behavior):
             (one, wrong), (other, also) = unit(left), unit(right)
             both = wrong or also or (f"{one} and {other}" if one and other and one != other else "")
             if both:
@@ -700,6 +737,49 @@ def unlike_units(case: Case) -> Iterator[Fault]:
                     "a number of one unit says nothing of an amount of another",
                     "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
                 )
+
+
+def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]]:
+    """Yield the pairs of amounts that a behaviour compares, or changes one by the other, and which of that it does."""
+    waiting = list(behavior.conditions)
+    while waiting:
+        match waiting.pop():
+            case Comparison(left, _, right):
+                yield left, right, "compares"
+            case Witness(_, _, inner):
+                waiting += inner
+            case AnyOf(alternatives):
+                waiting += [condition for group in alternatives for condition in group]
+    for effect in behavior.amounts:
+        by: Expression = effect.amount
+        if effect.operation == "scale":  # by a number without a unit
+            by = Calculation("*", Amount(effect.situation, effect.arguments), effect.amount)
+        yield Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"
+
+
+def multiplied_amounts(case: Case) -> Iterator[Fault]:
+    """Find amounts that change and are multiplied, or divided by: a whole level isn't searched with such a calculation."""
+    if case.reading is None:
+        return
+    domain, names = case.reading.problem.domain, case.reading.names
+    changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}
+    rules = [(name, rule.behavior) for name, its in domain.rules.items() for rule in its]
+    for name, behavior in (*domain.behaviors.items(), *rules):
+        found = dict[tuple[str, str, str], None]()
+        for left, right, does in _together(behavior):
+            for part in (*inside(left), *(() if does == "scales" else inside(right))):
+                if isinstance(part, Calculation) and part.operator in "*/":
+                    one, other = (sorted(situations_in(side) & changed) for side in (part.left, part.right))
+                    if other and (one or part.operator == "/"):
+                        found[part.operator, " and ".join(one), " and ".join(other)] = None
+        for sign, first, second in found:
+            does = f"multiplies {first} by {second}" if sign == "*" else f"divides by {second}"
+            yield (
+                names.iri(name),
+                f"{name} {does}, {'both of which' if first and sign == '*' else 'which'} behaviors change",
+                "where a whole level is searched, as in a world of one level or for the cheapest plan, that is refused",
+                "multiply by a relation's number or a constant, which never changes, or add and subtract instead",
+            )
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
@@ -767,10 +847,12 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "definition-without-effect": definitions_without_effect,
     "axiom-not-watched": axioms_not_watched,
     "unit-mismatch": unlike_units,
+    "product-of-amounts": multiplied_amounts,
+    "conclusion-outside-class": conclusions_about_nobody,
     "number-missing": numbers_missing,
     "defined": defined,
 }
-WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing", "other-kind"})
+WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing", "other-kind", "product-of-amounts"})
 """Rules of what can be planned with all the same."""
 REMARKS = frozenset({"defined"})
 """Rules that tell of what isn't wrong."""

@@ -150,7 +150,7 @@ def test_what_is_imported_is_read_back_from_turtle(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("domain", "said"),
     [
-        ("(increase (total) (* (level ?x) (level ?x)))", "multiplied or divided"),
+        ("(increase (total) (* (level ?x) (level ?x)))", "multiplies LEVEL by LEVEL, which both change"),
         ("(increase (total) much)", "wanted a number, got 'much'"),
         ("(increase (much ?x) 1)", "undefined function 'much'"),
         ("(assign (total) (level ?x ?x))", "takes 1 arguments, got 2"),
