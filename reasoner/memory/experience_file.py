@@ -263,6 +263,9 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             if not 0 <= min(tally.chosen, tally.passed_over, tally.failed) <= sum(astuple(tally)) < MOST:
                 raise ValueError(f"{counter} counts {tally}; wanted numbers from 0 to {MOST}")
             tallies[fact] = tallies[fact] | tally if fact in tallies else tally
+        for replica, epoch in experience.counts:
+            if epoch > (lived := experience.episodes.get(replica, epoch)):
+                raise ValueError(f":epoch {epoch} of {replica!r}, whose :episodes are {lived}; wanted no later one")
     except KnowledgeError:
         raise
     except (KeyError, ValueError, IndexError) as error:

@@ -8,6 +8,7 @@ what comes `:first` and `:then`. ``:enabled false`` keeps something from being f
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import TypeAlias
 from urllib.parse import quote, unquote
 
@@ -236,6 +237,10 @@ class Reader:
             if "becomesValueOf" in self.nodes[role]:
                 becomes = self.short(self.one(role, "becomesValueOf"))
             roles.append(OpenRole(self.short(self.one(role, "termType")), source, becomes))
+        named = [*(places for _, places in steps), *(role.source[1] for role in roles if role.source)]
+        for place in chain.from_iterable(named):
+            if not 0 <= place < own + len(roles):
+                raise ValueError(f"<{iri}>: names role {place} of {own + len(roles)}, counted from 0")
         return Method(self.short(self.one(iri, "refines")), own, tuple(steps), tuple(roles))
 
     def term(self, iri: str, terms: Mapping[str, str]) -> str:

@@ -16,7 +16,7 @@ import pyoxigraph as ox
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from reasoner.names import Names
-from reasoner.reading.problem import Reading
+from reasoner.reading.problem import Reading, check_values
 from reasoner.symbols import State, Symbol
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
 
@@ -67,6 +67,10 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     if not nodes:
         raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
     seen = {_symbol(iri, node, reading.problem.initial, path): node["value"] for iri, node in nodes.items()}
+    try:
+        check_values(seen, reading.problem.domain, reading.names)
+    except KnowledgeError as error:
+        raise KnowledgeError(f"{path}: {error}; observe this scene anew") from error
     return replace(reading, problem=replace(reading.problem, initial={**reading.problem.initial, **seen}))
 
 

@@ -68,6 +68,7 @@ from reasoner.symbols import (
     RelationCondition,
     Rule,
     SituationType,
+    State,
     Symbol,
     ValueCondition,
     ValueEffect,
@@ -619,18 +620,28 @@ def _initial(
                 what = f"several values ({', '.join(values)})" if values else "no value"
                 raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
             initial[symbol] = values[0]
-            if situation.quantity:
-                _check_amount(symbol, values[0], situation.quantity, names)
-    true = [s for s, (v, *_) in stated.items() if domain.situations[s.situation].boolean and v == TRUE]
-    initial |= dict.fromkeys(sorted(true), TRUE)
-    for symbol, value in initial.items():
-        number = domain.situations[symbol.situation].quantity is not None
-        for name in symbol.arguments if number else (*symbol.arguments, value):
+    members = {kind: frozenset(those) for kind, those in classes.items()}
+    for symbol in sorted(
+        s for s, values in stated.items() if domain.situations[s.situation].boolean and TRUE in values
+    ):
+        kinds = domain.situations[symbol.situation].arguments
+        if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
+            initial[symbol] = TRUE  # of others it isn't asked
+    check_values(initial, domain, names)
+    return initial
+
+
+def check_values(state: State, domain: Domain, names: Names) -> None:
+    """Raise `KnowledgeError` if a symbol has a value that is declared nowhere, or an amount that it can't have."""
+    for symbol, value in state.items():
+        quantity = domain.situations[symbol.situation].quantity
+        if quantity is not None:
+            _check_amount(symbol, value, quantity, names)
+        for name in symbol.arguments if quantity else (*symbol.arguments, value):
             if name not in names and name not in (TRUE, FALSE):
                 raise KnowledgeError(
                     f"{symbol} is {value}, but {name} isn't declared as an individual; declare it, or mend the name"
                 )
-    return initial
 
 
 def _check_amount(symbol: Symbol, value: str, quantity: Quantity, names: Names) -> None:

@@ -132,6 +132,7 @@ def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
         (r":chosen 1 ", ":chosen 1.5 ", "broken memory"),
         (r":epoch 0", ":epoch -1", ":epoch -1; wanted a number from 0"),
         (r":episodes 1", f":episodes {MOST}", f":episodes {MOST}; wanted a number from 0 to {MOST}"),
+        (r":epoch 0", ":epoch 2", ":epoch 2 of 'robot', whose :episodes are 1; wanted no later one"),
         (r":chosen 1 ", f":chosen {MOST} ", f"wanted numbers from 0 to {MOST}"),
         (r"m:counter_\S+ a owl:NamedIndividual, :Counter", "m:other a :Counter", "lacks a part"),
     ],
@@ -141,6 +142,15 @@ def test_a_part_that_is_missing_or_cannot_be_is_named(old: str, new: str, said: 
     assert re.search(old, text)
     with pytest.raises(KnowledgeError, match=re.escape(said)):
         read(re.sub(old, new, text, count=1))
+
+
+@pytest.mark.parametrize("place", [-1, 3])
+@pytest.mark.parametrize("role", [2, 0])
+def test_a_method_names_no_role_that_it_lacks(role: int, place: int) -> None:
+    text = written(Method("MOVE", 2, (("PICK", (2,)),), (OpenRole("Place", ("AT", (0,)), None),)))
+    edited = text.replace(f":Parameter ; :index {role} ", f":Parameter ; :index {place} ")
+    with pytest.raises(KnowledgeError, match=f"names role {place} of 3"):
+        read(edited)
 
 
 def test_probabilities_have_half_a_choice_and_half_a_pass_behind_them() -> None:

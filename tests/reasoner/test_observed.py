@@ -44,3 +44,13 @@ def test_observations_of_another_scene_are_refused(tmp_path: Path) -> None:
         load_observed(tmp_path / "observed.ttl", reading)
     with pytest.raises(KnowledgeError, match="no such file"):
         load_observed(tmp_path / "none.ttl", reading)
+
+
+def test_a_value_that_nothing_has_is_not_observed(tmp_path: Path) -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    save_observed(tmp_path / "observed.ttl", {CUP2: "location8"}, reading.names, graph.scene)
+    text = (tmp_path / "observed.ttl").read_text()
+    (tmp_path / "observed.ttl").write_text(text.replace("#location8>", "#location88>"))
+    with pytest.raises(KnowledgeError, match=r"observed.ttl: .*location88 isn't declared.*; observe this scene anew"):
+        load_observed(tmp_path / "observed.ttl", reading)

@@ -93,6 +93,14 @@ def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(t
     assert read(load(path)).problem.goal == read(load("drawers-small")).problem.goal
 
 
+def test_what_a_scene_states_of_what_cannot_be_so_is_not_so(tmp_path: Path) -> None:
+    """A drawer can be opened, an album can't; with what is said of the album nothing follows from its being open."""
+    path = tmp_path / "mine.ttl"
+    said = ":open_album a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :album ; c:situationType d:OPENED ."
+    path.write_text((SCENES / "drawers-small.ttl").read_text() + said)
+    assert read(load(path)).problem.initial == read(load("drawers-small")).problem.initial
+
+
 def test_several_conditions_may_stand_together_wherever_one_stands(tmp_path: Path) -> None:
     domain = (SCENES.parent / "domains" / "drawers.ttl").read_text()
     together = "c:precondition :L2_TAKE.all ;"
