@@ -46,6 +46,7 @@ def shortest(
     most: int = 1_000_000,
     deadline: float | None = None,
     counts: Counts | None = None,
+    known: float = math.inf,
 ) -> Shortest:
     """Return a cheapest plan cheaper than `upper`, or why none is returned.
 
@@ -59,6 +60,8 @@ def shortest(
     deadline : float, optional
     counts : Counts, optional
         Grows by what is generated and expanded.
+    known : float
+        States reached after which only a bound is returned: all of them will have to be expanded, if there is no plan.
     """
     counts = counts or Counts()
     goal, costs, priced = task.goal, task.costs, bool(task.prices)
@@ -80,7 +83,7 @@ def shortest(
                 state, operator = came_from[state]
                 steps.append(operator)
             return Shortest(f, tuple(steps[::-1]), g)
-        if expanded >= most or (deadline is not None and perf_counter() > deadline):
+        if expanded >= most or len(g) > known or (deadline is not None and perf_counter() > deadline):
             return Shortest(lower, None, g)
         expanded += 1
         counts.expanded += 1

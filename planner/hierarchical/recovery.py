@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from planner.hierarchical.refinement_cache import MOST_OPERATORS, NEAR, WHOLE
+from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE, WIDER
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.subproblem import MAKING
@@ -165,7 +165,7 @@ class Recovery:
         What is expected is searched first, with as much work as one small world may cost.
         """
         call = self.call
-        if call.advice is not None and call.advice.expects and call.segments.worked < NEAR.work:
+        if call.advice is not None and call.advice.expects and call.segments.worked < WIDER.work:
             return
         if self._lowest is None:
             self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline, call.segments.watch)

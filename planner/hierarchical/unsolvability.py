@@ -280,7 +280,7 @@ def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | 
     """Return that none of all states fulfils the goal, if that is so and at most so many have to be looked at."""
     from planner.grounded.shortest import shortest
 
-    found = shortest(task, most=most, deadline=deadline)
+    found = shortest(task, most=most, deadline=deadline, known=most)
     if found.plan is not None or found.bound < math.inf:
         return None
     states = list(found.states)
