@@ -339,12 +339,15 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
     from planner.grounded.best_first import search
     from planner.grounded.grounding import ground
     from planner.grounded.task import Task
-    from planner.plan import Limits, Status
+    from planner.plan import NO_MEMORY, Limits, Status
     from reasoner.pddl.importing import imported
     from reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
-    task = ground(scene.problem)
+    try:
+        task = ground(scene.problem)
+    except MemoryError:
+        task = NO_MEMORY
     if not isinstance(task, Task):
         print(task.text)
         return

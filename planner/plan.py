@@ -100,6 +100,9 @@ class Reason:
     terms: tuple[str, ...] = ()
 
 
+NO_MEMORY = Reason("there isn't enough memory to go on")
+
+
 @dataclass(frozen=True)
 class Broken:
     """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.

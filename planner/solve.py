@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import Limits, Outcome, OutOfTimeError, Reason
+from planner.plan import NO_MEMORY, Limits, Outcome, OutOfTimeError, Reason, Status
 from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
@@ -82,7 +82,10 @@ def solve(request: Request) -> Outcome:
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
-    outcome = MODES[request.mode](request)
+    try:
+        outcome = MODES[request.mode](request)
+    except MemoryError:
+        return Outcome(Status.GAVE_UP, reason=NO_MEMORY)
     if outcome.plan is None:
         return outcome
     faults = validate(request.problem, outcome.plan)

@@ -20,6 +20,7 @@ import math
 from array import array
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 from operator import or_
@@ -33,11 +34,11 @@ from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import Effort, EvaluateMany, effort
 from planner.grounded.hff_dense import heuristic as dense
 from planner.grounded.hff_numba import automatic
-from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, OutOfMemoryError, Seen, by_novelty, landmarks
+from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
-from planner.plan import Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan import NO_MEMORY, Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from reasoner.symbols import Problem, State
 
 BOOST = 1000
@@ -152,6 +153,8 @@ def plan_level(
         return Outcome(
             Status.GAVE_UP, reason=Reason(f"grounding stopped at a limit: {error}"), seconds=perf_counter() - began
         )
+    except MemoryError:
+        return Outcome(Status.GAVE_UP, reason=NO_MEMORY, seconds=perf_counter() - began)
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
     found = search(task, limits, deadline)
@@ -231,10 +234,10 @@ def search(
             done = next(search_)
             total += done
             spent[turn] += done / share
-        except OutOfMemoryError:
+        except MemoryError:
             del searches[turn], spent[turn], kinds[turn]
             if not searches:
-                return Flat(Status.GAVE_UP, (), Reason("every search holds as many states as it may"), counts)
+                return Flat(Status.GAVE_UP, (), NO_MEMORY, counts)
         except StopIteration as end:
             if end.value is None:
                 return Flat(
@@ -250,7 +253,9 @@ def search(
                 slow = [one for (_, one), kind in zip(searches, kinds, strict=True) if kind.slow]
                 plan = _again(task, slow, plan, deadline)
             shortening = SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING
-            best = shorter(task, plan, shortening, deadline, portfolio.restarts)
+            best: Sequence[int] = plan
+            with suppress(MemoryError):  # then it stays as it is
+                best = shorter(task, plan, shortening, deadline, portfolio.restarts)
             return Flat(Status.SOLVED, tuple(best), None, counts, total)
         if total >= most_work:
             return Flat(Status.GAVE_UP, (), Reason("the limit of work came first"), counts, total)
@@ -272,7 +277,7 @@ def _again(
         try:
             while work < AGAIN and (deadline is None or perf_counter() < deadline):
                 work += next(search_)
-        except OutOfMemoryError:
+        except MemoryError:
             continue
         except StopIteration as end:
             other = plan if end.value is None else _path(*end.value)
@@ -372,7 +377,7 @@ def _best_first(
 
     Raises
     ------
-    OutOfMemoryError
+    MemoryError
         There are more states and operators than it may keep.
     """
     goal = task.goal
@@ -404,7 +409,7 @@ def _best_first(
         counts.evaluated += len(now)
         yield work
         if len(came_from) * (STATE_BYTES + task.size // 4) + queues.bytes > MOST_BYTES:
-            raise OutOfMemoryError
+            raise MemoryError
         at_once = min(2 * at_once, evaluate.width)
         for (state, which, rank), evaluation in zip(now, evaluations, strict=True):
             if evaluation is None:

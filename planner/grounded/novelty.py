@@ -31,10 +31,6 @@ Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""
 
 
-class OutOfMemoryError(Exception):
-    """A search holds as many states as it may."""
-
-
 def by_novelty(
     task: Task,
     evaluate: Evaluate,
@@ -49,7 +45,7 @@ def by_novelty(
 
     Raises
     ------
-    OutOfMemoryError
+    MemoryError
         There are more states than it may keep.
     """
     goal, applied = task.goal, task.applied
@@ -71,7 +67,7 @@ def by_novelty(
             yield work
             work = 0
             if len(seen) > most:
-                raise OutOfMemoryError
+                raise MemoryError
         if wanted < 0:
             evaluation = evaluate(state)
             counts.evaluated += 1

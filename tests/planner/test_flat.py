@@ -7,6 +7,7 @@ from collections.abc import Generator
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from planner.grounded.best_first import ahead, plan_level, search
@@ -18,7 +19,8 @@ from planner.grounded.hff_numba import heuristic as compiled_heuristic
 from planner.grounded.novelty import Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
-from planner.plan import Counts, Limits, Plan, Reason, Status, TooLargeError
+from planner.plan import NO_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
+from planner.solve import MODES, Request, solve
 from planner.validation import validate
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse
@@ -354,7 +356,21 @@ def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monke
     monkeypatch.setattr("planner.grounded.best_first.MOST_BYTES", 0)
     outcome = plan_level(carrier(40))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
-    assert outcome.reason.text == "every search holds as many states as it may"
+    assert outcome.reason.text == "there isn't enough memory to go on"
+
+
+def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planner.grounded.best_first.landmarks", lambda task: np.empty(1 << 55))
+    outcome = plan_level(carrier(8))
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert not validate(carrier(8), outcome.plan)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_call_that_runs_out_of_memory_gives_up_and_says_so(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MODES, mode, lambda request: np.empty(1 << 55))
+    outcome = solve(Request(carrier(2), mode))
+    assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, NO_MEMORY)
 
 
 def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
