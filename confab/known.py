@@ -19,7 +19,7 @@ from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from reasoner.limits import Deadline
 from reasoner.names import Names, nearest
 from reasoner.reading.goals import parse_fact
-from reasoner.reading.problem import Reading, read
+from reasoner.reading.problem import Reading, read, read_names
 from reasoner.symbols import Fact, Problem
 
 if TYPE_CHECKING:
@@ -77,7 +77,11 @@ class Known:
     def names(self) -> Names:
         """Short names and the IRIs behind them; where the scene can't be read, of all that its files speak of."""
         try:
-            return self.reading.names
+            if "reading" in self.__dict__:
+                return self.reading.names
+            self.settle()
+            self.knowledge.require_whole()
+            return read_names(self.knowledge)
         except KnowledgeError:
             quads = self.knowledge.store
             return Names(term.value for q in quads for term in q.triple if isinstance(term, ox.NamedNode))

@@ -140,7 +140,12 @@ class KnowledgeGraph:
         KnowledgeError
             The query is no SPARQL; the message has line and column.
         """
-        return [tuple(row) for row in self.solutions(query, graphs, **bindings)]
+        rows: list[Row] = []
+        for row in self.solutions(query, graphs, **bindings):
+            rows.append(tuple(row))
+            if not len(rows) % 4096:
+                self.deadline.check("asking the knowledge graph")
+        return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
         """Return what `select` returns one row after the other, for those who read very many; errors as there."""

@@ -163,13 +163,24 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     KnowledgeError
         An object has no value of a situation type, or two; a behaviour's condition lacks a part. The message names it.
     """
-    members = [
-        (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
-    ]
+    members = _members(graph)
     schema = read_schema(graph) if schema is None else schema
     facts = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
     tuples = nodes_of(core_triple(row) for row in graph.select(TUPLES, SCENE))
-    return reading_of(graph.scene, frame(schema, members), facts, tuples)
+    known = frame(schema, members)
+    graph.deadline.check("reading the scene")
+    return reading_of(graph.scene, known, facts, tuples)
+
+
+def read_names(graph: KnowledgeGraph) -> Names:
+    """Return the short names of a whole scene, as `read` does, without what it says of them."""
+    return _names(read_schema(graph), _members(graph))
+
+
+def _members(graph: KnowledgeGraph) -> list[Member]:
+    return [
+        (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
+    ]
 
 
 def read_schema(graph: KnowledgeGraph) -> Schema:
@@ -257,17 +268,7 @@ def frame(
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
-    named = schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation")
-    typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
-    names = Names(
-        {
-            *named,
-            *(iri for iri in namesakes if iri not in nodes),
-            *chain.from_iterable((individual, kind) for individual, kind, _ in instances),
-            *chain.from_iterable((sub, *above) for sub, above in supers.items()),
-            *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
-        }
-    )
+    names = _names(schema, instances, namesakes)
     definitions = _definitions(schema, names)
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
@@ -293,6 +294,21 @@ def frame(
         _check_behavior(replace(rule.behavior, level=domain.situations[rule.situation].level), domain)
     _asked(domain)
     return Frame(schema, parts, domain, classes, parents, properties, lifted)
+
+
+def _names(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
+    """Return short names of a schema's terms, of some individuals, and of others that may end alike."""
+    nodes = schema.nodes
+    typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
+    return Names(
+        {
+            *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
+            *(iri for iri in namesakes if iri not in nodes),
+            *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
+            *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
+            *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
+        }
+    )
 
 
 def reading_of(

@@ -44,6 +44,17 @@ def test_trust_is_kept_in_the_file_and_not_passed_on(tmp_path: Path, scene: conf
     assert not third.advisor.trusted
 
 
+def test_a_memory_is_read_without_the_facts_of_its_scene(tmp_path: Path, scene: confab.Scene) -> None:
+    memory = confab.Memory.of(scene)
+    memory.teach(scene, scene.plan())
+    memory.save(tmp_path / "memory.ttl")
+    fresh = confab.load("beverage-serving")
+    assert confab.Memory.load(tmp_path / "memory.ttl", fresh).experience.said == memory.experience.said
+    assert "reading" not in vars(fresh)
+    assert fresh.names.agree(fresh.reading.names)
+    assert fresh.reading.names.agree(fresh.names)
+
+
 def test_a_memory_that_is_looked_after_without_its_scene_still_speaks_of_its_terms(
     tmp_path: Path, scene: confab.Scene
 ) -> None:
