@@ -46,6 +46,10 @@ FLOWING = 0.1
 NEARLY = 0.9
 """Of what is wanted, what a pour has to give."""
 
+SPARE = 0.25
+"""Servings beyond whole ones that are meant to stay in a source: half of what rounding forgives. What was stuck in a neck comes all
+at once, and nothing can be put back; too little only means to tilt again."""
+
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
     """Carry a vessel over another one, to where it can be tilted with its lip over the other's opening."""
@@ -74,8 +78,8 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
     had, got = world.inside(source), world.inside(target)
     enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
-    least = (numbers["least_poured"] + 1 / serving) / NEARLY  # a bead may go astray
-    enough += numbers["along"] * max(had / serving - round(had / serving), least - enough)
+    enough += numbers["along"] * max(had / serving - round(had / serving) - SPARE, NEARLY - enough)
+    nearly = max(NEARLY * enough, numbers["least_poured"] + 1 / serving)  # a bead may go astray
 
     def poured() -> float:
         return (had - world.inside(source)) / serving
@@ -83,13 +87,13 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     servo.turn(numbers["hold_back"], numbers["fast"])
     steepest, more = 0.0, True
     while more:
-        more = bool(world.beads) and servo.meter(numbers, enough, poured)
+        more = bool(world.beads) and servo.meter(numbers, enough, nearly, poured)
         if not world.beads:
             servo.turn(numbers["pour_angle"], numbers["fast"])
         steepest = max(steepest, servo.angle)
         servo.turn(numbers["hold_back"], numbers["fast"])
         world.run(round(numbers["settle"] * world.rate))
-        more = more and poured() < NEARLY * enough  # less was on its way than it looked like
+        more = more and poured() < nearly  # less was on its way than it looked like
     measured = {"steepest_rad": steepest, "tilt_rad": tilt_of(attempt.hand.frame()[0])} | attempt.check_grip(numbers)
     if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
         raise SkillError("tracking error", world.touching(attempt.hand), **measured)
@@ -257,10 +261,11 @@ class _Servo:
                 self.world.check_course(self.hand)
         raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
-    def meter(self, numbers: Numbers, enough: float, poured: Callable[[], float]) -> bool:
+    def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
         """Turn on slowly while nothing flows and wait while it does; return whether `enough` is `poured`, or patience ends.
 
-        What flows while the hand turns back, `lag` seconds long, counts as poured.
+        What flows while the hand turns back, `lag` seconds long, counts as poured. Where the flow stops, what is `nearly` enough
+        is enough: what was stuck in the neck comes all at once.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))
@@ -270,7 +275,7 @@ class _Servo:
             now, rate = looks[-1], (looks[-1] - looks[0]) / FLOWING
             flowing = round(numbers["flow"] / self.tick) if now > before else flowing - 1
             before, still = now, still + 1 if flowing <= 0 and self.angle == numbers["pour_angle"] else 0
-            if now + numbers["lag"] * rate >= enough:
+            if now + numbers["lag"] * rate >= enough or (flowing <= 0 and now >= nearly):
                 return True
             if still > numbers["wait"] / self.tick:
                 return False

@@ -1,0 +1,41 @@
+"""Watching a flow: when the hand turns on, waits, and takes the vessel back."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from sim.pouring import _Servo, _Way
+
+NUMBERS = {"lag": 0.3, "flow": 0.15, "wait": 1.0, "pour_angle": 2.09, "slow": 0.3}
+
+
+def servo_at(angle: float) -> tuple[_Servo, Any]:
+    """Return a servo of a hand of one joint, which is as it is told, and its world, which counts steps."""
+    world: Any = SimpleNamespace(rate=240, steps=0, check_course=lambda hand: None)
+    world.run = lambda steps: setattr(world, "steps", world.steps + steps)
+    hand: Any = SimpleNamespace(posture=np.zeros(1), command=lambda posture, speed: None)
+    return _Servo(world, hand, _Way(np.array([0.0, 3.0]), np.array([[0.0], [3.0]])), angle), world
+
+
+def test_what_has_stopped_flowing_and_is_nearly_enough_is_enough() -> None:
+    servo, world = servo_at(1.7)
+
+    def poured() -> float:
+        """Eighteen beads at ten a second, then something is stuck until the hand turns on: a burst."""
+        return 1.6 if servo.angle > 1.75 else min(world.steps // 24, 18) / 20
+
+    assert servo.meter(NUMBERS, enough=1.15, nearly=0.9, poured=poured)
+    assert poured() == 0.9
+
+
+def test_where_the_flow_stops_short_the_hand_turns_on() -> None:
+    servo, world = servo_at(1.7)
+
+    def poured() -> float:
+        return 1.2 if servo.angle > 1.75 else min(world.steps // 24, 12) / 20
+
+    assert servo.meter(NUMBERS, enough=1.15, nearly=0.9, poured=poured)
+    assert poured() == 1.2
