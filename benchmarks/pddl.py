@@ -77,7 +77,7 @@ def main() -> None:
 def wanted() -> list[str]:
     """Return the planners to run: all, or those that CONFAB_PLANNERS names."""
     named = os.environ.get("CONFAB_PLANNERS")
-    return named.split(",") if named else ["confab", "confab-fast", "pyperplan", "lama-first", "grounding", "read-back"]
+    return named.split(",") if named else ["confab", "pyperplan", "lama-first", "grounding", "read-back"]
 
 
 def problems(folder: Path) -> Iterator[tuple[str, Path, Path]]:
@@ -115,7 +115,7 @@ def peers() -> str:
 def planners(python: str | None) -> dict[str, list[str]]:
     """Return each planner's command; ``{domain}``, ``{problem}`` and ``{plan}`` are put in."""
     ours = [sys.executable, "-m", "benchmarks.pddl", "{domain}", "{problem}", "{plan}"]
-    confab = {"confab": ours, "confab-fast": [*ours, "fast"]}
+    confab = {"confab": ours}
     if python is None:
         return confab
     inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
@@ -333,7 +333,7 @@ def read_back(python: str) -> None:
             print(f"| {scene} | {len(steps)} | {'no: ' + str(faults[0]) if faults else 'yes'} | {said} |", flush=True)
 
 
-def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
+def _solve(domain: str, problem: str, target: str) -> None:
     """Solve one problem with the flat core and write its plan (what a benchmarked process does)."""
     gc.disable()
     from planner.grounded.best_first import search
@@ -358,8 +358,6 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
         part.write_text("".join(f"({line})\n" for line in steps if line))
         part.replace(target)
 
-    if not fast:
-        sys.modules["numba"] = None  # type: ignore[assignment]  # as if it weren't installed
     found = search(task, Limits(expansions=10**9), found=write)
     print(found.status, found.counts)
     if found.status is Status.SOLVED:
@@ -367,4 +365,4 @@ def _solve(domain: str, problem: str, target: str, fast: bool) -> None:
 
 
 if __name__ == "__main__":
-    _solve(sys.argv[1], sys.argv[2], sys.argv[3], "fast" in sys.argv[4:])
+    _solve(*sys.argv[1:4])

@@ -375,7 +375,7 @@ def within(seconds: float, variant: Callable[[], Outcome]) -> Outcome:
     try:
         with budget(seconds):
             return variant()
-    except (LimitError, SystemError) as limit:  # the latter is what numba makes of what a signal raises
+    except LimitError as limit:
         return Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
 
 

@@ -29,11 +29,11 @@ from typing import NamedTuple, TypeAlias
 
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation
+from planner.grounded.hff import heuristic as relaxed
 from planner.grounded.hff_amounts import heuristic as with_amounts
 from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import Effort, EvaluateMany, effort
 from planner.grounded.hff_dense import heuristic as dense
-from planner.grounded.hff_numba import automatic
 from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
@@ -185,8 +185,7 @@ def search(
     deadline : float, optional
         On the clock of `time.perf_counter`.
     evaluate : function of a state, optional
-        In place of h_FF: plain at first and compiled once the search turns out to be long (`planner.grounded.hff_numba.automatic`);
-        for many states of the searches by h by arrays, where these are less work.
+        In place of h_FF; where that is less work, the searches by h evaluate many states at once, by arrays.
     found : function of a plan, optional
         Called with the first plan, before it is made shorter.
     most_work : float
@@ -206,7 +205,7 @@ def search(
     else:
         width = min(needed.width, portfolio.widest)
         arrays = evaluate is None and needed.by_arrays(width) < width * work
-        evaluate = evaluate or _on_bits(task, automatic(bits))
+        evaluate = evaluate or _on_bits(task, relaxed(bits))
         many = _all_on_bits(task, cache(lambda: dense(bits))) if arrays else None
     often = _Evaluator(evaluate, many, needed, min(needed.width, portfolio.widest) if many else 1)
     begun = evaluate(task.initial)

@@ -159,7 +159,6 @@ UNWANTED = (
         "reasonable",
         "urllib3",
         "imageio",
-        "numba",
         "numpy",
         "pydantic",
     ),

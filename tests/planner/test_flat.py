@@ -15,7 +15,6 @@ from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
 from planner.grounded.hff_dense import Effort
 from planner.grounded.hff_dense import heuristic as by_arrays
-from planner.grounded.hff_numba import heuristic as compiled_heuristic
 from planner.grounded.novelty import Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
@@ -99,7 +98,7 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
 
         return evaluate
 
-    monkeypatch.setattr("planner.grounded.best_first.automatic", slow)
+    monkeypatch.setattr("planner.grounded.best_first.relaxed", slow)
     monkeypatch.setattr("planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
     monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
     for module in ("plan", "grounded.best_first", "grounded.plan_windows", "grounded.reachability"):
@@ -371,31 +370,3 @@ def test_a_call_that_runs_out_of_memory_gives_up_and_says_so(mode: str, monkeypa
     monkeypatch.setitem(MODES, mode, lambda request: np.empty(1 << 55))
     outcome = solve(Request(carrier(2), mode))
     assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, NO_MEMORY)
-
-
-def test_the_kernel_takes_over_without_changing_the_plan(tabletop: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="needs the extra 'fast'")
-    task = ground(tabletop)
-    assert isinstance(task, Task)
-    plain = search(task)
-    monkeypatch.setattr("planner.grounded.hff_numba.PLAIN", 5 * len(task.owners))
-    assert search(task) == plain
-
-
-def test_the_compiled_heuristic_is_the_plain_one(tabletop: Problem) -> None:
-    pytest.importorskip("numba", reason="needs the extra 'fast'")
-    for problem in (tabletop, corridor(30)):
-        task = ground(problem)
-        assert isinstance(task, Task)
-        plain, compiled = heuristic(task), compiled_heuristic(task)
-        choice, state = random.Random(0), task.initial
-        for _ in range(40):
-            evaluation = plain(state)
-            assert compiled(state) == evaluation
-            assert evaluation is not None
-            after = task.applied(state, choice.choice(evaluation[2]))
-            assert after is not None
-            state = after
-            if plain(state) is None:
-                assert compiled(state) is None
-                break
