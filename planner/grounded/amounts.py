@@ -97,10 +97,10 @@ class AmountTable:
         self.problem = problem
         situations = problem.domain.situations
         changed = {effect.situation for behavior in problem.domain.at_level(level) for effect in behavior.amounts}
+        counted = {s.name for s in situations.values() if s.quantity is not None and s.level <= level}
         self.now: dict[Symbol, Exact] = {
-            symbol: _exact(Fraction(value))
-            for symbol, value in sorted(initial.items())
-            if situations[symbol.situation].quantity is not None and situations[symbol.situation].level <= level
+            symbol: _exact(Fraction(initial[symbol]))
+            for symbol in sorted(symbol for symbol in initial if symbol.situation in counted)
         }
         self.place = {s: i for i, s in enumerate(symbol for symbol in self.now if symbol.situation in changed)}
         self.first = tuple(self.now[symbol] for symbol in self.place)

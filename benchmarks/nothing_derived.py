@@ -1,0 +1,89 @@
+"""What derived situations and amounts cost where nothing is derived or counted: tables with and without what serves only them.
+
+python -m benchmarks nothing_derived
+CONFAB_PAIRS=10 …            how many calls of each kind, by turns in one process
+
+Without: the scene isn't asked for definitions of value properties, chains and rules; none is compiled; a value is what is wanted
+if it is the same, and not if it lies within bounds.
+"""
+
+from __future__ import annotations
+
+import gc
+import operator
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from importlib import import_module
+from pathlib import Path
+from statistics import median
+from time import process_time
+from unittest.mock import patch
+
+import confab
+from benchmarks.before import SEED
+from reasoner.generate import write_scene
+from reasoner.reading import problem
+
+CASES = (("served", 50), ("handover", 50), ("served", 200), ("served", 1000))
+"""Families and how many objects."""
+PART = re.compile(
+    r"\n  UNION \{(?:(?!\n  UNION ).)*BIND\(\"(?:expression|axiom|swrl|range)\" AS \?part\)(?:(?!\n  UNION |\n\}).)*",
+    re.DOTALL,
+)
+"""A part of the query for the schema that serves only what is derived or counted."""
+COMPARING = (
+    "planner.hierarchical.subplans",
+    "planner.hierarchical.refinement_cache",
+    "planner.hierarchical.subproblem",
+    "planner.hierarchical.serialization",
+    "planner.hierarchical.planner",
+    "planner.validation",
+)
+"""The modules that ask whether a value is as wanted."""
+
+
+@contextmanager
+def without() -> Iterator[None]:
+    """Do without what serves only derived situations and amounts."""
+    left, parts = PART.subn("", problem.SCHEMA)
+    assert parts == 4, f"wanted 4 parts of the query, found {parts}"
+    with ExitStack() as stack:
+        stack.enter_context(patch.object(problem, "SCHEMA", left))
+        stack.enter_context(patch.object(problem, "_rules", lambda *_: {}))
+        for name in COMPARING:
+            stack.enter_context(patch.object(import_module(name), "meets", operator.eq))
+        yield
+
+
+def call(path: Path) -> tuple[float, int]:
+    """Return the CPU seconds of a whole call and the length of its plan."""
+    gc.collect()
+    begin = process_time()
+    found = confab.load(path).plan()
+    return process_time() - begin, len(found.plan.primitives)
+
+
+def main() -> None:
+    """Print the table."""
+    pairs = int(os.environ.get("CONFAB_PAIRS", "10"))
+    print("| family | n | primitives | CPU s | without | ratio, median of pairs | of the least of each |")
+    print("|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for family, n in CASES:
+            path = Path(folder) / f"{family}.ttl"
+            write_scene(path, family, n, 2, 0, SEED)
+            call(path)
+            now, bare = list[float](), list[float]()
+            for i in range(pairs):
+                for kind in (now, bare) if i % 2 else (bare, now):
+                    with ExitStack() as stack:
+                        if kind is bare:
+                            stack.enter_context(without())
+                        seconds, steps = call(path)
+                        kind.append(seconds)
+            ratio = median(a / b for a, b in zip(now, bare, strict=True))
+            cells = f"{median(now):.3f} | {median(bare):.3f} | {ratio:.3f} | {min(now) / min(bare):.3f}"
+            print(f"| {family} | {n} | {steps:,} | {cells} |", flush=True)
