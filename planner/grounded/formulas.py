@@ -140,7 +140,9 @@ class Formulas:
         if key not in self._known:
             solutions, kinds = self._solutions(part, part.unbound, bound), part.kinds
             each = ((self.condition(c, found, kinds, negated) for c in part.conditions) for found in solutions)
-            self._known[key] = self.all_of(map(self.any_of, each)) if negated else self.any_of(map(self.all_of, each))
+            self._known[key] = (
+                self.named(self.all_of(map(self.any_of, each))) if negated else self.any_of(map(self.all_of, each))
+            )
         return self._known[key]
 
     def _groups_of(
@@ -298,6 +300,15 @@ class Formulas:
                 return None
             found.update(part)
         return tuple(sorted(found))
+
+    def named(self, literals: Literals) -> Literals:
+        """Return one derived bit for a conjunction of several: that nobody stands somewhere is asked by many operators."""
+        if literals is None or len(literals) < 2:
+            return literals
+        if (literals,) not in self.derived:
+            self.derived[literals,] = self.fresh()
+            self._groups[self.derived[literals,]] = (literals,)
+        return (self.derived[literals,],)
 
     def any_of(self, parts: Iterable[Literals]) -> Literals:
         """Return the disjunction: one derived bit unless it is simpler than that."""

@@ -49,6 +49,9 @@ from reasoner.symbols import (
 
 MOST_ROWS = 20_000_000
 """Of one join: about 1 GB."""
+SAID_ONCE = 20_000
+"""So many conditions less, of all operators, are worth working out in each state what is asked often: going through them for one
+relaxed plan takes a millisecond."""
 
 
 def ground(
@@ -245,7 +248,8 @@ class _Assembly:
     ) -> tuple[Derived, list[tuple[tuple[int, ...], int]], Grouped | None]:
         """Return the bits that follow from others; for the relaxed task each way in which one does; and what each bit means.
 
-        A bit that follows in one way only stands for what that way asks, and isn't kept itself.
+        A bit that follows in one way only stands for what that way asks, and isn't kept itself, unless that is much and
+        asked often: that nobody stands in a place.
         """
         formulas = self.formulas
         ways: dict[int, dict[tuple[int, ...], None]] = {}  # of each bit of a situation type that is defined
@@ -267,6 +271,12 @@ class _Assembly:
         for groups, bit in formulas.derived.items():
             ways[bit] = dict.fromkeys(groups)
         means: dict[int, tuple[int, ...]] = {}
+        none = np.empty(0, np.int64)
+        asked = np.bincount(np.concatenate([none, *(bit for _, bit in needs.values())]), minlength=formulas.size)
+        only = {bit: len(next(iter(its))) for bit, its in ways.items() if len(its) == 1}
+        saved = {bit: int(size * asked[bit] - size - asked[bit]) for bit, size in only.items()}
+        if sum(less for less in saved.values() if less > 0) > SAID_ONCE:
+            means |= {bit: (bit,) for bit, less in saved.items() if less > 0}
         for bit in ways:
             _meaning(bit, ways, circular, means)
         kept = {
@@ -355,7 +365,7 @@ class _Assembly:
                 if bit >= 0:
                     symbol_bits[symbol].append(bit)
         moves = self._moves(rows, first)
-        add = self._adds(effects, need, symbol_bits, count, self._pushed(moves, owner))
+        add, left = self._adds(effects, need, symbol_bits, count, self._pushed(moves, owner))
         reached.check_time()
         by_owner = np.lexsort((effects[:, 1], owner[effects[:, 0]])) if len(effects) else np.empty(0, np.int64)
         ordered = effects[by_owner]
@@ -434,7 +444,7 @@ class _Assembly:
         # operator of no cost there, owned by nobody.
         telling = (np.arange(count) < operators) | (np.diff(add.starts) > 0)
         relaxed_needs, relaxed_adds, owner = _with_derived(
-            _only(need, telling), _only(add, telling), owner[telling], cases
+            _only(need, telling), _only(add, telling), owner[telling], [*cases, *left]
         )
         return Task(
             problem=reached.problem,
@@ -558,8 +568,13 @@ class _Assembly:
         symbol_bits: Mapping[int, Sequence[int]],
         count: int,
         pushed: tuple[Ints, Ints],
-    ) -> Grouped:
-        """Return the bits that each relaxed operator may set: complements only of values that the symbol may have had."""
+    ) -> tuple[Grouped, list[tuple[tuple[int, ...], int]]]:
+        """Return the bits that each relaxed operator may set: complements only of values that the symbol may have had.
+
+        Where these are many, operators set a bit of the relaxed task that says "changed"; what follows from it is returned, too.
+        """
+        changed: dict[int, int] = {}
+        opposites: dict[int, dict[int, int]] = {}
         positive = effects[:, 3] >= 0
         pairs = [(effects[positive, 0], effects[positive, 3]), pushed]
         complements = self.formulas.complements
@@ -571,17 +586,26 @@ class _Assembly:
             before = symbol_of[need.items]
             stride = self.symbols + 1
             known = dict(zip((owner * stride + before).tolist(), need.items.tolist(), strict=True))
-            extra_row, extra_bit = [], []
+            opposites = {
+                symbol: {bit: complements[bit] for bit in bits if bit in complements}
+                for symbol, bits in symbol_bits.items()
+            }
+            lost: list[tuple[int, int, list[int]]] = []
             for number, (relaxed, _, symbol, bit) in enumerate(effects.tolist()):
                 if not number % 1000:
                     self.reached.check_time()
-                had = known.get(relaxed * stride + symbol)
-                for value in symbol_bits[symbol] if had is None else (had,):
-                    if value != bit and value in complements:
-                        extra_row.append(relaxed)
-                        extra_bit.append(complements[value])
-            pairs.append((np.array(extra_row, np.int64), np.array(extra_bit, np.int64)))
-        return _grouped(np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs]), count)
+                had, of = known.get(relaxed * stride + symbol), opposites[symbol]
+                lost.append((relaxed, symbol, [o for value, o in of.items() if value != bit and had in (None, value)]))
+            more = sum(len(bits) for _, _, bits in lost) - len(lost)
+            if more > SAID_ONCE and not self.reached.amounts.place:  # what was used up is counted by who sets a bit
+                several = dict.fromkeys(symbol for _, symbol, bits in lost if len(bits) > 1)
+                changed = {symbol: self.formulas.fresh() for symbol in several}
+            lost = [(r, s, [changed[s]] if s in changed and len(bits) > 1 else bits) for r, s, bits in lost]
+            extra = [(relaxed, bit) for relaxed, _, bits in lost for bit in bits]
+            both = np.array(extra, np.int64).reshape(-1, 2)
+            pairs.append((both[:, 0], both[:, 1]))
+        add = _grouped(np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs]), count)
+        return add, [((bit,), o) for symbol, bit in changed.items() for o in opposites[symbol].values()]
 
 
 def _only(groups: Grouped, wanted: Flags) -> Grouped:

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.grounded import grounding
 from planner.grounded.best_first import plan_level, search
 from planner.grounded.formulas import Formulas
 from planner.grounded.grounding import ground
+from planner.grounded.hff import heuristic
 from planner.grounded.task import Task
 from planner.language import DomainError
 from planner.plan import Limits, Reason, Status
@@ -277,3 +279,43 @@ def test_who_only_has_to_be_somewhere_is_forgotten_as_soon_as_nothing_asks_for_t
     task = grounded(problem)  # joined at once, 30 to the power of 6 rows
     assert isinstance(task, Task)
     assert len(task) == len(places)
+
+
+def parking(things: int, places: int) -> Problem:
+    """Things are put where nobody stands; from where doesn't matter."""
+    nobody = Witness("?y", "Thing", (ValueCondition("AT", ("?y",), "?v"),), True)
+    put = Behavior(
+        "PUT",
+        1,
+        (Parameter("?x", "Thing"), Parameter("?v", "Place")),
+        (),
+        (nobody,),
+        (ValueEffect("AT", ("?x",), "?v"),),
+    )
+    who, where = tuple(f"x{i}" for i in range(things)), tuple(f"p{i}" for i in range(places))
+    return Problem(
+        "urn:parking",
+        Domain({"AT": SITUATIONS["AT"]}, {"PUT": put}),
+        {"Thing": who, "Place": where},
+        {},
+        {Symbol("AT", (x,)): p for x, p in zip(who, where, strict=False)},
+        {Symbol("AT", (x,)): p for x, p in zip(who, where[1:], strict=False)},
+    )
+
+
+def test_what_many_operators_ask_is_said_once_and_means_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grounding, "SAID_ONCE", 1_000_000)
+    often = ground(parking(4, 6))
+    monkeypatch.setattr(grounding, "SAID_ONCE", 0)
+    once = ground(parking(4, 6))
+    assert isinstance(often, Task) and isinstance(once, Task)
+    assert transitions(often) == transitions(once)
+    assert len(once.needs.items) < len(often.needs.items) and len(once.adds.items) < len(often.adds.items)
+    relaxed = heuristic(often)(often.initial), heuristic(once)(once.initial)
+    assert relaxed[0] is not None and relaxed[1] is not None and relaxed[0][0] == relaxed[1][0]
+
+
+def test_that_nobody_stands_in_a_place_is_said_once_of_each_place() -> None:
+    task = ground(parking(40, 60))
+    assert isinstance(task, Task) and len(task) == 2400
+    assert len(task.needs.items) + len(task.adds.items) < 10 * len(task)  # 40 things and 60 places in each operator
