@@ -163,7 +163,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a planning call stops: expansions per search, and seconds for the whole call (None: no limit)."""
+    """Where a planning call stops: seconds for the whole call (None: no limit), and expansions.
+
+    These are of each search in the paper's mode; in the default one of all before the last resort, and as many for that.
+    """
 
     expansions: int = 200_000
     seconds: float | None = None

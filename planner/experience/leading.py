@@ -150,7 +150,7 @@ class Guide:
             steps = None
         finally:
             self.off = outer
-        if steps is not None and call.refiner.left_as_it_must(start, targets, keep) is None:
+        if steps is not None and call.refiner.left_wrong(start, targets, keep) is None:
             if level == self.first:
                 return steps  # made shorter in the end
             return list(call.refiner.lean(tuple(steps), start, targets, keep))

@@ -1,4 +1,4 @@
-"""The fast planner: goals in series, proofs where these get stuck, then flat search; what is found is shortened.
+"""The default planner: goals in series, proofs and more effort where these get stuck, then flat search; what is found is shortened.
 
 Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
 never that there is no plan.
@@ -7,10 +7,12 @@ never that there is no plan.
 stage                   decides                                         module
 ======================  ==============================================  ==============================
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
-more effort             where these get stuck                           `planner.hierarchical.recovery`
-static proofs           that a goal lacks a static fact                 `planner.hierarchical.unsolvability`
-relaxed reachability    that a goal can't be reached                    `planner.grounded.reachability`
-flat search             the rest, both ways, until a limit comes        `planner.grounded.best_first`
+static proofs           where these get stuck: that a goal lacks a      `planner.hierarchical.unsolvability`
+                        static fact, or two goals want one value
+more effort             where nothing is proved                         `planner.hierarchical.recovery`
+relaxed reachability    in between, that a goal can't be reached, or    `planner.grounded.reachability`
+                        that none of a few states fulfils all
+flat search             the rest, solved or unsolvable, until a limit   `planner.grounded.best_first`
 ======================  ==============================================  ==============================
 """
 
@@ -28,7 +30,6 @@ from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
-from planner.hierarchical.subplans import Watch, nobody
 from planner.levels import levels_left
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from reasoner.amounts import meets
@@ -56,7 +57,6 @@ def plan(
     limits: Limits = Limits(),  # noqa: B008 - frozen
     improve: int = IMPROVEMENTS,
     using: Compiled | None = None,
-    watch: Watch = nobody,
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
 ) -> Outcome:
@@ -70,9 +70,6 @@ def plan(
         How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
     using : Compiled, optional
         From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
-    watch : Watch, optional
-        Told the level of each expansion, and `None` before what costs most: detours for several goals, and lower levels where
-        relaxed reachability disproves nothing.
     leave_levels : bool
         Whether steps of a lower level may stand where a level has no plan that can be refined.
     advised : function of a call, optional
@@ -83,7 +80,7 @@ def plan(
     Outcome
     """
     with paused_collection():
-        return _plan(problem, limits, improve, using, watch, leave_levels, advised)
+        return _plan(problem, limits, improve, using, leave_levels, advised)
 
 
 def _plan(
@@ -91,7 +88,6 @@ def _plan(
     limits: Limits,
     improve: int,
     using: Compiled | None,
-    watch: Watch,
     leave_levels: bool,
     advised: Callable[[Call], None],
 ) -> Outcome:
@@ -100,7 +96,6 @@ def _plan(
     using = using or compiled(problem)
 
     call = Call(problem, using, deadline, limits.expansions)
-    call.segments.watch = watch
     advised(call)
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
@@ -142,6 +137,8 @@ def _plan(
 
     left = None if deadline is None else max(deadline - perf_counter(), 0.0)
     flat = plan_level(problem, limits=Limits(limits.expansions, left))
+    for level, counts in flat.search.items():
+        call.segments.counts[level].add(counts)
     found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
@@ -175,8 +172,8 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
     An object in a hand is at no place that the first level knows, so that none of its steps may begin there.
     """
     other = beside(call, call.problem, settled=True)
-    other.segments.watch = call.segments.watch
     other.segments.expanded += call.segments.expanded
+    other.segments.counts = call.segments.counts
     advised(other)
     return other
 

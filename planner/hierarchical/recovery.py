@@ -27,8 +27,6 @@ ALL = (WHOLE,)
 """All goals at once in the whole world."""
 FEW = 1_000
 """So many states of the lowest level, at least, are worth looking at."""
-COSTLY = 4
-"""From so many goals that need more than a few steps on, the observer is told."""
 Done = TypeVar("Done")
 
 
@@ -95,8 +93,6 @@ class Recovery:
             call.restarts += 1
             return True
         for level, attempt in self.ladder:
-            if not isinstance(attempt, Effort) and len(call.goal) - len(call.kept) >= COSTLY:
-                call.segments.watch(None)
             if attempt is ALL:
                 if self.together(level):
                     return True
@@ -116,9 +112,9 @@ class Recovery:
                 if self._astray(not isinstance(attempt, Effort)):
                     call.restarts += 1
                     return True
-        if call.moved:  # something was done since some of these attempts failed
+        if call.progressed:  # something was done since some of these attempts failed
             call.failed.clear()
-            call.moved = False
+            call.progressed = False
             return self.harder(asleep, before)
         return False
 
@@ -168,7 +164,7 @@ class Recovery:
         if call.advice is not None and call.advice.expects and call.segments.worked < WIDER.work:
             return
         if self._lowest is None:
-            self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline, call.segments.watch)
+            self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline)
         if not isinstance(self._lowest, Reason):
             self._looked = looked_at(self._lowest, call.segments, self._looked)
 

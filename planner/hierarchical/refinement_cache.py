@@ -26,7 +26,6 @@ MUCH = 1_500_000
 """What a search in a large world may cost, in states times operators."""
 NEAR, WIDER, WIDE, WHOLE = Width(10, 0, 50_000), Width(20), Width(160, 4, MUCH), Width(None, work=MUCH)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
-"""In which nothing is searched."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""
 LONG = 4
@@ -111,7 +110,7 @@ class Refiner:
                 found[situation, key] = value
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
-    def left_as_it_must(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
+    def left_wrong(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
         """Return a symbol touched since a mark, or a target, that isn't what it must be; None if all are."""
         now = self.table.now
         for cell, first in self.table.before(mark).items():
@@ -140,7 +139,7 @@ class Refiner:
                 self.table.undo(mark)
                 return None
             inner.append(again)
-        if self.left_as_it_must(mark, targets, self.segments.refining(level)) is not None:
+        if self.left_wrong(mark, targets, self.segments.refining(level)) is not None:
             self.table.undo(mark)
             return None
         return RefinedStep(level, name, arguments, done[0], tuple(inner))
@@ -190,7 +189,7 @@ class Refiner:
         if found is None:
             attempts: list[Effort | Sequence[Width]] = [SHORT, widths]
             for attempt in reversed(attempts) if name in self.long else attempts:
-                found = found or self.achieve(below, targets, keep, attempt)
+                found = self.achieve(below, targets, keep, attempt) if found is None else found
         if found is None:
             around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
@@ -246,7 +245,7 @@ class Refiner:
                     break
                 steps.append(step)
             if len(steps) == len(found):
-                if self.left_as_it_must(mark, targets, keep) is None:
+                if self.left_wrong(mark, targets, keep) is None:
                     return steps
                 table.undo(mark)
                 return None
@@ -269,7 +268,7 @@ class Refiner:
                     break
                 steps.append(step)
             if len(steps) == len(found):
-                astray = self.left_as_it_must(mark, targets, keep)
+                astray = self.left_wrong(mark, targets, keep)
                 if astray is None:
                     return steps
                 first = next((old for s, key, old in table.trail[mark:] if (s, key) == astray), None)
@@ -308,7 +307,7 @@ class Refiner:
                 self.table.undo(mark)
                 return None
             steps.append(step)
-        if self.left_as_it_must(mark, targets, keep) is not None:
+        if self.left_wrong(mark, targets, keep) is not None:
             self.table.undo(mark)
             return None
         if template.open and (self.drifting or len(steps) >= LONG):
@@ -321,7 +320,7 @@ class Refiner:
         """Do steps, done since a mark, without those that nothing here needs: alone, or with the step that undoes them."""
         for dropped in self._droppable(steps, mark, keep):
             rest = [step for i, step in enumerate(steps) if i not in dropped]
-            if self._redone(rest, mark) and self.left_as_it_must(mark, targets, keep) is None:
+            if self._redone(rest, mark) and self.left_wrong(mark, targets, keep) is None:
                 return self.lean(tuple(rest), mark, targets, keep)
         self._redone(steps, mark)
         return steps

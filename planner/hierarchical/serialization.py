@@ -36,7 +36,7 @@ Before: TypeAlias = "Mapping[Cell, Sequence[Cell]]"
 Harder: TypeAlias = "Callable[[Asleep, Before], bool]"
 """Achieves one of the goals that are asleep by more effort; whether that succeeded."""
 Again: TypeAlias = "Callable[[], list[RefinedStep] | None]"
-"""Does steps, or nothing if there are none."""
+"""Does steps anew and returns them; None, and nothing done, without any."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Call:
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
-        self.moved = False
+        self.progressed = False
         self.vain = 0
         """Work of small worlds that came to nothing since it was last asked whether steps led astray."""
         self.restarts = 0
@@ -202,7 +202,7 @@ class Call:
             self.vain += self.segments.worked - worked
             return False
         self.steps.extend(steps)
-        self.moved = True
+        self.progressed = True
         self.kept.update(targets)
         if not first:
             goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())

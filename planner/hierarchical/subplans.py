@@ -32,24 +32,16 @@ Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
 Forbidden: TypeAlias = "tuple[Ground, frozenset[tuple[Cell, str]]]"
 """A quantified behaviour, and the changes since the segment began after which it is forbidden."""
-EXPANSIONS = 150
+MOST_EXPANSIONS = 150
 """The most expansions of one search for a few steps."""
 EXPANSION = 100
 """An expansion takes about as long as so many states times operators of a small world: a microsecond each."""
-Watch: TypeAlias = "Callable[[int | None], object]"
-"""Told the level of each expansion, and `None` before what costs most begins."""
-
-
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
 """Says what a touched symbol must be in the end, given what it was in the beginning; None: whatever it came to be."""
 
 
 def trusting() -> None:
     """Doubt nothing."""
-
-
-def nobody(level: int | None) -> None:
-    """Watch nothing."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +64,7 @@ class Segments:
     deadline : float, optional
         `perf_counter` at which `LimitError` is raised.
     doubt : function, optional
-        Called whenever that work has doubled: it may be in vain.
-    watch : Watch, optional
+        Called whenever the work of small worlds has doubled: it may be in vain.
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
     most_work : float
@@ -86,7 +77,6 @@ class Segments:
     deadline: float | None = None
     most: int = 200_000
     most_work: float = math.inf
-    watch: Watch = nobody
     doubt: Callable[[], None] = trusting
     counts: dict[int, Counts] = field(default_factory=dict)
 
@@ -121,7 +111,7 @@ class Segments:
         counts, widest = self.counts[level], self.widest[level]
         origin: dict[Cell, str] = {}
         steps: list[Ground] = []
-        left = EXPANSIONS
+        left = MOST_EXPANSIONS
         seen: dict[frozenset[tuple[Cell, str]], int] = {}
 
         def deepen(depth: int, off: dict[Cell, str], changed: dict[Cell, str]) -> bool:
@@ -217,7 +207,6 @@ class Segments:
         counts = self.counts[level]
         counts.expanded += 1
         self.expanded += 1
-        self.watch(level)
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
         self.check_time()

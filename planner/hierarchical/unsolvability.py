@@ -14,7 +14,7 @@ from operator import or_
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.hierarchical.operators import Achieve, Achiever, Program
-from planner.hierarchical.subplans import Segments, Watch, nobody
+from planner.hierarchical.subplans import Segments
 from planner.hierarchical.subproblem import LEAST
 from planner.plan import Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
@@ -237,10 +237,10 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
     return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
 
 
-def proved(problem: Problem, level: int, deadline: float | None = None, watch: Watch = nobody) -> Task | Reason:
+def proved(problem: Problem, level: int, deadline: float | None = None) -> Task | Reason:
     """Raise `UnsolvableError` if a goal can't be reached on a level even if nothing ever became false.
 
-    Else that level is returned, grounded, or why it is too large for that. The observer is told before it is grounded.
+    Else that level is returned, grounded, or why it is too large for that.
     """
     from planner.grounded.grounding import ground
     from planner.grounded.unreachable import unreachable
@@ -250,7 +250,6 @@ def proved(problem: Problem, level: int, deadline: float | None = None, watch: W
         for symbol, value in sorted(problem.goal.items()):
             if not reached.possible(symbol, value):
                 raise UnsolvableError(unreachable(reached, Fact(symbol, value)))
-        watch(None)
         too_large = refusal(reached)
         if too_large is not None:
             return too_large
