@@ -219,3 +219,5 @@ if __name__ == "__main__":
         case ["try", name, *numbers]:
             noise, first, last = (*map(int, numbers), *(0, DEVELOPMENT, DEVELOPMENT + 10)[len(numbers) :])
             tried(name, noise, range(first, last))
+        case _:
+            raise SystemExit(__doc__)

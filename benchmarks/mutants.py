@@ -41,7 +41,7 @@ by the clock so many times that."""
 LIBRARIES = ("pytest", "hypothesis", "numpy", "networkx", "pyoxigraph", "rdflib", "urllib3")
 """What no fault is put into, imported once for all."""
 TESTS: dict[str, tuple[str, ...]] = {
-    "planner/language.py": ("tests/planner/test_language.py", "tests/planner/test_behaviors.py"),
+    "reasoner/language.py": ("tests/planner/test_language.py", "tests/planner/test_behaviors.py"),
     "reasoner/symbols.py": ("tests/reasoner/test_symbols.py", "tests/planner/test_validation.py"),
     "planner/validation.py": ("tests/planner/test_checker.py", "tests/planner/test_validation.py"),
     "planner/hierarchical/unsolvability.py": ("tests/planner/test_proofs.py",),

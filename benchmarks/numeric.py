@@ -16,11 +16,11 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from benchmarks.pddl import accepted
-from planner.language import DomainError
 from planner.plan import Limits, Status
 from planner.plan_costs import cost_of
 from planner.solve import Request, solve
 from planner.validation import validate
+from reasoner.language import DomainError
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import PddlError, parse
 from worlds.numbers import jugs, rounds

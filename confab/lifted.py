@@ -12,6 +12,8 @@ from reasoner.amounts import LESS, MORE
 from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
 from reasoner.symbols import (
     AnyOf,
+    ClassCondition,
+    Comparison,
     Condition,
     Domain,
     EqualityCondition,
@@ -66,7 +68,8 @@ class Sayings:
                 return denied(text) if condition.negated else text
             case AnyOf(alternatives, False):
                 return " or ".join(" and ".join(map(self.condition, those)) for those in alternatives)
-        return plainly(condition, self._words)
+            case AnyOf() | ClassCondition() | EqualityCondition() | Comparison():
+                return plainly(condition, self._words)
 
     def _words(self, what: object) -> str:
         return self.fact(what) if isinstance(what, Fact) else self.name(str(what))

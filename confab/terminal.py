@@ -38,7 +38,7 @@ WITHOUT_PHYSICS = (
 
 def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
-    from planner.language import DomainError
+    from reasoner.language import DomainError
     from reasoner.limits import LimitError
 
     _open_streams()

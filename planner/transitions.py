@@ -20,8 +20,8 @@ from typing import Any, TypeAlias
 
 from planner.amount_transitions import amount, change, comparison, settled
 from planner.generated import code, identifier, key_written, tuple_written, written
-from planner.language import DomainError, needs, nothing_determines
 from reasoner.amounts import terms_of
+from reasoner.language import DomainError, needs, nothing_determines
 from reasoner.symbols import (
     FALSE,
     TRUE,

@@ -164,7 +164,8 @@ def done(operation: str, amount: Number, by: Number) -> Number:
             return amount * by
         case "increase":
             return amount + by
-    return amount - by
+        case _:
+            return amount - by
 
 
 # ------------------------------------------------------------------------------------------------------ what is wanted

@@ -9,7 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from reasoner.amounts import situations_in
-from reasoner.symbols import FALSE, AnyOf, Comparison, Condition, Rule, ValueCondition, Witness
+from reasoner.language import groups
+from reasoner.symbols import (
+    FALSE,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    Rule,
+    ValueCondition,
+    Witness,
+)
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
@@ -23,14 +35,12 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
         match condition:
             case ValueCondition(situation, _, value):
                 yield situation, flipped is not (value == FALSE)
-            case Witness(_, _, inner):
-                yield from needed(inner, flipped)
-            case AnyOf(alternatives):
-                for group in alternatives:
-                    yield from needed(group, flipped)
             case Comparison(left, _, right):
                 for situation in sorted(situations_in(left) | situations_in(right)):
                     yield situation, flipped
+            case RelationCondition() | ClassCondition() | EqualityCondition() | Witness() | AnyOf():
+                for group in groups(condition):
+                    yield from needed(group, flipped)
 
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:

@@ -245,8 +245,9 @@ def holds(formula: Any, terms: Mapping[str, str], state: Iterable[Fact]) -> bool
         case "exists" | "forall":
             tried = (holds(parts[1], {**terms, **more}, state) for more in _bindings(parts[0]))
             return any(tried) if word == "exists" else all(tried)
-    row = tuple(terms.get(part, part) for part in parts)
-    return row[0] == row[1] if word == "=" else (word, *row) in state
+        case _:
+            row = tuple(terms.get(part, part) for part in parts)
+            return row[0] == row[1] if word == "=" else (word, *row) in state
 
 
 def _bindings(declared: Sequence[str]) -> Iterator[dict[str, str]]:

@@ -182,7 +182,8 @@ class Writer:
             case "product":
                 size = rng.choice((Fraction(2), Fraction(-1, 2), Fraction(0), Measure("size", (self.term(bound),))))
                 return Calculation(rng.choice("*/"), self.amount(bound, depth - 1), size)
-        return Fraction(rng.randint(-2, 6), rng.choice((1, 1, 2, 3)))
+            case _:
+                return Fraction(rng.randint(-2, 6), rng.choice((1, 1, 2, 3)))
 
     def amount_effect(self, bound: list[str], when: tuple[Condition, ...]) -> AmountEffect:
         """Return a random effect on an amount."""

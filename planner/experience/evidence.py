@@ -17,8 +17,8 @@ from math import log
 from typing import TypeAlias
 
 from planner.hierarchical.operators import Program
-from planner.language import walk
 from planner.transitions import Cell, Table
+from reasoner.language import walk
 from reasoner.memory.experience import ITSELF, Experience, Fact, Rule, Tally
 from reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from planner.generated import identifier, tuple_written, written
-from planner.language import is_variable, mentions, walk
 from planner.transitions import Table, Writer
+from reasoner.language import is_variable, mentions, walk
 from reasoner.memory.experience import Rule
 from reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 

@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 from planner.hierarchical.operators import named
-from planner.language import terms, walk
 from planner.paper.learning import LearningError
 from planner.validation import Facts, Rules
 from reasoner.amounts import Amount, inside, meets, towards
 from reasoner.derivation import strata
+from reasoner.language import terms, walk
 from reasoner.memory.experience import Ground, Order, Rule
 from reasoner.symbols import (
     FALSE,

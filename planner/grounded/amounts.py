@@ -17,8 +17,8 @@ from functools import cached_property
 from math import inf
 from typing import TypeAlias
 
-from planner.language import DomainError
 from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, situations_in, written
+from reasoner.language import DomainError
 from reasoner.symbols import Fact, Problem, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"

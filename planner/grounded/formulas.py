@@ -16,9 +16,9 @@ from typing import Protocol
 from planner.grounded.amounts import AmountTable
 from planner.grounded.joins import Table
 from planner.grounded.schemas import plain_variables
-from planner.language import mentions
 from planner.plan import TooLargeError
 from reasoner.amounts import Amount, bounds
+from reasoner.language import mentions
 from reasoner.symbols import (
     FALSE,
     TRUE,

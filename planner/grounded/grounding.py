@@ -33,10 +33,10 @@ from planner.grounded.schemas import Schema
 from planner.grounded.shortage import shortage
 from planner.grounded.task import Change, Grouped, Task
 from planner.grounded.unreachable import unreachable
-from planner.language import mentions
 from planner.plan import Reason
 from reasoner.amounts import COMPARING, written
 from reasoner.derivation import circular
+from reasoner.language import mentions
 from reasoner.symbols import (
     FALSE,
     TRUE,

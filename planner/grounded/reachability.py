@@ -16,12 +16,14 @@ from planner.grounded.amounts import AmountTable
 from planner.grounded.formulas import Formulas
 from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
-from planner.language import mentions
 from planner.plan import OutOfTimeError
+from reasoner.language import mentions
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     Problem,
@@ -29,7 +31,9 @@ from reasoner.symbols import (
     SituationType,
     State,
     Symbol,
+    ValueCondition,
     ValueEffect,
+    Witness,
 )
 
 Flags: TypeAlias = NDArray[np.bool_]
@@ -286,6 +290,8 @@ class Reached:
                 if term in columns:
                     places = self.tables["class", kind].find(columns[term][:, None])
                     return np.asarray((places >= 0) != negated)
+            case ValueCondition() | Witness() | AnyOf() | Comparison():
+                pass
         used = sorted(mentions(condition) & columns.keys())
         combinations, inverse = self.combinations(columns, used, count)
         holds = [self.formulas.condition(condition, dict(zip(used, c, strict=True)), kinds) == () for c in combinations]

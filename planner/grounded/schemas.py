@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from planner.language import DomainError, is_variable, mentions, terms, walk
 from reasoner.amounts import put_in, situations_in, terms_of
+from reasoner.language import DomainError, is_variable, mentions, terms, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -273,6 +273,8 @@ class _Compiler:
                 yield Atom(("relation", relation), arguments)
             case ClassCondition(term, kind, False):
                 yield Atom(("class", kind), (term,))
+            case _:  # is worked out row by row
+                pass
 
     def _fluent(self, condition: Condition) -> bool:
         return _changing(condition, self.changed)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from planner.language import mentions
+from reasoner.language import mentions
 from reasoner.symbols import (
     AnyOf,
     Behavior,

@@ -21,9 +21,9 @@ from planner.amount_transitions import comes_nearer
 from planner.derived_facts import Rules
 from planner.generated import identifier, tuple_written, written
 from planner.hierarchical.symmetry import Alike, representatives
-from planner.language import measures, mentions, terms, walk
 from planner.transitions import Forward, Key, Table, Writer, ready_condition
 from reasoner.amounts import Amount, inside, terms_of
+from reasoner.language import measures, mentions, terms, walk
 from reasoner.symbols import (
     AmountEffect,
     AnyOf,
@@ -31,6 +31,7 @@ from reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    EqualityCondition,
     Problem,
     RelationCondition,
     SituationType,
@@ -297,7 +298,8 @@ class Program:
                 return not any(self.changeable(part.situation, part.arguments, kinds, behavior) for part in parts)
             case AnyOf(alternatives):
                 return all(self._static(c, kinds, behavior) for group in alternatives for c in group)
-        return True
+            case RelationCondition() | ClassCondition() | EqualityCondition():
+                return True
 
     def changeable(
         self, situation: str, arguments: Sequence[str], kinds: Mapping[str, str], behavior: Behavior

@@ -17,18 +17,20 @@ from planner.amount_transitions import amount
 from planner.generated import written
 from planner.hierarchical.operators import FEW, Achiever, Program
 from planner.hierarchical.symmetry import representatives
-from planner.language import mentions, needs, walk
 from planner.transitions import Cell, Key, Table, arguments_of, key_of
 from reasoner.amounts import Amount, Calculation, Number, inside, number
 from reasoner.amounts import written as amount_written
 from reasoner.derivation import circular
+from reasoner.language import mentions, needs, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
+    ClassCondition,
     Comparison,
     Condition,
     EqualityCondition,
+    RelationCondition,
     ValueCondition,
     Witness,
 )
@@ -147,6 +149,10 @@ class Wants:
                     for c in group:
                         if isinstance(c, ValueCondition | Comparison) and self.holds(achiever, c, env) is negated:
                             yield from self.of(achiever, self._negation(c) if negated else c, env, level)
+            case (
+                RelationCondition() | ClassCondition() | EqualityCondition()
+            ):  # other individuals would have to be chosen
+                pass
         yield from self._redetermined(achiever, condition, env)
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:

@@ -80,4 +80,5 @@ def _term(term: Any) -> Any:
             return ox.Literal(str(term), language=language)
         case rdflib.Literal(datatype=datatype):
             return ox.Literal(str(term), datatype=ox.NamedNode(str(datatype)) if datatype else None)
-    raise TypeError(f"{term!r} is no term")
+        case _:
+            raise TypeError(f"{term!r} is no term")

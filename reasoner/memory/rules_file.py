@@ -21,6 +21,7 @@ from reasoner.symbols import (
     TRUE,
     AnyOf,
     ClassCondition,
+    Comparison,
     Condition,
     EqualityCondition,
     RelationCondition,
@@ -161,6 +162,8 @@ class Writer:
                     of = f" ; :condition {', '.join(those)}" if those else ""
                     parts.append(f"{groups[-1]} a owl:NamedIndividual, :AllOf{of}")
                 said = f":AnyOf ; :alternative {', '.join(groups)}"
+            case Comparison():
+                raise TypeError(f"{one} is no condition of a rule: rules compare no amounts")
         parts[place] = f"{name} a owl:NamedIndividual, {said}{no}"
         return name
 

@@ -26,6 +26,7 @@ from fractions import Fraction
 from itertools import product
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, inside, terms_of, written
+from reasoner.language import is_variable, terms, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -193,7 +194,14 @@ class _Export:
         kinds = [t.kind for b in self.behaviors for t in (*b.parameters, *b.variables)]
         rules = [rule.behavior for its in self.problem.domain.rules.values() for rule in its]
         kinds += [t.kind for b in rules for t in (*b.parameters, *b.variables)]
-        kinds += [w.kind for b in (*self.behaviors, *rules) for c in _all(b) for w in [c] if isinstance(w, Witness)]
+        kinds += [
+            w.kind
+            for b in (*self.behaviors, *rules)
+            for one in b.conditions
+            for c in walk(one)
+            for w in [c]
+            if isinstance(w, Witness)
+        ]
         chosen: dict[frozenset[str], str] = {}
         for kind in sorted(dict.fromkeys(kinds), key=lambda k: (-len(self.sets.get(k, ())), kinds.index(k))):
             members = self.sets.get(kind, frozenset())
@@ -783,32 +791,8 @@ def _absent(condition: Condition) -> tuple[str, str] | None:
     return None
 
 
-def _all(behavior: Behavior) -> Iterator[Condition]:
-    waiting = [*behavior.conditions]
-    while waiting:
-        one = waiting.pop()
-        yield one
-        if isinstance(one, Witness):
-            waiting += one.conditions
-        elif isinstance(one, AnyOf):
-            waiting += [c for group in one.alternatives for c in group]
-
-
 def _terms(condition: Condition) -> set[str]:
     """Return the variables of a condition from outside, those of a disjunction left to it."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            found = {*arguments, value}
-        case RelationCondition(_, arguments):
-            found = {*arguments}
-        case ClassCondition(term):
-            found = {term}
-        case EqualityCondition(left, right):
-            found = {left, right}
-        case Witness(variable, _, conditions):
-            found = {t for c in conditions for t in _terms(c)} - {variable}
-        case AnyOf():
-            found = set()
-        case Comparison(one, _, other):
-            found = {*terms_of(one), *terms_of(other)}
-    return {t for t in found if t.startswith("?")}
+    if isinstance(condition, Witness):
+        return {t for c in condition.conditions for t in _terms(c)} - {condition.variable}
+    return {t for t in terms(condition) if is_variable(t)}

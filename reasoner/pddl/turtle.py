@@ -13,7 +13,8 @@ from functools import cached_property
 
 import pyoxigraph as ox
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, inside, written
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from reasoner.language import measures
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -196,18 +197,7 @@ class _Writer:
     @cached_property
     def measures(self) -> frozenset[str]:
         """The relations that behaviours take for numbers."""
-        behaviors = self.problem.domain.behaviors.values()
-        amounts = [effect.amount for behavior in behaviors for effect in behavior.amounts]
-        waiting = [condition for behavior in behaviors for condition in behavior.conditions]
-        while waiting:
-            match waiting.pop():
-                case Comparison(left, _, right):
-                    amounts += [left, right]
-                case Witness(_, _, conditions):
-                    waiting += conditions
-                case AnyOf(alternatives):
-                    waiting += [condition for group in alternatives for condition in group]
-        return frozenset(part.relation for amount in amounts for part in inside(amount) if isinstance(part, Measure))
+        return measures(self.problem.domain.behaviors.values())
 
     def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
         said = [f":{name} a owl:NamedIndividual, {kind_of_term}"]

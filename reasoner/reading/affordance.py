@@ -120,7 +120,8 @@ def _names(condition: Condition, variable: str) -> bool:
             return variable in (*arguments, value)
         case RelationCondition(_, arguments, False):
             return variable in arguments
-    return False
+        case _:
+            return False
 
 
 def applicable_query(

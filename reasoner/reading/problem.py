@@ -25,13 +25,13 @@ from itertools import chain, product
 from reasoner.amounts import (
     DECIMAL,
     Amount,
-    Expression,
     Quantity,
     inside,
     written,
 )
 from reasoner.derivation import circles, needed
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from reasoner.language import walk
 from reasoner.names import Names
 from reasoner.reading import swrl
 from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
@@ -58,10 +58,8 @@ from reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
-    AnyOf,
     Behavior,
     Comparison,
-    Condition,
     Domain,
     Parameter,
     Problem,
@@ -72,7 +70,6 @@ from reasoner.symbols import (
     Symbol,
     ValueCondition,
     ValueEffect,
-    Witness,
     spread,
 )
 from reasoner.vocabulary import CORE, RDFS
@@ -444,35 +441,29 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
         raise KnowledgeError(
             f"{behavior.name} has several terms called {', '.join(twice)}; give each a name of its own"
         )
-    said: list[Condition | ValueEffect | AmountEffect | Expression]
-    said = [*behavior.preconditions, *behavior.effects, *behavior.amounts]
-    while said:
-        match said.pop():
-            case (
-                ValueCondition(situation, arguments)
-                | ValueEffect(situation, arguments)
-                | AmountEffect(situation, arguments)
-                | Amount(situation, arguments)
-            ) as part:
-                wanted = len(domain.situations[situation].arguments)
-                if len(arguments) != wanted:
-                    raise KnowledgeError(
-                        f"{behavior.name} speaks of {situation} with {len(arguments)} arguments; it has {wanted}: "
-                        "mend the condition or effect, or say what has that situation type"
-                    )
-                if domain.situations[situation].level > behavior.level:
-                    raise KnowledgeError(
-                        f"{behavior.name} on level {behavior.level} speaks of {situation}, which exists from level "
-                        f"{domain.situations[situation].level} on; mend the behaviour's :level or the situation type's :fromLevel"
-                    )
-                said += part.when if isinstance(part, ValueEffect | AmountEffect) else ()
-                said += inside(part.amount) if isinstance(part, AmountEffect) else ()
-            case Comparison(left, _, right):
-                said += [*inside(left), *inside(right)]
-            case Witness(_, _, inner):
-                said += inner
-            case AnyOf(alternatives):
-                said += (condition for group in alternatives for condition in group)
+    conditions = [inner for condition in behavior.conditions for inner in walk(condition)]
+    compared = [side for c in conditions if isinstance(c, Comparison) for side in (c.left, c.right)]
+    amounts = (*compared, *(effect.amount for effect in behavior.amounts))
+    parts = (
+        *conditions,
+        *behavior.effects,
+        *behavior.amounts,
+        *(part for amount in amounts for part in inside(amount)),
+    )
+    for part in parts:
+        if not isinstance(part, ValueCondition | ValueEffect | AmountEffect | Amount):
+            continue
+        situation = domain.situations[part.situation]
+        if len(part.arguments) != len(situation.arguments):
+            raise KnowledgeError(
+                f"{behavior.name} speaks of {part.situation} with {len(part.arguments)} arguments; it has "
+                f"{len(situation.arguments)}: mend the condition or effect, or say what has that situation type"
+            )
+        if situation.level > behavior.level:
+            raise KnowledgeError(
+                f"{behavior.name} on level {behavior.level} speaks of {part.situation}, which exists from level "
+                f"{situation.level} on; mend the behaviour's :level or the situation type's :fromLevel"
+            )
 
 
 def _situations(
@@ -594,19 +585,15 @@ def _asked(domain: Domain) -> dict[str, int]:
     """Return how many individuals conditions name for each relation without a number; raise `KnowledgeError` if they differ."""
     found: dict[str, int] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
-    waiting = [condition for behavior in (*domain.behaviors.values(), *rules) for condition in behavior.conditions]
-    while waiting:
-        match waiting.pop():
-            case RelationCondition(relation, arguments):
-                if found.setdefault(relation, len(arguments)) != len(arguments):
-                    raise KnowledgeError(
-                        f"conditions of {relation} name {min(found[relation], len(arguments))} individuals here and "
-                        f"{max(found[relation], len(arguments))} there; let all of them name as many"
-                    )
-            case Witness(_, _, inner):
-                waiting += inner
-            case AnyOf(alternatives):
-                waiting += chain.from_iterable(alternatives)
+    for behavior in (*domain.behaviors.values(), *rules):
+        for one in (inner for condition in behavior.conditions for inner in walk(condition)):
+            if not isinstance(one, RelationCondition):
+                continue
+            if found.setdefault(one.relation, len(one.arguments)) != len(one.arguments):
+                fewest, most = sorted((found[one.relation], len(one.arguments)))
+                raise KnowledgeError(
+                    f"conditions of {one.relation} name {fewest} individuals here and {most} there; let all of them name as many"
+                )
     return found
 
 

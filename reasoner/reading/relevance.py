@@ -23,6 +23,7 @@ import pyoxigraph as ox
 
 from reasoner.amounts import situations_in, terms_of
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from reasoner.language import terms
 from reasoner.names import local_name
 from reasoner.reading.goals import BOUNDS, with_goals
 from reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
@@ -158,7 +159,10 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
                     counting |= situations_in(effect.amount)
                 scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
                 counting |= {s for scope in scopes for c in scope.conditions for s in _situations(c)}
-                own = {t for s in scopes for c in s.conditions for t in _terms(c)} | {*effect.arguments, *values}
+                own = {t for s in scopes for c in s.conditions for t in terms(c)} - {TRUE, FALSE} | {
+                    *effect.arguments,
+                    *values,
+                }
                 own &= kinds.keys()
                 for from_value, start in starts.items():
                     if (id(behavior), number, from_value) in spanned:
@@ -218,7 +222,7 @@ def _span(
 ) -> None:
     """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
-    in_use = {t for c in scope.conditions for t in _terms(c)} | more
+    in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more
     waiting = (in_use | {t for t in start if t.startswith("?")}) - start
     reached = set(start) | {t for t in in_use if not t.startswith("?")}
     waiting -= reached
@@ -298,18 +302,6 @@ def _steps_by_nodes(terms: Sequence[str], only: bool, schema: Schema, situation:
                     backward=frozenset() if first else frozenset(PLACES[1:]),
                     looks_up=None if first else situation,
                 )
-
-
-def _terms(condition: Condition) -> set[str]:
-    """Return the terms of a condition that isn't nested, individuals among them."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            return {*arguments, *([value] if value not in (TRUE, FALSE) else [])}
-        case RelationCondition(_, arguments):
-            return set(arguments)
-        case Comparison(left, _, right):
-            return {*terms_of(left), *terms_of(right)}
-    return {t for name in ("term", "left", "right") for t in [getattr(condition, name, None)] if t}
 
 
 def _situations(condition: Condition) -> Iterable[str]:

@@ -21,19 +21,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from reasoner.amounts import Calculation, Expression, exact, terms_of
+from reasoner.amounts import Calculation, Expression, exact
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.language import mentions
 from reasoner.names import local_name
 from reasoner.reading.definitions import INSIDE, Definitions
 from reasoner.symbols import (
     TRUE,
-    AnyOf,
-    ClassCondition,
     Comparison,
     Condition,
     EqualityCondition,
     Parameter,
-    RelationCondition,
     Rule,
     ValueCondition,
     Witness,
@@ -278,14 +276,14 @@ class _Imp:
         for place, (argument, kind) in enumerate(zip(said, classes, strict=True)):
             term = self.term(argument)
             if self.variable(argument) and term not in [p.name for p in parameters]:
-                if not any(term in _free(condition) for condition in self.asked) and term not in self.kinds:
+                if not any(term in mentions(condition) for condition in self.asked) and term not in self.kinds:
                     raise self.error(f"the variable {term} of its head is in no atom of its body; say there what it is")
                 parameters.append(Parameter(term, self.kinds.get(term, kind)))
             else:
                 parameters.append(Parameter(f"?argument{place}", kind))
                 compared.append(EqualityCondition(f"?argument{place}", term))
         variables: list[Parameter] = []
-        sought = {*self.kinds, *(t for c in self.asked for t in _free(c))} - {p.name for p in parameters}
+        sought = {*self.kinds, *(t for c in self.asked for t in mentions(c))} - {p.name for p in parameters}
         conditions = self._nested([*compared, *self.asked], {p.name for p in parameters}, sorted(sought), variables)
         return situation, Rule(definitions.names.short(situation), tuple(parameters), tuple(variables), conditions)
 
@@ -293,7 +291,7 @@ class _Imp:
         self, asked: Sequence[Condition], bound: set[str], sought: Sequence[str], variables: list[Parameter]
     ) -> tuple[Condition, ...]:
         """Return conditions with a witness around those that need a further variable, which a value determines if one can."""
-        here = tuple(condition for condition in asked if _free(condition) <= bound)
+        here = tuple(condition for condition in asked if mentions(condition) <= bound)
         rest = [condition for condition in asked if condition not in here]
         if not sought:
             return here
@@ -305,7 +303,7 @@ class _Imp:
                         others = [one for one in rest if one is not condition]
                         deeper = self._nested(others, bound | {value}, [v for v in sought if v != value], variables)
                         return (*here, condition, *deeper)
-        nearest = {v: sum(v in _free(c) and bool(_free(c) & bound) for c in rest) for v in sought}
+        nearest = {v: sum(v in mentions(c) and bool(mentions(c) & bound) for c in rest) for v in sought}
         chosen = max(sought, key=lambda variable: nearest[variable])
         deeper = self._nested(rest, bound | {chosen}, [v for v in sought if v != chosen], variables)
         return (*here, Witness(chosen, self._kind(chosen), deeper))
@@ -314,23 +312,3 @@ class _Imp:
         if variable not in self.kinds:
             raise self.error(f"nothing says the class of {variable}; add an atom of a class with it")
         return self.kinds[variable]
-
-
-def _free(condition: Condition) -> frozenset[str]:
-    """Return the variables of a condition that nothing inside of it determines."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            terms: Sequence[str] = (*arguments, value)
-        case RelationCondition(_, arguments):
-            terms = arguments
-        case ClassCondition(term):
-            terms = (term,)
-        case EqualityCondition(left, right):
-            terms = (left, right)
-        case Comparison(one, _, other):
-            terms = (*terms_of(one), *terms_of(other))
-        case Witness(variable, _, inner):
-            return frozenset().union(*map(_free, inner)) - {variable}
-        case AnyOf(alternatives):
-            return frozenset().union(*(_free(one) for group in alternatives for one in group))
-    return frozenset(term for term in terms if term.startswith("?"))

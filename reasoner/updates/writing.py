@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, written
+from reasoner.language import walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -290,17 +291,11 @@ class _Writer:
 
     def asked_of_class(self, term: str) -> bool:
         """Tell whether some condition asks of which class a term is: such a line isn't to be taken for its type."""
-        waiting: list[Condition] = [*self.behavior.preconditions, *(c for e in self.behavior.effects for c in e.when)]
-        while waiting:
-            match waiting.pop():
-                case ClassCondition(one):
-                    if one == term:
-                        return True
-                case Witness(_, _, inner):
-                    waiting += inner
-                case AnyOf(alternatives):
-                    waiting += (c for group in alternatives for c in group)
-        return False
+        return any(
+            isinstance(inner, ClassCondition) and inner.term == term
+            for condition in self.behavior.conditions
+            for inner in walk(condition)
+        )
 
 
 def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Condition, str]]:

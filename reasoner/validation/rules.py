@@ -9,6 +9,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -20,6 +21,7 @@ import ontology
 from reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in, terms_of
 from reasoner.derivation import needed
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
+from reasoner.language import groups, mentions, walk
 from reasoner.names import local_name, nearest
 from reasoner.reading.definitions import Definitions
 from reasoner.reading.problem import Reading
@@ -271,16 +273,8 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
             case AnyOf(alternatives):
                 free |= set().union(*(_undetermined(group, set(bound)) for group in alternatives))
             case _:
-                free |= _terms(condition) - bound
+                free |= mentions(condition) - bound
     return free
-
-
-def _terms(condition: Condition) -> set[str]:
-    if isinstance(condition, Comparison):
-        return {t for t in (*terms_of(condition.left), *terms_of(condition.right)) if t.startswith("?")}
-    values = [value for name, value in vars(condition).items() if name != "negated"]
-    flat = [term for value in values for term in (value if isinstance(value, tuple) else (value,))]
-    return {term for term in flat if term.startswith("?")}
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
@@ -355,7 +349,8 @@ def _possible(condition: Condition, behavior: Behavior, problem: Problem, there:
             return all(_possible(c, behavior, problem, there) for c in inner)
         case AnyOf(alternatives, False):
             return any(all(_possible(c, behavior, problem, there) for c in group) for group in alternatives)
-    return True
+        case _:
+            return True
 
 
 def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[str]:
@@ -432,7 +427,8 @@ def _none_has(condition: Condition, effect: ValueEffect) -> str:
         case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
             same = (situation, about, value) == (effect.situation, variable, effect.value)
             return kind if same and value.startswith("?") else ""
-    return ""
+        case _:
+            return ""
 
 
 AXIOMS_OF_PROPERTIES = {
@@ -584,6 +580,8 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
                 for term, kind in zip(arguments, domain.situations[situation].arguments, strict=True):
                     if term == parameter.name:
                         yield kind
+            case _:
+                pass
 
 
 def _both(case: Case, one: str, other: str) -> bool:
@@ -723,7 +721,8 @@ def unlike_units(case: Case) -> Iterator[Fault]:
                 if sign in "*/" and one and other:
                     return "", wrong or also  # servings by the hour
                 return one or (other if sign != "/" else ""), wrong or also
-        return "", ""
+            case Fraction():
+                return "", ""
 
     for name, behavior in reading.problem.domain.behaviors.items():
         for left, right, does in _together(behavior):
@@ -741,15 +740,9 @@ def unlike_units(case: Case) -> Iterator[Fault]:
 
 def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]]:
     """Yield the pairs of amounts that a behaviour compares, or changes one by the other, and which of that it does."""
-    waiting = list(behavior.conditions)
-    while waiting:
-        match waiting.pop():
-            case Comparison(left, _, right):
-                yield left, right, "compares"
-            case Witness(_, _, inner):
-                waiting += inner
-            case AnyOf(alternatives):
-                waiting += [condition for group in alternatives for condition in group]
+    for one in (inner for condition in behavior.conditions for inner in walk(condition)):
+        if isinstance(one, Comparison):
+            yield one.left, one.right, "compares"
     for effect in behavior.amounts:
         by: Expression = effect.amount
         if effect.operation == "scale":  # by a number without a unit
@@ -824,14 +817,14 @@ def _measured(
         match condition:
             case Comparison(left, _, right):
                 for part in (*inside(left), *inside(right)):
-                    match part:
-                        case Measure(relation, (term,)) if term in among:
-                            yield relation, *among[term]
-            case Witness(variable, kind, inner):
+                    if isinstance(part, Measure) and len(part.arguments) == 1 and part.arguments[0] in among:
+                        yield part.relation, *among[part.arguments[0]]
+            case Witness(variable, kind):
                 members = kind, frozenset(problem.classes.get(kind, ()))
-                yield from _measured(inner, {**among, variable: members}, problem)
-            case AnyOf(alternatives):
-                for group in alternatives:
+                for group in groups(condition):
+                    yield from _measured(group, {**among, variable: members}, problem)
+            case _:
+                for group in groups(condition):
                     yield from _measured(group, among, problem)
 
 

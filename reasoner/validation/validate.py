@@ -317,7 +317,8 @@ def _rdflib(term: object) -> rdflib.term.Node:
             return Literal(value, datatype=URIRef(datatype.value))
         case ox.Literal(value=value, language=language):
             return Literal(value, lang=language)
-    raise TypeError(f"{term!r} is no term of RDF 1.1")
+        case _:
+            raise TypeError(f"{term!r} is no term of RDF 1.1")
 
 
 @cache

@@ -97,7 +97,8 @@ def named(expression: Expression) -> set[str]:
             return named(left) | named(right)
         case Amount(_, arguments) | Measure(_, arguments):
             return {*arguments}
-    return set()
+        case Fraction():
+            return set()
 
 
 def worth(problem: Problem, state: Facts, expression: Expression, terms: Terms) -> Fraction | None:
@@ -114,7 +115,8 @@ def worth(problem: Problem, state: Facts, expression: Expression, terms: Terms) 
             if a is None or b is None or (sign == "/" and b == 0):
                 return None
             return a + b if sign == "+" else a - b if sign == "-" else a * b if sign == "*" else a / b
-    return expression
+        case Fraction():
+            return expression
 
 
 def outside(conditions: Sequence[Condition]) -> set[str]:

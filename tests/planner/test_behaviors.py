@@ -4,8 +4,8 @@ from itertools import permutations
 
 import pytest
 
-from planner.language import DomainError
 from planner.paper.transitions import Model
+from reasoner.language import DomainError
 from reasoner.symbols import (
     AnyOf,
     Behavior,

@@ -15,8 +15,8 @@ from planner.grounded.formulas import Formulas
 from planner.grounded.grounding import ground
 from planner.grounded.hff import heuristic
 from planner.grounded.task import Task
-from planner.language import DomainError
 from planner.plan import Limits, Reason, Status
+from reasoner.language import DomainError
 from reasoner.symbols import (
     FALSE,
     TRUE,

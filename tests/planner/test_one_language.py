@@ -23,9 +23,10 @@ from planner.validation import successor
 from reasoner import symbols
 from reasoner.amounts import Quantity
 from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from reasoner.language import groups
 from reasoner.reading.affordance import applicable_query, write_situation
 from reasoner.reading.problem import Reading, read
-from reasoner.symbols import FALSE, AnyOf, Condition, Fact, Problem, Symbol, Witness
+from reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 from tests.planner import naive, small
 from tests.reasoner.worlds import graph_of, worlds
 from worlds.language import DEFINED, language
@@ -235,9 +236,5 @@ def nested(conditions: Sequence[Condition], depth: int = 0) -> Iterator[tuple[in
     """Yield all conditions with how deep they are."""
     for condition in conditions:
         yield depth, condition
-        match condition:
-            case Witness(_, _, inner):
-                yield from nested(inner, depth + 1)
-            case AnyOf(alternatives):
-                for group in alternatives:
-                    yield from nested(group, depth + 1)
+        for group in groups(condition):
+            yield from nested(group, depth + 1)

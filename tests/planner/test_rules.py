@@ -18,10 +18,10 @@ from planner.hierarchical import recovery
 from planner.hierarchical.operators import Program
 from planner.hierarchical.serialization import Call, compiled
 from planner.hierarchical.subplans import EXPANSION
-from planner.language import terms
 from planner.plan import Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.amounts import LESS, MORE
+from reasoner.language import terms
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Order, Rule, Tally
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse_files

@@ -32,7 +32,8 @@ def amount(rng: Random, own: str, depth: int = 1) -> str:
             return f"({rng.choice('+-')} {amount(rng, own, 0)} {amount(rng, own, 0)})"
         case "times":
             return f"({rng.choice('*/')} {amount(rng, own, 0)} {rng.choice(('2', '0.5', '(size ?x)'))})"
-    return rng.choice(("0", "1", "2", "0.5", "1.5"))
+        case _:
+            return rng.choice(("0", "1", "2", "0.5", "1.5"))
 
 
 def pddl(seed: int) -> tuple[str, str]:

@@ -9,13 +9,13 @@ from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
 from ontology import ROOT
-from planner.language import DomainError
 from planner.paper.astar import mismatches
 from planner.paper.hierarchy import plan
 from planner.paper.transitions import Model, ground
 from planner.plan import Limits, Status
 from reasoner.generate import families, generate, write_scene
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from reasoner.language import DomainError
 from reasoner.reading.goals import with_goals
 from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise

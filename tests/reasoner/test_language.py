@@ -4,8 +4,8 @@ from fractions import Fraction
 
 import pytest
 
-from planner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
 from reasoner.amounts import Amount, Calculation, Measure
+from reasoner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
 from reasoner.symbols import (
     AmountEffect,
     AnyOf,

@@ -1,4 +1,4 @@
-"""What conditions name, need from outside and hold inside: read here by all that search, so that a new kind is added once."""
+"""What conditions name, need from outside and hold inside: read here by all but the checker, so that a new kind is added once."""
 
 from __future__ import annotations
 
@@ -29,9 +29,13 @@ def is_variable(term: str) -> bool:
 
 def groups(condition: Condition) -> tuple[tuple[Condition, ...], ...]:
     """Return the conjunctions inside a condition."""
-    if isinstance(condition, Witness):
-        return (condition.conditions,)
-    return condition.alternatives if isinstance(condition, AnyOf) else ()
+    match condition:
+        case Witness(_, _, inner):
+            return (inner,)
+        case AnyOf(alternatives):
+            return alternatives
+        case ValueCondition() | RelationCondition() | ClassCondition() | EqualityCondition() | Comparison():
+            return ()
 
 
 def walk(condition: Condition) -> Iterator[Condition]:
@@ -55,7 +59,8 @@ def terms(condition: Condition) -> tuple[str, ...]:
             return (left, right)
         case Comparison(one, _, other):
             return (*terms_of(one), *terms_of(other))
-    return ()
+        case Witness() | AnyOf():
+            return ()
 
 
 def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
