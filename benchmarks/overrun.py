@@ -1,4 +1,4 @@
-"""How long `confab plan --time-limit N` goes on after its limit, and that it ends with exit 3 then.
+"""How long `confab plan --time-limit N` goes on after its limit, ending with exit 3; how long `confab validate` takes.
 
     python -m benchmarks.overrun        every call, as docs/promises.md has it
 
@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 from time import sleep
 
 SCENES = {
@@ -22,6 +23,8 @@ SCENES = {
     "100,000 irrelevant objects": ("served", "--objects", "4", "--clutter", "100000"),
     "200 objects": ("served", "--objects", "200"),
 }
+VALIDATED = ("1,000 objects", "10,000 objects")
+"""These scenes are validated, which has no limit."""
 MEMORY = "FILE"
 """Stands for a memory of `TAUGHT`."""
 TAUGHT = ("served", "--objects", "8")
@@ -90,14 +93,17 @@ def cpu_seconds(process: int) -> float:
     return own + sum(map(cpu_seconds, map(int, children)))
 
 
-def confab(*arguments: str) -> None:
-    """Run a command that has to succeed."""
+def confab(*arguments: str) -> float:
+    """Run a command that has to succeed; return the seconds of CPU time that it took."""
+    before = getrusage(RUSAGE_CHILDREN)
     command = [sys.executable, "-c", "from confab.start import main; main()", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    after = getrusage(RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main() -> None:
-    """Print a row for each call."""
+    """Print a row for each call, and for each scene that is validated."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
         files = {name: Path(folder) / f"{number}.ttl" for number, name in enumerate(SCENES)}
         for name, file in files.items():
@@ -113,6 +119,9 @@ def main() -> None:
                 f"| {name} | {f'`{said}`' if said else ''} | {seconds:g} | {code} | {after:.2f} | {after / seconds:.0%} |",
                 flush=True,
             )
+        print("\n| `confab validate` of | CPU s |\n|---|---|")
+        for name in VALIDATED:
+            print(f"| {name} | {confab('validate', str(files[name])):.1f} |", flush=True)
 
 
 if __name__ == "__main__":
