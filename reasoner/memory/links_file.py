@@ -79,9 +79,8 @@ def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
         The file is missing, isn't Turtle, or imports no scene.
     """
     graph = _graph(path, found)
-    scenes = [
-        text(row[0]) for row in graph.select("SELECT ?scene WHERE { ?memory owl:imports ?scene } ORDER BY ?scene")
-    ]
+    imported = "SELECT ?scene WHERE { ?memory owl:imports ?scene FILTER(isIRI(?scene)) } ORDER BY ?scene"
+    scenes = [text(row[0]) for row in graph.select(imported)]
     if not scenes:
         raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
     return scenes[0], Names(

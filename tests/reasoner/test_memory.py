@@ -106,3 +106,10 @@ def test_the_text_of_links_is_that_of_the_file_without_its_head(tmp_path: Path, 
     assert names.iri("cup1") == serving.names.iri("cup1")
     with pytest.raises(KnowledgeError, match="it imports no scene"):
         memory_names(tmp_path / "n.ttl")
+
+
+def test_what_a_memory_imports_has_a_name(tmp_path: Path, serving: Reading, links: Links) -> None:
+    file = tmp_path / "m.ttl"
+    save_links(file, links, serving.names, serving.problem.scene)
+    file.write_text(f"{file.read_text()}\n_:some <http://www.w3.org/2002/07/owl#imports> _:other .\n")
+    assert memory_names(file)[0] == serving.problem.scene
