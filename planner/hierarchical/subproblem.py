@@ -67,7 +67,7 @@ class World:
         self.segments, self.level, self.width = segments, level, width
         self.plan: tuple[int, ...] = ()
         self.task: Task | None = None
-        with suppress(TooLargeError, OutOfTimeError):
+        with suppress(TooLargeError, OutOfTimeError, MemoryError):
             task = self._grounded(targets, keep, width)
             self.task = None if isinstance(task, Reason) else task
         segments.check_time()
