@@ -124,6 +124,8 @@ def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
+        (r":memoryFormat \d+", ":memoryFormat 0", "memory of format 0, wanted"),
+        (r":memoryFormat \d+", ":memoryFormat 99", "memory of format 99, wanted"),
         (r":does ", ":did ", "wanted one :does, found 0"),
         (r":does ", ":does :CIRCLE, ", "wanted one :does, found 2"),
         (r":index 1", ':index "some"', "broken memory"),
