@@ -66,7 +66,14 @@ def load_observed(path: Path, reading: Reading) -> Reading:
         nodes.setdefault(text(fact), {})[text(predicate).removeprefix(CORE)] = reading.names.short(text(value))
     if not nodes:
         raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
-    seen = {_symbol(iri, node, reading.problem.initial, path): node["value"] for iri, node in nodes.items()}
+    seen: dict[Symbol, str] = {}
+    for iri, node in nodes.items():
+        symbol = _symbol(iri, node, reading.problem.initial, path)
+        if (other := seen.setdefault(symbol, node["value"])) != node["value"]:
+            raise KnowledgeError(
+                f"{path}: {symbol} is {other} and {node['value']}, which can't both be seen (a memory says what may be); "
+                "give the file that 'confab run' or 'confab execute' wrote"
+            )
     try:
         check_values(seen, reading.problem.domain, reading.names)
     except KnowledgeError as error:

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.memory.links import Links
+from reasoner.memory.links_file import save_links
 from reasoner.reading.observed import assert_observed, load_observed, save_observed
 from reasoner.reading.problem import read
 from reasoner.symbols import Symbol
@@ -54,3 +56,12 @@ def test_a_value_that_nothing_has_is_not_observed(tmp_path: Path) -> None:
     (tmp_path / "observed.ttl").write_text(text.replace("#location8>", "#location88>"))
     with pytest.raises(KnowledgeError, match=r"observed.ttl: .*location88 isn't declared.*; observe this scene anew"):
         load_observed(tmp_path / "observed.ttl", reading)
+
+
+def test_a_file_that_says_what_may_be_is_not_what_was_seen(tmp_path: Path) -> None:
+    graph = load("beverage-serving")
+    reading = read(graph)
+    links = Links({("B1_MOVE", ("cup2", "location5")): {CUP2: {"location1": 0.5, "location8": 0.5}}})
+    save_links(tmp_path / "memory.ttl", links, reading.names, graph.scene)
+    with pytest.raises(KnowledgeError, match="is location1 and location8, which can't both be seen"):
+        load_observed(tmp_path / "memory.ttl", reading)
