@@ -249,6 +249,11 @@ def execute(
     from confab.live import both, spectator
     from confab.memory import Memory, undisturbed
 
+    given = [file.resolve() for file in (memory, plan, save, report) if file is not None]
+    if len(set(given)) < len(given):
+        raise KnowledgeError(
+            "one file for two options: --memory, --plan, --save and --report each want one of their own"
+        )
     loaded = load_scene(scene, iri)
     remembered = memory_for(memory, no_memory, loaded)
     if learn and (memory is None or remembered is None):

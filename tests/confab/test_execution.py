@@ -83,6 +83,7 @@ def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
         (["--intervene", "after=28 drop-goal cup2 LOCATOIN"], "did you mean"),
         (["--world", "moon"], "unknown world 'moon'"),
         (["--mode", "magic"], "unknown mode 'magic'"),
+        (["--memory", "m.ttl", "--learn", "--save", "./m.ttl"], "one file for two options"),
     ],
 )
 def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:
