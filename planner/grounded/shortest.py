@@ -16,6 +16,9 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from planner.grounded.task import Task, bits_of
 from planner.plan import Counts
 
@@ -110,41 +113,57 @@ def ways(task: Task) -> Bound:
     Every operator counts for one symbol only, so that no plan is cheaper. A goal that isn't a value among several counts
     for nothing.
     """
-    of_symbol: dict[object, int] = {}
+    of_symbol: dict[object, list[int]] = {}
     for bit, fact in enumerate(task.facts):
-        of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
-    wanted = [(mask, mask & task.goal) for mask in of_symbol.values() if mask & task.goal and mask.bit_count() > 1]
-    wanted.sort(key=lambda pair: -pair[0].bit_count())
-    which = {bit: i for i, (mask, _) in enumerate(wanted) for bit in bits_of(mask)}
-    cheapest: list[dict[tuple[int, int], float]] = [
-        {} for _ in wanted
-    ]  # (value before, or 0 for any; value after): cost
-    for operator in range(len(task)):
-        needed, changes = task.known(operator)
-        touched = {(which[bit], 1 << bit) for _, _, set_ in changes for bit in bits_of(set_) if bit in which}
-        counted = min((i for i, _ in touched), default=0)
-        for i, after in touched:
-            step = needed & wanted[i][0], after
-            cost = task.costs[operator] if i == counted else 0.0
-            cheapest[i][step] = min(cost, cheapest[i].get(step, math.inf))
-    tables: list[tuple[int, dict[int, float]]] = []
-    for (mask, value), steps in zip(wanted, cheapest, strict=True):
-        away = {value: 0.0}
-        for _ in range(mask.bit_count()):
-            old = dict(away)
-            for (before, after), cost in steps.items():
-                least = away.get(after, math.inf) + cost
-                for source in (before,) if before else (1 << bit for bit in bits_of(mask)):
-                    if least < away.get(source, math.inf):
-                        away[source] = least
-            if old == away:
-                break
-        tables.append((mask, away))
+        of_symbol.setdefault(fact.symbol, []).append(bit)
+    wanted = [(bits, at) for bits in of_symbol.values() if len(bits) > 1 for at in bits if task.goal >> at & 1]
+    wanted.sort(key=lambda pair: -len(pair[0]))
+    symbol = np.full(task.size, -1)  # of each bit, by its place among those wanted
+    for number, (bits, _) in enumerate(wanted):
+        symbol[bits] = number
+    operator, before, after = _steps(task, symbol)
+    counted = np.full(len(task), len(wanted))
+    np.minimum.at(counted, operator, symbol[after])
+    costs = np.where(counted[operator] == symbol[after], np.array(task.costs)[operator], 0.0)
+    least = np.full(task.size, np.inf)
+    least[[at for _, at in wanted]] = 0.0
+    stated = before >= 0
+    while True:
+        total, old = least[after] + costs, least.copy()
+        np.minimum.at(least, before[stated], total[stated])
+        anyhow = np.full(len(wanted) + 1, np.inf)  # from whatever value; the last for bits of no symbol that is wanted
+        np.minimum.at(anyhow, symbol[after[~stated]], total[~stated])
+        np.minimum(least, anyhow[symbol], out=least)
+        if np.array_equal(least, old):
+            break
+    tables = {at: (sum(1 << bit for bit in bits), {1 << bit: float(least[bit]) for bit in bits}) for bits, at in wanted}
+    goal = sum(1 << at for at in tables)
 
     def bound(state: int) -> float:
         total = 0.0
-        for mask, away in tables:
+        for at in bits_of(goal & ~state):
+            mask, away = tables[at]
             total += away.get(state & mask, math.inf)
         return total
 
     return bound
+
+
+def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return who sets bits of symbols: the operator, the bit of that symbol that it needs (-1: none), and the one that it sets."""
+    owner = np.array(task.owners, np.int64)
+    setter = owner[np.repeat(np.arange(len(owner)), np.diff(task.adds.starts))]
+    here = (setter >= 0) & (symbol[task.adds.items] >= 0)
+    setter, after = setter[here], task.adds.items[here]
+    starts = task.needs.starts[: len(task) + 1]
+    needed = task.needs.items[: starts[-1]]
+    who = np.repeat(np.arange(len(task)), np.diff(starts))
+    here = symbol[needed] >= 0
+    symbols = int(symbol.max(initial=0)) + 1
+    keys, needed = who[here] * symbols + symbol[needed[here]], needed[here]
+    order = np.argsort(keys, kind="stable")
+    keys, needed = keys[order], needed[order]
+    asked = setter * symbols + symbol[after]
+    place = np.minimum(np.searchsorted(keys, asked), max(len(keys) - 1, 0))
+    before = np.where(keys[place] == asked, needed[place], -1) if len(keys) else np.full(len(asked), -1)
+    return setter, before, after
