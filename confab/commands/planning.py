@@ -249,10 +249,10 @@ def execute(
     from confab.live import both, spectator
     from confab.memory import Memory, undisturbed
 
-    given = [file.resolve() for file in (memory, plan, save, report) if file is not None]
+    given = [file.resolve() for file in (Path(scene), memory, plan, save, report) if file is not None]
     if len(set(given)) < len(given):
         raise KnowledgeError(
-            "one file for two options: --memory, --plan, --save and --report each want one of their own"
+            "one file for two purposes: the scene, --memory, --plan, --save and --report each want one of their own"
         )
     loaded = load_scene(scene, iri)
     remembered = memory_for(memory, no_memory, loaded)

@@ -83,7 +83,8 @@ def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
         (["--intervene", "after=28 drop-goal cup2 LOCATOIN"], "did you mean"),
         (["--world", "moon"], "unknown world 'moon'"),
         (["--mode", "magic"], "unknown mode 'magic'"),
-        (["--memory", "m.ttl", "--learn", "--save", "./m.ttl"], "one file for two options"),
+        (["--memory", "m.ttl", "--learn", "--save", "./m.ttl"], "one file for two purposes"),
+        (["--save", "beverage-serving"], "one file for two purposes"),
     ],
 )
 def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:
