@@ -100,10 +100,12 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
             continue
         seen.add(iri)
         name = local_name(iri)
-        known = [local_name(other) for other, types in case.types.items() if not kinds or kinds & types]
+        known = {other: local_name(other) for other, types in case.types.items() if not kinds or kinds & types}
+        elsewhere = sorted(other for other, called in known.items() if called == name and other != iri)
+        hint = f"; did you mean <{elsewhere[0]}>?" if elsewhere else nearest(name, [*known.values()])
         yield (
             subject.value if isinstance(subject, ox.NamedNode) else iri,
-            f"{name} is used as {wanted}, but isn't declared as one{nearest(name, known)}",
+            f"{name} is used as {wanted}, but isn't declared as one{hint}",
             "an unknown name is read as a new one, without a warning; what was meant by it is lost",
             f"mend the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )

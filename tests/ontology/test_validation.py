@@ -157,6 +157,16 @@ def test_a_finding_names_file_line_node_and_label(tmp_path: Path) -> None:
     assert lines[finding.line - 1].startswith(":plate1 a ")
 
 
+def test_of_a_name_in_another_namespace_the_whole_is_told(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path, WITH_BODIES)
+    domain = tmp_path / f"{WITH_BODIES}.ttl"
+    domain.write_text(
+        re.sub(r"(?m)^:Can a ", "<https://example.org/elsewhere#Can> a ", domain.read_text(encoding="utf-8")),
+        encoding="utf-8",
+    )
+    assert "but isn't declared as one; did you mean <https://example.org/elsewhere#Can>?" in validate([scene])[0].what
+
+
 def test_an_undeclared_term_comes_first_and_hides_what_follows_from_it(tmp_path: Path) -> None:
     scene = skeleton(tmp_path, WITH_BODIES)
     domain = tmp_path / f"{WITH_BODIES}.ttl"
