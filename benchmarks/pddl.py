@@ -339,7 +339,7 @@ def _solve(domain: str, problem: str, target: str) -> None:
     from planner.grounded.best_first import search
     from planner.grounded.grounding import ground
     from planner.grounded.task import Task
-    from planner.plan import NO_MEMORY, Limits, Status
+    from planner.plan import OUT_OF_MEMORY, Limits, Status
     from reasoner.pddl.importing import imported
     from reasoner.pddl.syntax import parse_files
 
@@ -347,7 +347,7 @@ def _solve(domain: str, problem: str, target: str) -> None:
     try:
         task = ground(scene.problem)
     except MemoryError:
-        task = NO_MEMORY
+        task = OUT_OF_MEMORY
     if not isinstance(task, Task):
         print(task.text)
         return

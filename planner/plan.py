@@ -100,7 +100,7 @@ class Reason:
     terms: tuple[str, ...] = ()
 
 
-NO_MEMORY = Reason("there isn't enough memory to go on")
+OUT_OF_MEMORY = Reason("there isn't enough memory to go on")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import NO_MEMORY, Limits, Outcome, OutOfTimeError, Reason, Status
+from planner.plan import OUT_OF_MEMORY, Limits, Outcome, OutOfTimeError, Reason, Status
 from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.symbols import GroundBehavior, Problem
@@ -85,7 +85,7 @@ def solve(request: Request) -> Outcome:
     try:
         outcome = MODES[request.mode](request)
     except MemoryError:
-        return Outcome(Status.GAVE_UP, reason=NO_MEMORY)
+        return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     if outcome.plan is None:
         return outcome
     faults = validate(request.problem, outcome.plan)

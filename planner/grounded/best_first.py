@@ -38,7 +38,7 @@ from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, 
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
-from planner.plan import NO_MEMORY, Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
 from reasoner.symbols import Problem, State
 
 BOOST = 1000
@@ -154,7 +154,7 @@ def plan_level(
             Status.GAVE_UP, reason=Reason(f"grounding stopped at a limit: {error}"), seconds=perf_counter() - began
         )
     except MemoryError:
-        return Outcome(Status.GAVE_UP, reason=NO_MEMORY, seconds=perf_counter() - began)
+        return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY, seconds=perf_counter() - began)
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
     found = search(task, limits, deadline)
@@ -236,7 +236,7 @@ def search(
         except MemoryError:
             del searches[turn], spent[turn], kinds[turn]
             if not searches:
-                return Flat(Status.GAVE_UP, (), NO_MEMORY, counts)
+                return Flat(Status.GAVE_UP, (), OUT_OF_MEMORY, counts)
         except StopIteration as end:
             if end.value is None:
                 return Flat(

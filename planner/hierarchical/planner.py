@@ -29,13 +29,14 @@ from planner.hierarchical.detours import without_detours
 from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
-from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
+from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.levels import levels_left
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
+from planner.transitions import arguments_of
 from reasoner.amounts import meets
-from reasoner.symbols import FALSE, Problem
+from reasoner.symbols import FALSE, Problem, Symbol
 
-__all__ = ["EASY", "Call", "Compiled", "compiled", "plan"]
+__all__ = ["Call", "Compiled", "compiled", "plan"]
 
 IMPROVEMENTS = 2
 """So many shapes of clusters are planned anew by default."""
@@ -132,17 +133,39 @@ def _plan(
     if recovery.too_large is not None:
         text = f"goals in series found no plan, and {recovery.too_large.text}"
         return outcome(Status.GAVE_UP, reason=Reason(text))
-    from planner.grounded.best_first import plan_level
     from planner.hierarchical.flattened import regrouped
 
-    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-    flat = plan_level(problem, limits=Limits(limits.expansions, left))
-    for level, counts in flat.search.items():
-        call.segments.counts[level].add(counts)
+    flat = lowest_alone(call, limits)
     found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
     return outcome(flat.status, found, flat.reason)
+
+
+def lowest_alone(call: Call, limits: Limits) -> Outcome:
+    """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
+    from planner.grounded.best_first import plan_level
+    from planner.validation import validate
+
+    problem, deadline, lowest = call.problem, call.segments.deadline, call.program.levels[-1]
+    call.table.undo(0)
+    restless = {cell: value for level in call.program.levels[1:] for cell, value in call.restless(level).items()}
+    rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
+    goal = problem.goal_on(lowest)
+    for wanted in (goal, {**rests, **goal}):
+        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+        flat = plan_level(problem, lowest, goal=wanted, limits=Limits(limits.expansions, left))
+        for level, counts in flat.search.items():
+            call.segments.counts[level].add(counts)
+        if not rests or flat.plan is None or not validate(problem, flat.plan):
+            break
+    if (
+        wanted is not goal and flat.status is Status.UNSOLVABLE
+    ):  # a plan may be left that doesn't touch all that doesn't rest
+        return replace(
+            flat, status=Status.GAVE_UP, reason=Reason("plans were found that leave what they touch not at rest")
+        )
+    return flat
 
 
 def achieved(recovery: Recovery) -> bool:

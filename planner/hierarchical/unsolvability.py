@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from planner.hierarchical.operators import Achieve, Achiever, Program
 from planner.hierarchical.subplans import Segments
 from planner.hierarchical.subproblem import LEAST
-from planner.plan import NO_MEMORY, Reason, TooLargeError, UnsolvableError
+from planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
 from reasoner.symbols import (
     FALSE,
@@ -257,7 +257,7 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
     except TooLargeError as error:
         return Reason(f"level {level} is too large to be grounded: {error}")
     except MemoryError:
-        return NO_MEMORY
+        return OUT_OF_MEMORY
     if isinstance(task, Reason):
         raise UnsolvableError(task)
     return task

@@ -18,7 +18,7 @@ from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.novelty import Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
-from planner.plan import NO_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
+from planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
 from planner.solve import MODES, Request, solve
 from planner.validation import validate
 from reasoner.pddl.importing import imported
@@ -369,4 +369,4 @@ def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypa
 def test_a_call_that_runs_out_of_memory_gives_up_and_says_so(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(MODES, mode, lambda request: np.empty(1 << 55))
     outcome = solve(Request(carrier(2), mode))
-    assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, NO_MEMORY)
+    assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, OUT_OF_MEMORY)

@@ -11,7 +11,7 @@ from planner.grounded.unreachable import blocked, unreachable
 from planner.hierarchical.planner import Call, compiled
 from planner.hierarchical.subproblem import LEAST
 from planner.hierarchical.unsolvability import LOOKING, closed, exhausted, impossible, looked_at, proved, refusal
-from planner.plan import NO_MEMORY, Reason, UnsolvableError
+from planner.plan import OUT_OF_MEMORY, Reason, UnsolvableError
 from reasoner.amounts import Quantity
 from reasoner.symbols import (
     FALSE,
@@ -383,7 +383,7 @@ def test_a_level_for_which_memory_runs_out_proves_nothing(monkeypatch: pytest.Mo
         raise MemoryError
 
     monkeypatch.setattr("planner.grounded.grounding.ground", out)
-    assert proved(kitchen({"AT cup1": "sink"}), 1) == NO_MEMORY
+    assert proved(kitchen({"AT cup1": "sink"}), 1) == OUT_OF_MEMORY
 
 
 def test_all_states_are_looked_at_only_within_bounds_and_never_twice() -> None:

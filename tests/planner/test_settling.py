@@ -6,9 +6,11 @@ import pytest
 
 from planner.hierarchical.planner import plan
 from planner.plan import Limits, Status
+from planner.solve import Request, solve
 from planner.validation import successor, validate
 from reasoner.symbols import Problem, State
 from worlds.families import family
+from worlds.hierarchies import hierarchy
 
 
 def course(problem: Problem) -> list[State]:
@@ -41,3 +43,13 @@ def test_that_a_lower_level_comes_first_is_told() -> None:
         [step.level for step in outcome.plan.steps].index(1) == sum(step.level > 1 for step in outcome.plan.steps) > 0
     )
     assert [text[:34] for text in outcome.given_up] == ["steps of a lower level come first:"]
+
+
+@pytest.mark.parametrize("seed", (9902726, 9903910, 9904745))
+def test_the_lowest_level_alone_leaves_nothing_touched_that_was_found_not_at_rest(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planner.hierarchical.planner.soon", lambda recovery: False)
+    monkeypatch.setattr("planner.hierarchical.planner.achieved", lambda recovery: False)
+    outcome = solve(Request(hierarchy(seed)))
+    assert outcome.status is Status.SOLVED
