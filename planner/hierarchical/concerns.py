@@ -24,17 +24,19 @@ class Concern:
     asked: frozenset[Cell]
 
 
-def put_aside(steps: Sequence[Concern]) -> bool:
-    """Whether a step gives a symbol a value that nobody asks for before a later step overwrites it.
+def put_aside(steps: Sequence[Concern]) -> dict[int, None]:
+    """Return the positions of steps that give a symbol a value that nobody asks for before a later step overwrites it.
 
     Only then can a level below save something that a level must do: elsewhere every step serves another one or the goal.
     """
-    idle: set[Cell] = set()
-    for step in steps:
-        if not idle.isdisjoint(step.touched):
-            return True
-        idle = (idle - step.asked) | step.touched
-    return False
+    idle: dict[Cell, int] = {}
+    found: dict[int, None] = {}
+    for position, step in enumerate(steps):
+        found.update((idle[cell], None) for cell in step.touched if cell in idle)
+        for cell in step.asked:
+            idle.pop(cell, None)
+        idle.update(dict.fromkeys(step.touched, position))
+    return found
 
 
 def concerns(refiner: Refiner, steps: Sequence[RefinedStep]) -> list[Concern]:

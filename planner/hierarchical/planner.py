@@ -25,7 +25,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from planner.hierarchical.concerns import concerns, put_aside
-from planner.hierarchical.detours import without_detours
+from planner.hierarchical.detours import AGAIN, without_detours
 from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
@@ -227,6 +227,11 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     first, call.steps = call.steps, fewer(call)
     concerned = concerns(call.refiner, call.steps)
     aside = put_aside(concerned)
+    needed = without_needless(call, list(aside))
+    if len(needed) < len(call.steps):
+        call.steps = needed
+        concerned = concerns(call.refiner, call.steps)
+        aside = put_aside(concerned)
     before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
     if not leave_levels:
         return False
@@ -290,6 +295,23 @@ def fewer(call: Call) -> list[RefinedStep]:
     if not all(map(other.met, other.goal)):  # what the first level doesn't see
         Recovery(other, solvable=True).finish()
     return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
+
+
+def without_needless(call: Call, positions: Sequence[int]) -> list[RefinedStep]:
+    """Return a call's steps without those at some positions, each with what then can't be done, that the goals don't need."""
+    refiner, table = call.refiner, call.table
+    if abstract(call, call.steps) < len(call.steps):
+        return call.steps  # where a level was left, what is put aside may be what brings something to rest
+    kept = dict(enumerate(call.steps))
+    for number in positions[:AGAIN]:
+        if number in kept:
+            call.redo([step for other, step in kept.items() if other < number])
+            later = {other: refiner.again(step) for other, step in kept.items() if other > number}
+            if all(map(call.met, call.goal)):
+                before = {other: step for other, step in kept.items() if other < number}
+                kept = before | {other: step for other, step in later.items() if step is not None}
+    table.undo(0)
+    return list(kept.values())
 
 
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:

@@ -259,7 +259,9 @@ class Refiner:
         for _ in range(ATTEMPTS):
             found = world.search()
             if found is None:
-                return None
+                if not self.drifting or not world.by_other_ways():
+                    return None
+                continue
             steps: list[RefinedStep] = []
             for position, (name, arguments) in enumerate(found):
                 step = self.do(level, name, arguments)

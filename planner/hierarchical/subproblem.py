@@ -66,6 +66,9 @@ class World:
     def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
         self.segments, self.level, self.width = segments, level, width
         self.plan: tuple[int, ...] = ()
+        self.ways: set[tuple[int, int]] = set()
+        """The step before each that was forbidden, or itself where it was the first, with the state in which it stands."""
+        self.other_ways = False
         self.task: Task | None = None
         with suppress(TooLargeError, OutOfTimeError, MemoryError):
             task = self._grounded(targets, keep, width)
@@ -109,11 +112,30 @@ class World:
     def forbid(self, position: int) -> None:
         """Take back the plan that was found last because of one of its steps, which can't be refined where it stands."""
         assert self.task is not None
+        before = self._same(max(position - 1, 0))
+        self.task.barred.update(before if self.other_ways else self._same(position))
+        self.ways |= before
+
+    def by_other_ways(self) -> bool:
+        """Allow what was forbidden, but for the steps that led to where it stood; whether that wasn't done before.
+
+        Whether a step can be refined may depend on what its level doesn't see, which is otherwise where another step leads there.
+        """
+        if self.task is None or self.other_ways or self.ways <= self.task.barred:
+            return False
+        self.other_ways = True
+        self.task.barred.clear()
+        self.task.barred.update(self.ways)
+        return True
+
+    def _same(self, position: int) -> set[tuple[int, int]]:
+        """Return the operators that are a step of the plan that was found last, with the state in which it stands."""
+        assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:
             state = self.task.applied(state, operator) or state
         name = self.task.describe(self.plan[position])[:2]
-        self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
+        return {(state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name}
 
 
 def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str] | None:

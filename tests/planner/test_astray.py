@@ -141,3 +141,22 @@ def test_what_level_1_does_not_see_and_all_goals_at_once_undid_is_a_goal_again()
     outcome = plan(problem)
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
+
+
+def test_a_step_that_cannot_be_refined_after_one_order_of_steps_may_be_after_another() -> None:
+    """Level 1 doesn't see where the robot is, and it has power for three ways."""
+    problem = hierarchy(9_801_920)
+    outcome = plan(problem, improve=0)
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
+    assert outcome.plan.length[1] == len(outcome.plan.steps) == 3
+
+
+def test_a_step_of_level_1_that_puts_something_aside_for_nothing_is_left_out() -> None:
+    problem = hierarchy(9_700_104)
+    first, outcome = plan(problem, improve=0), plan(problem)
+    assert first.plan is not None
+    assert outcome.plan is not None
+    assert validate(problem, outcome.plan) == []
+    assert len(first.plan.steps) == 8
+    assert outcome.plan.length[1] == len(outcome.plan.steps) == 7
