@@ -24,7 +24,7 @@ from planner.hierarchical.serialization import Call
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets, number, towards
 from reasoner.memory.experience import Ground, Rule
-from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition
+from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition
 
 WAYS, TRIES = 40, 3
 """So many ways to follow a rule are compared, and so many of the best of all rules tried."""
@@ -111,6 +111,8 @@ class Chains:
         self.needed: list[dict[Cell, str]] = []
         """What steps that are to be done ask, of each that is being prepared."""
         self.cut = False
+        self.taken: frozenset[str] = frozenset()
+        """Who is used up by ways that are to be gone together with those that are looked for."""
 
     def met(self, goal: Goal) -> bool:
         """Whether something is as wanted now."""
@@ -131,6 +133,7 @@ class Chains:
                 Candidate(rule, cell, *way)
                 for rule in rules
                 for way in islice(self.find(rule, cell, value, everybody), WAYS)
+                if self.taken.isdisjoint(way[0])
             ]
         return self.found[key]
 
@@ -161,7 +164,8 @@ class Chains:
         found = self.picked.get(id(candidates))
         if found is None:
             alike, now = self.call.program.alike, self.call.table.now
-            found = candidates if len(candidates) <= FEW else alike.unlike(candidates, (), now)
+            free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
+            found = free if len(free) <= FEW else alike.unlike(free, (), now)
             self.picked[id(candidates)] = found
         return found
 
@@ -205,10 +209,10 @@ class Chains:
         if most <= 0 or self.beyond.get(key, 0) >= most:
             self.cut |= key not in self.seen and self.beyond.get(key, 0) < inf
             return False
-        self.beyond[key] = most  # met again on the way, it isn't nearer
+        before, self.beyond[key] = self.beyond.get(key, 0), most  # met again on the way, it isn't nearer
         self.seen.add(key)
         if any(all(self.mended(level, way, n, most - 1, everybody) for n in way.unmet) for way in ways):
-            self.near[key] = most
+            self.near[key], self.beyond[key] = most, before
             return True
         return False
 
@@ -339,6 +343,65 @@ class Chains:
         step = call.refiner.do(level, *ground)
         return None if step is None else [*steps, step]
 
+    def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
+        """Do steps that lead to goals of which none can be reached after the others: what their last steps ask comes first.
+
+        Each has a way of its own, so that nobody is used up twice; of all that these lack the nearest is brought about first that
+        leaves the rest within reach. Without steps the table may be changed.
+        """
+        ways, steps = list[tuple[Goal, Candidate]](), list[RefinedStep]()
+        try:
+            for goal in goals:
+                found = self.nearest(level, goal)
+                if not found:
+                    return None
+                ways.append((goal, found[0][1]))
+                self.take(self.taken | used_up(found[0][1], self.call.program.problem))
+        finally:
+            self.take(frozenset())
+        lacks = (self.lacks(level, way, n) for _, way in ways for n in way.unmet)
+        wants = list(dict.fromkeys(its[0] for its in lacks if its))
+        while wants:
+            done = self.first(level, wants)
+            if done is None:
+                return None
+            steps += done
+            wants = [want for want in wants if not self.met(want)]
+        for goal, way in ways:
+            now = self.same(level, way, way.ground, goal)
+            done = self.go(level, now, 1, Budget(SLACK), (goal,)) if now is not None else None
+            if done is None:
+                return None
+            steps += done
+        return steps
+
+    def first(self, level: int, wants: Sequence[Goal]) -> Steps | None:
+        """Bring about the nearest of some wants after which those about as near are within reach."""
+        table = self.call.table
+        for far, want in self.by_distance(level, wants):
+            beside = [g for g in wants if g != want and self.distance(level, g, False, far + SLACK) < inf]
+            mark, done = len(table.trail), self.attain(level, want, Budget(far + SLACK))
+            if done and all(self.far(level, other) < inf for other in beside):
+                return done
+            table.undo(mark)
+        return None
+
+    def by_distance(self, level: int, wants: Sequence[Goal]) -> Iterator[tuple[int, Goal]]:
+        """Yield wants with their distances, the nearest first; those that nothing leads to are left out."""
+        left = list(wants)
+        for everybody in (False, True):
+            for n in range(FARTHEST + 1):
+                for want in list(left):
+                    if self.within(level, want, n, everybody):
+                        left.remove(want)
+                        yield n, want
+
+    def take(self, taken: frozenset[str]) -> None:
+        """Let nobody be looked for who is taken."""
+        self.taken = taken
+        self.found.clear()
+        self.picked.clear()
+
     def same(self, level: int, way: Candidate, ground: Ground, goal: Goal) -> Candidate | None:
         """Return the way to do the same step by the same rule that lacks least now."""
         now = (w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule and w.ground == ground)
@@ -346,9 +409,8 @@ class Chains:
 
     def mend(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
         """Bring about the next of the conditions that a way lacks."""
-        asks, env = self.achievers[way.rule.name].soft, way.named
-        first: tuple[int, float, int] | None = None
-        goals: list[tuple[float, bool, int, Goal]] = []
+        asks, env, table = self.achievers[way.rule.name].soft, way.named, self.call.table
+        found: list[tuple[int, float, int, list[Goal]]] = []
         for n in way.unmet:
             lacks = self.lacks(level, way, n)
             near = sorted((self.far(level, g), not self.mends(way, n, g), i, g) for i, g in enumerate(lacks))
@@ -357,12 +419,16 @@ class Chains:
             if near[0][0] == inf:
                 return None
             later = sum(m != n and self.before(asks[m], asks[n], env) for m in way.unmet)
-            if first is None or (later, -near[0][0], n) < first:
-                first, goals = (later, -near[0][0], n), near
-        for far, *_, goal in goals[:TRIES]:
-            done = self.attain(level, goal, budget, above) if far < inf else None
-            if done is not None:
-                return done
+            found.append((later, -near[0][0], n, [g for far, *_, g in near if far < inf]))
+        for *_, n, goals in sorted(found):
+            for goal in goals[:TRIES]:
+                mark, done = len(table.trail), self.attain(level, goal, budget, above)
+                if done is None:
+                    continue
+                others = (its for *_, m, its in found if m != n)
+                if all(any(self.far(level, g) < inf for g in its) for its in others):
+                    return done
+                table.undo(mark)  # what is brought about first must not put the others out of reach
         return None
 
     def mends(self, way: Candidate, number: int, goal: Goal) -> bool:
@@ -377,6 +443,22 @@ class Chains:
         if fresh:
             self.age = table.age  # all is as it was
         return holds
+
+
+def used_up(way: Candidate, problem: Problem) -> set[str]:
+    """Return of whom a way asks something that its step makes otherwise."""
+    behavior, env = problem.domain.behaviors[way.rule.does[0]], way.named
+    put = {p.name: who for p, who in zip(behavior.parameters, way.ground[1], strict=True)}
+    made = {
+        (e.situation, tuple([put.get(a, a) for a in e.arguments])): put.get(e.value, e.value) for e in behavior.effects
+    }
+    asked = [found for c in way.rule.asks if (found := fact(c, env)) is not None]
+    return {
+        who
+        for f in asked
+        if made.get((f.symbol.situation, f.symbol.arguments), f.value) != f.value
+        for who in f.symbol.arguments
+    }
 
 
 def fact(condition: Condition, env: Mapping[str, str]) -> Fact | None:

@@ -70,6 +70,8 @@ class Guide:
         self.off: dict[Cell, str] = {}
         self.first = call.program.levels[0]
         self.wasted, self.vain = 0, 0.0
+        self.serial = True
+        """Whether goals can be reached one after the other, for all that is known."""
         self.orders = frozenset(orders)
         self.constants = frozenset(call.program.named) | {TRUE, FALSE}
         self.before = _before(call.goal, orders, call.program)
@@ -144,8 +146,13 @@ class Guide:
         expanded = call.segments.expanded
         began = call.segments.effort + self.chains.spent
         outer, self.off = self.off, {}
+        other = self.another(targets) if level == self.first and self.serial else None
         try:
             steps = self.led(level, targets, keep)
+            if other is not None and (steps is None or self.chains.far(level, other) == inf):
+                call.table.undo(start)
+                self.serial = False  # not tried again
+                steps = self.chains.together(level, list(self.open().items()))
         except TooMuchError:
             steps = None
         finally:
@@ -158,6 +165,19 @@ class Guide:
             self.wasted += call.segments.expanded - expanded
         self.vain = max(self.vain, vain + call.segments.effort + self.chains.spent - began)
         call.table.undo(start)
+        return None
+
+    def another(self, targets: Mapping[Cell, str]) -> tuple[Cell, str] | None:
+        """Return another open goal of the same kind as a target to which chains lead now."""
+        alike = self.call.program.alike.sort
+        kinds = {(cell[0], *map(alike.get, arguments_of(cell[1]))) for cell in targets}
+        for cell, value in reversed(self.call.goal.items()):
+            if (
+                cell not in targets
+                and (cell[0], *map(alike.get, arguments_of(cell[1]))) in kinds
+                and not self.call.met(cell)
+            ):
+                return (cell, value) if self.chains.far(self.first, (cell, value)) < inf else None
         return None
 
     def led(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
