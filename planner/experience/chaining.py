@@ -107,6 +107,7 @@ class Chains:
         self.beyond: dict[tuple[int, Cell, str, bool], float] = {}
         """How long chains may be that lead to a goal, and how long they may not."""
         self.picked: dict[int, Sequence[str]] = {}
+        self.lacking: dict[tuple[int, int], tuple[Candidate, list[Goal]]] = {}
         self.seen: set[tuple[int, Cell, str, bool]] = set()
         self.needed: list[dict[Cell, str]] = []
         """What steps that are to be done ask, of each that is being prepared."""
@@ -119,12 +120,16 @@ class Chains:
         (situation, key), value = goal
         return meets(self.call.table.now[situation].get(key, FALSE), value)
 
-    def ways(self, level: int, goal: Goal, everybody: bool = False) -> list[Candidate]:
-        """Return the ways to follow rules for a goal now."""
+    def fresh(self) -> None:
+        """Forget what was found of another state."""
         if self.age != self.call.table.age:
             self.age = self.call.table.age
-            for known in (self.found, self.near, self.beyond, self.picked):
+            for known in (self.found, self.near, self.beyond, self.picked, self.lacking):
                 known.clear()
+
+    def ways(self, level: int, goal: Goal, everybody: bool = False) -> list[Candidate]:
+        """Return the ways to follow rules for a goal now."""
+        self.fresh()
         (cell, value), key = goal, (level, *goal, everybody)
         if key not in self.found:
             rules = self.rules.get((level, cell[0]), ())
@@ -171,6 +176,13 @@ class Chains:
 
     def lacks(self, level: int, way: Candidate, number: int) -> list[Goal]:
         """Return the wants of which one would do for a condition."""
+        self.fresh()
+        if (id(way), number) not in self.lacking:
+            self.lacking[id(way), number] = way, self.wanting(level, way, number)
+        return self.lacking[id(way), number][1]
+
+    def wanting(self, level: int, way: Candidate, number: int) -> list[Goal]:
+        """Return the same, anew."""
         achiever, env = self.achievers[way.rule.name], way.named
         asked = achiever.soft[number]
         defined = isinstance(asked, ValueCondition) and asked.situation in self.call.program.rules

@@ -2,7 +2,7 @@
 
 off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
 rank      how many rules must follow each other (`planner.experience.chaining`); what is nearest is brought about first
-promise   what came to be right must not go wrong again
+promise   what came to be right must not go wrong again, but once
 wasted    what was undone because a promise of the most abstract level was broken; nothing is tried there while that is more than a
           tenth of all expansions
 vain      all that came to nothing, rules that were asked included; of all effort that is never more than a tenth, and a little
@@ -37,6 +37,8 @@ FREE = 500_000
 """That is counted as if so much had been done before, in microseconds: a promise in a world with locks takes 20,000."""
 PATIENCE, SLACK = 3, 2
 """So many times as many steps are done as are promised, and so many more: each condition is promised by itself."""
+TWICE = 2
+"""So many times something is brought about in the end: what was shut is opened once more for what belongs into it."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
 Found = TypeVar("Found")
@@ -187,16 +189,18 @@ class Guide:
         origin: dict[Cell, str] = {}
         for cell, value in targets.items():
             self._look(cell, value)
-        closed: set[Cell] = set()
+        closed: dict[Cell, int] = {}
         steps: list[RefinedStep] = []
         while off:
-            among = sorted((self.chains.far(level, g), i, g) for i, g in enumerate(off.items()) if g[0] not in closed)
+            among = sorted(
+                (-self.chains.far(level, g), i, g) for i, g in enumerate(off.items()) if closed.get(g[0], 0) < TWICE
+            )
             done = None
             for far, _, goal in among:
-                done = self.chains.attain(level, goal, Budget(int(PATIENCE * far + SLACK))) if far < inf else None
+                done = self.chains.attain(level, goal, Budget(int(SLACK - PATIENCE * far))) if far > -inf else None
                 if done is not None:
                     steps += done
-                    closed.add(goal[0])
+                    closed[goal[0]] = closed.get(goal[0], 0) + 1
                     break
             if done is None:
                 return None

@@ -53,9 +53,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
     for variant in variants(problem):
         found = fast.plan(variant, limits=SHORT, using=using, improve=0).plan
         if found is not None:
-            course = Course(variant, grounds(found.steps))
-            lesson.said += course.rules_of()
-            lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
+            lesson += shows(variant, found, using)
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
     experience.learn(shown(experience, lesson, problem, using))
@@ -157,16 +155,22 @@ def learned(
     if at is not None:
         lesson = in_vain(experience, problem, steps[at], using, steps[:at])
         return lesson
-    course = Course(problem, grounds(steps))
+    lesson = shows(problem, plan, using)
+    own = [rule for rule in lesson.said if isinstance(rule, Rule)]
+    lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
+    return lesson
+
+
+def shows(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
+    """Return the rules and orders of a plan's steps, and those of their refinements with the methods."""
+    course = Course(problem, grounds(plan.steps))
     lesson = Lesson(said=list(course.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
-    for one in refined(Call(problem, using, None, SHORT.expansions), steps):
+    for one in refined(Call(problem, using, None, SHORT.expansions), plan.steps):
         if isinstance(one, Rule):
             lesson.said.append(one)
         else:
             lesson.counted.append((one, ITSELF, CHOSEN))
-    own = [rule for rule in lesson.said if isinstance(rule, Rule)]
-    lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
     return lesson
 
 
