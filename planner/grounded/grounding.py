@@ -61,6 +61,7 @@ def ground(
     goal: State | None = None,
     most: int = MOST_ROWS,
     deadline: float | None = None,
+    apart: bool = False,
 ) -> Task | Reason:
     """Ground one level of a problem.
 
@@ -75,6 +76,8 @@ def ground(
         Rows that one join may have.
     deadline : float, optional
         On the clock of `time.perf_counter`.
+    apart : bool
+        Whether operators may be told apart by arguments and effects alone: where some crane is asked for, not by which.
 
     Returns
     -------
@@ -91,7 +94,7 @@ def ground(
         A behaviour names a variable that nothing determines.
     """
     level = problem.domain.levels[-1] if level is None else level
-    reached = Reached(problem, level, problem.initial if initial is None else initial, most, deadline)
+    reached = Reached(problem, level, problem.initial if initial is None else initial, most, deadline, apart)
     reached.close()
     wanted = problem.goal if goal is None else goal
     for symbol, value in sorted(wanted.items()):

@@ -16,6 +16,7 @@ from planner.grounded.amounts import AmountTable
 from planner.grounded.formulas import Formulas
 from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
+from planner.grounded.separation import in_parts
 from planner.plan import OutOfTimeError
 from reasoner.language import mentions
 from reasoner.symbols import (
@@ -55,7 +56,9 @@ class Reached:
         Those that stand for a part of a rule, which nobody has named.
     """
 
-    def __init__(self, problem: Problem, level: int, initial: State, most: int, deadline: float | None) -> None:
+    def __init__(
+        self, problem: Problem, level: int, initial: State, most: int, deadline: float | None, apart: bool = False
+    ) -> None:
         self.problem, self.level, self.most, self.deadline = problem, level, most, deadline
         known = (s for s in problem.domain.situations.values() if s.level <= level and s.quantity is None)
         self.situations = {s.name: s for s in known}
@@ -76,7 +79,17 @@ class Reached:
             self.defined |= made.keys()
             changed |= made.keys()
         self.changed = changed
-        self.schemas = [s for behavior in behaviors for s in schemas(behavior, situations, changed, members)]
+        self.schemas, parts = [], list[Schema]()
+        for behavior in behaviors:
+            base, *conditional = schemas(behavior, situations, changed, members)
+            if apart and not conditional:
+                (base, *more), made = in_parts(base, members)
+                parts += more
+                self.situations |= made
+                self.made |= made.keys()
+                self.defined |= made.keys()
+            self.schemas += [base, *conditional]
+        self.schemas += parts
         self.schemas += [replace(s, rule=True) for rule in rules for s in schemas(rule, situations, changed, members)]
         self.individuals = tuple(dict.fromkeys(self._individuals()))
         self.number = {name: i for i, name in enumerate(self.individuals)}

@@ -12,6 +12,7 @@ and searches is imported where a world is looked at: numpy alone takes longer to
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
@@ -90,7 +91,8 @@ class World:
         for cell in segments.defined:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
-        return ground(small, level, goal=goal, most=5 * width.work // MAKING, deadline=segments.deadline)
+        most, deadline, needed = 5 * width.work // MAKING, segments.deadline, segments.most_work == math.inf
+        return ground(small, level, goal=goal, most=most, deadline=deadline, apart=needed)
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""

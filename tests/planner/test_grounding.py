@@ -134,17 +134,17 @@ def transitions(task: Task) -> set[frozenset[tuple[Symbol, str]]]:
     return {key(task.values(state)) for state in seen}
 
 
-def grounded(problem: Problem) -> Task | Reason | None:
+def grounded(problem: Problem, apart: bool = False) -> Task | Reason | None:
     try:
-        return ground(problem)
+        return ground(problem, apart=apart)
     except DomainError:
         return None
 
 
-@given(problems())
+@given(problems(), flags)
 @settings(max_examples=150)
-def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem) -> None:
-    task = grounded(problem)
+def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem, apart: bool) -> None:
+    task = grounded(problem, apart)
     if task is None:
         return
     states, solvable = explore(problem)
@@ -163,10 +163,10 @@ def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem) -> N
         assert wanted(problem, complete(problem) | task.values(state))
 
 
-@given(problems())
+@given(problems(), flags)
 @settings(max_examples=60)
-def test_every_operator_is_what_the_behaviour_does(problem: Problem) -> None:
-    task = grounded(problem)
+def test_every_operator_is_what_the_behaviour_does(problem: Problem, apart: bool) -> None:
+    task = grounded(problem, apart)
     if not isinstance(task, Task):
         return
     start = complete(problem)
@@ -301,6 +301,36 @@ def parking(things: int, places: int) -> Problem:
         {Symbol("AT", (x,)): p for x, p in zip(who, where, strict=False)},
         {Symbol("AT", (x,)): p for x, p in zip(who, where[1:], strict=False)},
     )
+
+
+def test_by_which_of_many_something_is_done_makes_no_operators_of_its_own() -> None:
+    size = 12
+    places, cranes = tuple(f"p{i}" for i in range(size)), tuple(f"c{i}" for i in range(size))
+    stands = (ValueCondition("AT", ("?x",), "?u"), ValueCondition("NEAR", ("?y", "?u"), TRUE))
+    move = Behavior(
+        "MOVE",
+        1,
+        (Parameter("?x", "Thing"), Parameter("?v", "Place")),
+        (Parameter("?u", "Place"), Parameter("?y", "Crane")),
+        (*stands, ValueCondition("NEAR", ("?y", "?v"), TRUE)),
+        (ValueEffect("AT", ("?x",), "?v"),),
+    )
+    shift = Behavior("SHIFT", 1, (Parameter("?y", "Crane"), Parameter("?v", "Place")), (), (),
+                     (ValueEffect("NEAR", ("?y", "?v"), TRUE),))  # fmt: skip
+    situations = {"AT": SITUATIONS["AT"], "NEAR": SituationType("NEAR", ("Crane", "Place"), "Truth", boolean=True)}
+    problem = Problem(
+        "urn:cranes",
+        Domain(situations, {"MOVE": move, "SHIFT": shift}),
+        {"Truth": (FALSE, TRUE), "Thing": ("x",), "Place": places, "Crane": cranes},
+        {},
+        {Symbol("AT", ("x",)): places[0]},
+        {Symbol("AT", ("x",)): places[1]},
+    )
+    told, apart = ground(problem), ground(problem, apart=True)
+    assert isinstance(told, Task) and isinstance(apart, Task)
+    assert len(told) == size**3 + size**2
+    assert len(apart) == 2 * size**2
+    assert len(search(told).plan) == len(search(apart).plan) == 3
 
 
 def test_what_many_operators_ask_is_said_once_and_means_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
