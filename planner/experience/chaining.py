@@ -373,8 +373,11 @@ class Chains:
             self.take(frozenset())
         lacks = (self.lacks(level, way, n) for _, way in ways for n in way.unmet)
         wants = list(dict.fromkeys(its[0] for its in lacks if its))
+        effort = self.call.segments.effort
         while wants:
             done = self.first(level, wants)
+            self.spend(self.call.segments.effort - effort)  # refinements that are searched count, too
+            effort = self.call.segments.effort
             if done is None:
                 return None
             steps += done
@@ -433,6 +436,7 @@ class Chains:
             later = sum(m != n and self.before(asks[m], asks[n], env) for m in way.unmet)
             found.append((later, -near[0][0], n, [g for far, *_, g in near if far < inf]))
         for *_, n, goals in sorted(found):
+            lost = False
             for goal in goals[:TRIES]:
                 mark, done = len(table.trail), self.attain(level, goal, budget, above)
                 if done is None:
@@ -440,7 +444,10 @@ class Chains:
                 others = (its for *_, m, its in found if m != n)
                 if all(any(self.far(level, g) < inf for g in its) for its in others):
                     return done
-                table.undo(mark)  # what is brought about first must not put the others out of reach
+                table.undo(mark)
+                lost = True
+            if not lost:  # else another condition comes first: this one put the others out of reach
+                return None
         return None
 
     def mends(self, way: Candidate, number: int, goal: Goal) -> bool:

@@ -151,7 +151,7 @@ class Guide:
         other = self.another(targets) if level == self.first and self.serial else None
         try:
             steps = self.led(level, targets, keep)
-            if other is not None and (steps is None or self.chains.far(level, other) == inf):
+            if steps is not None and other is not None and self.chains.far(level, other) == inf:
                 call.table.undo(start)
                 self.serial = False  # not tried again
                 steps = self.chains.together(level, list(self.open().items()))
@@ -192,11 +192,14 @@ class Guide:
         closed: dict[Cell, int] = {}
         steps: list[RefinedStep] = []
         while off:
+            before = _before(off, self.orders, self.call.program)
             among = sorted(
-                (-self.chains.far(level, g), i, g) for i, g in enumerate(off.items()) if closed.get(g[0], 0) < TWICE
+                (sum(other in off for other in before.get(g[0], ())), -self.chains.far(level, g), i, g)
+                for i, g in enumerate(off.items())
+                if closed.get(g[0], 0) < TWICE
             )
             done = None
-            for far, _, goal in among:
+            for _, far, _, goal in among:
                 done = self.chains.attain(level, goal, Budget(int(SLACK - PATIENCE * far))) if far > -inf else None
                 if done is not None:
                     steps += done
@@ -256,7 +259,7 @@ def usable(experience: Experience) -> list[Order]:
     return found
 
 
-def _before(goal: Mapping[Cell, str], orders: Sequence[Order], program: Program) -> dict[Cell, list[Cell]]:
+def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program) -> dict[Cell, list[Cell]]:
     """Return for each goal those that come before it."""
     found: dict[Cell, list[Cell]] = {}
     parts = {cell: (*arguments_of(cell[1]), value) for cell, value in goal.items()}
