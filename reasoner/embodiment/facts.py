@@ -80,7 +80,7 @@ class Facts:
         """Return an attribute's text, or raise that it's missing."""
         value = self.attributes.get(node, {}).get(name, default)
         if value is None:
-            raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)")
+            raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)", node)
         return value
 
     def number(self, node: str, name: str, default: float | None = None) -> float:
@@ -93,7 +93,7 @@ class Facts:
         try:
             return tuple(float(word) for word in value.split())
         except ValueError:
-            raise EmbodimentError(f"{node} has :{camel(name)} '{value}'; wanted numbers") from None
+            raise EmbodimentError(f"{node} has :{camel(name)} '{value}'; wanted numbers", node) from None
 
     def position(self, node: str, default: str | None = None) -> Vector:
         """Return a node's coordinates."""
@@ -108,7 +108,7 @@ class Facts:
         """Return a node's colour."""
         numbers = self.numbers(node, "color", default)
         if len(numbers) != 4:
-            raise EmbodimentError(f"{node} has :color {numbers}; wanted red, green, blue and opacity")
+            raise EmbodimentError(f"{node} has :color {numbers}; wanted red, green, blue and opacity", node)
         return (numbers[0], numbers[1], numbers[2], numbers[3])
 
     def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
@@ -119,7 +119,8 @@ class Facts:
             if (folder / file).is_file():
                 return str(folder / file)
         raise EmbodimentError(
-            f"{node} has :{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}"
+            f"{node} has :{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}",
+            node,
         )
 
     def all_numbers(self, node: str) -> dict[str, float]:

@@ -16,6 +16,7 @@ JOINTS = ("revolute", "prismatic", "fixed")
 
 def mechanisms(facts: Facts, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Mechanism, ...]:
     """Return the mechanisms of a scene, each with the links that are part of it."""
+    _all_hang(facts)
     return tuple(_mechanism(facts, node, names, folders) for node in facts.members("Mechanism"))
 
 
@@ -29,6 +30,29 @@ def _mechanism(facts: Facts, node: str, names: Callable[[str], str], folders: Se
         facts.number(node, "friction", 0.8),
         facts.file(node, "urdf", folders) if facts.text(node, "urdf", "") else "",
     )
+
+
+def _all_hang(facts: Facts) -> None:
+    """Raise that a link hangs on no mechanism, or on itself."""
+    mechanisms = {*facts.members("Mechanism")}
+    for node in facts.ordered(node for node, links in facts.links.items() if "part_of" in links):
+        above = [node]
+        while above[-1] not in mechanisms:
+            parents = facts.linked(above[-1], "part_of")
+            if len(parents) != 1 or parents[0] in above:
+                raise EmbodimentError(_unhung(above, parents), node)
+            above.append(parents[0])
+
+
+def _unhung(above: Sequence[str], parents: Sequence[str]) -> str:
+    """Say why what is above a link, itself first, doesn't lead to a mechanism."""
+    if not parents:
+        why = f"{above[-1]} is neither an e:Mechanism nor part of one"
+    elif len(parents) > 1:
+        why = f"{above[-1]} has {len(parents)} values of :partOf: {', '.join(parents)}"
+    else:
+        why = f"{above[-1]} is :partOf {parents[0]} in turn" if len(above) > 1 else "it is :partOf itself"
+    return f"{above[0]} hangs on no mechanism: {why}; state one :partOf, a mechanism or a link that hangs on one"
 
 
 def _links(facts: Facts, mechanism: str) -> list[str]:
@@ -46,10 +70,10 @@ def _links(facts: Facts, mechanism: str) -> list[str]:
 def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
     kind, parent = facts.text(node, "joint", "fixed"), facts.linked(node, "part_of")[0]
     if kind not in JOINTS:
-        raise EmbodimentError(f"{node} has :joint '{kind}'; wanted one of {', '.join(JOINTS)}")
+        raise EmbodimentError(f"{node} has :joint '{kind}'; wanted one of {', '.join(JOINTS)}", node)
     axis = facts.numbers(node, "axis", "0 0 1")
     if len(axis) != 3 or not any(axis):
-        raise EmbodimentError(f"{node} has :axis {axis}; wanted the three coordinates of a direction")
+        raise EmbodimentError(f"{node} has :axis {axis}; wanted the three coordinates of a direction", node)
     upper = facts.number(node, "upper", 0.0)
     return Link(
         names(node),
@@ -80,7 +104,7 @@ def _parts(facts: Facts, node: str, names: Callable[[str], str], folders: Sequen
 def _part(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Part:
     kind = facts.text(node, "kind")
     if kind not in KINDS and kind != "mesh":
-        raise EmbodimentError(f"{node} has :kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}")
+        raise EmbodimentError(f"{node} has :kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}", node)
     x, y, z = (facts.number(node, name) * (2 if name == "radius" else 1) for name in KINDS.get(kind, KINDS["box"]))
     file = facts.file(node, "mesh", folders) if kind == "mesh" else ""
     place = facts.position(node, "0")

@@ -74,7 +74,7 @@ def _phase(facts: Facts, node: str) -> Phase:
 
     offset = sum_of("offset", "0 0 0").split()
     if len(offset) != 3:
-        raise EmbodimentError(f"{node} has :offset '{text('offset')}'; wanted three numbers or settings: x y z")
+        raise EmbodimentError(f"{node} has :offset '{text('offset')}'; wanted three numbers or settings: x y z", node)
     found = Phase(
         local_name(node),
         text("motion"),
@@ -101,10 +101,14 @@ def _phase(facts: Facts, node: str) -> Phase:
     ):
         for word in said:
             if word not in known:
-                raise EmbodimentError(f"{node} has the {what} '{word}'; wanted one of {', '.join(filter(None, known))}")
+                raise EmbodimentError(
+                    f"{node} has the {what} '{word}'; wanted one of {', '.join(filter(None, known))}", node
+                )
     for expression in (*found.offset, found.above, found.value, found.speed, found.wait):
         if expression != "".join(match[0] for match in TERM.finditer(expression)):
-            raise EmbodimentError(f"{node} has '{expression}'; wanted numbers and settings with signs between them")
+            raise EmbodimentError(
+                f"{node} has '{expression}'; wanted numbers and settings with signs between them", node
+            )
     return found
 
 
@@ -114,7 +118,9 @@ def _guards(node: str, text: str) -> tuple[Guard, ...]:
     for piece in (piece.strip() for piece in text.split(";")):
         match = GUARD.fullmatch(piece)
         if piece and match is None:
-            raise EmbodimentError(f"{node} has the guard '{piece}'; wanted QUANTITY >= VALUE, or <=, maybe else CODE")
+            raise EmbodimentError(
+                f"{node} has the guard '{piece}'; wanted QUANTITY >= VALUE, or <=, maybe else CODE", node
+            )
         if match is not None:
             guards.append(Guard(match[1], 1 if match[2] == ">=" else -1, snake(match[3]), match[4] or ""))
     return tuple(guards)

@@ -175,8 +175,11 @@ def _line(file: Path | None, node: str) -> int:
     """Return the first line on which a Turtle file has the node as its subject, else on which it has its name."""
     if file is None or file.suffix != ".ttl":
         return 0
-    text, name = file.read_text(encoding="utf-8"), re.escape(local_name(node))
-    for pattern in (rf"^[\w-]*:{name}(?=\s)", rf"^<{re.escape(node)}>", rf"[:/#]{name}(?![\w.-])"):
+    text, short = file.read_text(encoding="utf-8"), local_name(node)
+    name, space = re.escape(short), re.escape(node.removesuffix(short))
+    prefixes = re.findall(rf"^\s*@?prefix\s+([\w.-]*):\s*<{space}>", text, re.MULTILINE | re.IGNORECASE)
+    own = "|".join(map(re.escape, prefixes)) if prefixes else r"(?!)"
+    for pattern in (rf"^(?:{own}):{name}(?=\s)", rf"^<{re.escape(node)}>", rf"[:/#]{name}(?![\w.-])"):
         if found := re.search(pattern, text, re.MULTILINE):
             return text.count("\n", 0, found.start()) + 1
     return 0

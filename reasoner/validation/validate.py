@@ -189,7 +189,7 @@ def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) ->
         embodiment = read_embodiment(graph.store, reading.names.short, graph.folders)
     except EmbodimentError as error:
         why = "physics reads the file in the same way"
-        yield places.finding("unreadable-body", graph.scene, str(error), why, "see the message")
+        yield places.finding("unreadable-body", error.node or graph.scene, str(error), why, "see the message")
         return
     for rule, faults in (measures.RULES | skill_checks.RULES).items():
         for name, what, why, remedy in faults(embodiment):

@@ -238,3 +238,24 @@ def test_a_number_that_a_behaviour_reads_of_a_smaller_class_may_be_lacking_elsew
     """
     domain.write_text(domain.read_text(encoding="utf-8") + pot, encoding="utf-8")
     assert [finding for finding in validate([scene]) if finding.rule == "number-missing"] == []
+
+
+@pytest.mark.parametrize("name", ["sway", "watering-bodies"])
+def test_what_physics_can_t_read_is_told_at_the_line_of_its_individual(name: str, tmp_path: Path) -> None:
+    scene = skeleton(tmp_path, WITH_BODIES)
+    file = tmp_path / "watering-bodies.ttl"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    lines += ["e:lift e:phase :{} .", ':{} a owl:NamedIndividual, e:Phase ; c:index 9 ; e:motion "jump" .']
+    file.write_text("\n".join(lines).replace("{}", name) + "\n", encoding="utf-8")
+    (finding,) = (finding for finding in validate([scene]) if finding.rule == "unreadable-body")
+    assert (Path(finding.file), finding.line) == (file, len(lines))
+
+
+def test_an_ontology_is_told_at_its_own_line_where_an_individual_has_the_last_part_of_its_name(tmp_path: Path) -> None:
+    file = tmp_path / "another.ttl"
+    file.write_text(
+        "@prefix : <https://example.org/shove#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n"
+        "<https://example.org/shove> a owl:Ontology .\n:shove a owl:NamedIndividual, owl:Thing .\n",
+        encoding="utf-8",
+    )
+    assert {finding.rule: finding.line for finding in validate([file])}["file-name-and-iri"] == 3
