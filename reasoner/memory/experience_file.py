@@ -251,11 +251,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
         for subject, node in nodes.items():
             if "epoch" in node:
                 who = reader.one(subject, "replica"), _count(reader.one(subject, "epoch"), "epoch")
-                about = _local(reader.one(subject, "countsFor"))
-                if about in named:  # what was deleted isn't counted any more
+                about = _local(reader.one(subject, "countsFor")) if "countsFor" in node else ""
+                if about in named:
                     tallies = experience.counts.setdefault(who, {}).setdefault(named[about], {})
                     counters[_local(subject)] = tallies
-                else:
+                else:  # what was deleted isn't counted any more; Protégé deletes with a rule all that names it
                     counters[_local(subject)] = {}
         for counter, target, tally in links:
             fact = facts[target] if target.startswith("fact_") else ITSELF

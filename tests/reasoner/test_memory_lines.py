@@ -251,3 +251,14 @@ def test_a_deleted_rule_takes_its_counts_with_it_and_nothing_else() -> None:
     found = read(text)
     assert set(found.said) == {kept.name}
     assert found.totals().keys() == {kept.name}
+
+
+def test_a_rule_that_another_editor_deleted_with_all_that_names_it_leaves_the_rest_of_the_memory() -> None:
+    kept = GoalKind("AT", ("Cup", "Day"))
+    named = f"#{rule().name}>"
+    triples = [str(triple) for triple in lines(written(rule(), kept)).triples]
+    left = [f"{triple} .\n" for triple in triples if named not in triple]
+    assert any("countsFor" in triple for triple in set(triples) - {line[:-3] for line in left})
+    found = read("".join(left))
+    assert set(found.said) == {kept.name}
+    assert [set(counts) for counts in found.counts.values()] == [{kept.name}]
