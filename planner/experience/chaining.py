@@ -5,6 +5,7 @@ distance   how many rules must follow each other at least, each condition taken 
 lacks      the wants, one of which would do, for an unmet condition (`planner.hierarchical.subgoals`)
 attain     the nearest way is gone: its conditions are brought about in the order in which plans did, the farthest first where
            none is known, then its step is done; what was reached on the way may be lost and brought about again, a few times
+together   several goals, where one alone would put the others out of reach: what all of them lack comes before their last steps
 
 A want isn't sought while it is sought already. Each step that is done costs the budget, and what comes to nothing is undone.
 """
