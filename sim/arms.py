@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -81,9 +81,19 @@ class Arm:
         return np.asarray((self.lower + self.upper) / 2)
 
     @cached_property
-    def crosses(self) -> Array:
-        """Cross-product matrices (k, 3, 3) of the axes."""
-        return np.stack([cross_matrix(axis) for axis in self.axes])
+    def turning(self) -> tuple[Array, Array]:
+        """Cross-product matrices (k, 3, 3) of the axes, and their squares."""
+        crosses = np.stack([cross_matrix(axis) for axis in self.axes])
+        return crosses, crosses @ crosses
+
+    @cached_property
+    def limbs(self) -> tuple[float, float, Array, float, float]:
+        """Lengths of upper arm and forearm, the elbow's frame (3, 3), its bend in radians, and the side (1 or -1) it bends to."""
+        a, b, hinge = self.upper_length, self.lower_length, self.axes[3]
+        upper, fore = (self.elbow - self.shoulder) / a, (self.wrist - self.elbow) / b
+        bent = float(np.arctan2(cross(upper, fore) @ hinge, upper @ fore))
+        side = 1.0 if (self.lower[3] + self.upper[3]) / 2 + bent > 0 else -1.0
+        return a, b, np.stack([upper, hinge, cross(upper, hinge)], -1), bent, side
 
 
 def read_arm(
@@ -168,12 +178,21 @@ def cross(a: Array, b: Array) -> Array:
     """Return vector products (..., 3); `numpy.cross` takes four times as long over a few of them."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], -1)
+    product = np.empty((*np.broadcast(x, u).shape, 3))
+    product[..., 0], product[..., 1], product[..., 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    return product
 
 
 def turn(axis: Array, angle: Array) -> Array:
     """Return rotation matrices (n, 3, 3) about a unit `axis` (3,) by `angle` (n,) radians."""
-    return _turned(cross_matrix(axis), angle)
+    return _turned(*_turning(axis.tobytes()), angle)
+
+
+@lru_cache(maxsize=64)
+def _turning(axis: bytes) -> tuple[Array, Array]:
+    """Return the cross-product matrix (3, 3) of an axis, and its square: an arm has few axes, about which it often turns."""
+    crosses = cross_matrix(np.frombuffer(axis))
+    return crosses, crosses @ crosses
 
 
 def turn_about(vectors: Array) -> Array:
@@ -181,13 +200,14 @@ def turn_about(vectors: Array) -> Array:
     angle = np.linalg.norm(vectors, axis=-1)
     x, y, z = (vectors / np.maximum(angle, 1e-12)[:, None]).T
     zero = np.zeros(len(angle))
-    return _turned(np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3), angle)
+    crosses = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)
+    return _turned(crosses, crosses @ crosses, angle)
 
 
-def _turned(crosses: Array, angle: Array) -> Array:
-    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given by their cross-product matrices."""
+def _turned(crosses: Array, squares: Array, angle: Array) -> Array:
+    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes: their cross-product matrices, and these squared."""
     sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    matrices: Array = EYE + sin * crosses + (1 - cos) * (crosses @ crosses)
+    matrices: Array = EYE + sin * crosses + (1 - cos) * squares
     return matrices
 
 
@@ -197,7 +217,7 @@ def link_transforms(arm: Arm, q: Array) -> tuple[Array, Array]:
     A point x of link i at the zero posture is at ``R[:, i] @ x + t[:, i]``.
     """
     rotations, shifts = np.empty((*q.shape, 3, 3)), np.empty((*q.shape, 3))
-    local = _turned(arm.crosses, q)
+    local = _turned(*arm.turning, q)
     offset = arm.origins - np.einsum("nkij,kj->nki", local, arm.origins)
     r, t = local[:, 0], offset[:, 0]
     rotations[:, 0], shifts[:, 0] = r, t

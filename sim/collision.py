@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reasoner.embodiment.values import Fixture
 from sim.arms import Arm, Flags, link_transforms, turn
@@ -19,7 +20,7 @@ from sim.urdf import Array, Model, Spheres
 EDGE, BETWEEN = 0.004, 0.02
 """Radius of the spheres along the lower edge of what is held, and metres from one to the next."""
 
-POINTS = 1000
+POINTS = 4000
 """Points whose distances from everything are worked out at once: more at a time would have to wait for memory."""
 
 
@@ -138,17 +139,15 @@ def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> F
 
 
 def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
-    count, points = len(centers), centers.reshape(-1, 3)
-    if not count:
-        return np.ones(0, dtype=bool)
-    keep = np.maximum(radii + margin, 0.0)
-    low, high = points.min(0) - keep.max(initial=0.0), points.max(0) + keep.max(initial=0.0)
-    keep = np.tile(keep, count)
-    touched: Flags = np.zeros(len(points), dtype=bool)
+    keep, found = np.maximum(radii + margin, 0.0), np.ones(len(centers), dtype=bool)
+    if not centers.size:
+        return found
+    low, high = centers.min(0) - keep[:, None], centers.max(0) + keep[:, None]
     turned, middles, half, bottom, top = around.packed
-    near = np.flatnonzero(np.all((bottom <= high) & (top >= low), -1))
+    mine, near = _meeting(low, high, bottom, top)
     if len(near):
-        axes = np.moveaxis(turned[near], 0, 1).reshape(3, -1)
+        points, kept = centers[:, mine].reshape(-1, 3), np.tile(keep[mine], len(centers))
+        axes = turned[near].transpose(1, 0, 2).reshape(3, -1)
         local = np.abs((points @ axes).reshape(len(points), -1, 3) - middles[near])
         split = int(np.searchsorted(near, around.boxes))
         excess = np.maximum(local[:, :split] - half[near[:split]], 0.0)
@@ -156,16 +155,29 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
         across = np.hypot(local[:, split:, 0], local[:, split:, 1]) - half[near[split:], 0]
         along = local[:, split:, 2] - half[near[split:], 2]
         outside.append(np.maximum(across, 0.0) ** 2 + np.maximum(along, 0.0) ** 2)
-        touched = np.asarray((np.concatenate(outside, 1) <= (keep**2)[:, None]).any(1))
+        touched = (np.concatenate(outside, 1) <= (kept**2)[:, None]).any(1)
+        found &= ~touched.reshape(len(centers), -1).any(1)
     reach = around.radii[:, None]
-    close = np.all((around.centers + reach >= low) & (around.centers - reach <= high), -1)
-    if close.any():  # |p - o|^2 - (k + r)^2 of all pairs as one product
-        others, wide = around.centers[close], around.radii[close]
-        left = np.column_stack([points, np.einsum("pi,pi->p", points, points) - keep**2, np.ones(len(points)), keep])
+    mine, near = _meeting(low, high, around.centers - reach, around.centers + reach)
+    if len(near):  # |p - o|^2 - (k + r)^2 of all pairs as one product
+        points, kept = centers[:, mine].reshape(-1, 3), np.tile(keep[mine], len(centers))
+        others, wide = around.centers[near], around.radii[near]
+        left = np.column_stack([points, np.einsum("pi,pi->p", points, points) - kept**2, np.ones(len(points)), kept])
         right = np.column_stack([-2 * others, np.ones(len(wide)), (others**2).sum(1) - wide**2, -2 * wide])
-        touched |= (left @ right.T).min(1) <= 0
-    found: Flags = np.asarray(~touched.reshape(count, -1).any(1))
+        touched = (left @ right.T).min(1) <= 0
+        found &= ~touched.reshape(len(centers), -1).any(1)
     return found
+
+
+def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return which of the boxes from `low` to `high` (m, 3) meet any from `bottom` to `top` (s, 3), and which of those are met.
+
+    An arm that goes along a path is far from most things with most of its spheres.
+    """
+    near = np.ones((len(low), len(bottom)), dtype=bool)
+    for i in range(3):
+        near &= (bottom[:, i] <= high[:, i, None]) & (top[:, i] >= low[:, i, None])
+    return np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
 
 
 def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, Array]:

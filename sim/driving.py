@@ -7,7 +7,7 @@ of robot and load does. Afterwards the arms' kinematics begin at the base where 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,10 @@ class Roller:
         """Return where the base is along poses, or None if the robot would touch something."""
         q = poses[:, BASE]
         return q if self.free(q).all() else None
+
+    def first(self, ways: Sequence[Array]) -> int | None:
+        """Return the number of the first of some ways that can be followed, or None."""
+        return next((i for i, way in enumerate(ways) if self.follow(way) is not None), None)
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
         """Yield ways that draw back, turn, and come up to the goal from before it."""

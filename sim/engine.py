@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -348,9 +348,7 @@ class Engine:
         """
         solids = [box(fixture) for fixture in self.embodiment.fixtures]
         for mechanic in self.mechanics:
-            shift = self.shift(mechanic)
-            found = mechanic.solids({**mechanic.values(), **(values or {})})
-            solids += [replace(solid, center=solid.center + shift) for solid in found]
+            solids += mechanic.solids({**mechanic.values(), **(values or {})}, self.shift(mechanic))
         for name, thing in self.bodies.items():
             if name != held:
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)

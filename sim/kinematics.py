@@ -56,27 +56,23 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
     """Return postures with the elbow at a swivel about the line from shoulder to wrist, and which are in reach."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
-    a, b = arm.upper_length, arm.lower_length
+    a, b, zero, bent, side = arm.limbs
     reach = wrist - arm.shoulder
-    distance = np.maximum(np.linalg.norm(reach, axis=-1), 1e-9)
+    distance = np.maximum(_length(reach), 1e-9)
     n = reach / distance[:, None]
     cosine = (a * a + distance**2 - b * b) / (2 * a * distance)
     valid = np.abs(cosine) < most
-    cosine = np.clip(cosine, -STRETCHED, STRETCHED)
+    cosine = np.minimum(np.maximum(cosine, -STRETCHED), STRETCHED)
     hang = arm.hang - (n @ arm.hang)[:, None] * n
-    hang = hang / np.maximum(np.linalg.norm(hang, axis=-1), 1e-9)[:, None]
+    hang = hang / np.maximum(_length(hang), 1e-9)[:, None]
     out = np.cos(swivel)[:, None] * hang + np.sin(swivel)[:, None] * cross(n, hang)
     u = cosine[:, None] * n + np.sqrt(1 - cosine**2)[:, None] * out
     f = (wrist - arm.shoulder - a * u) / b
-    u0, f0, hinge = (arm.elbow - arm.shoulder) / a, (arm.wrist - arm.elbow) / b, arm.axes[3]
-    bent = np.arctan2(cross(u0, f0) @ hinge, u0 @ f0)
-    side = 1.0 if (arm.lower[3] + arm.upper[3]) / 2 + bent > 0 else -1.0
     normal = cross(u, f)
-    normal = side * normal / np.maximum(np.linalg.norm(normal, axis=-1), 1e-9)[:, None]
-    zero = np.stack([u0, hinge, cross(u0, hinge)], -1)
+    normal = side * normal / np.maximum(_length(normal), 1e-9)[:, None]
     upper = np.stack([u, normal, cross(u, normal)], -1) @ zero.T
-    elbow = side * np.arccos(np.clip(np.einsum("ni,ni->n", u, f), -1, 1)) - bent
-    hand = np.swapaxes(upper @ turn(hinge, elbow), -1, -2) @ last
+    elbow = side * _arccos(np.einsum("ni,ni->n", u, f)) - bent
+    hand = np.swapaxes(upper @ turn(arm.axes[3], elbow), -1, -2) @ last
     q = np.concatenate([_gentler(arm, upper, 0), elbow[:, None], _gentler(arm, hand, 4)], -1)
     return q, valid
 
@@ -116,9 +112,9 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
     for angle in both.T:
         forearm = bent @ turn(fifth, angle)
         shoulder_turn = _frame(w, e) @ np.swapaxes(_frame(np.einsum("nij,nj->ni", bent, v), forearm @ sixth), -1, -2)
-        across = np.cross(sixth, fifth)
+        across = cross(sixth, fifth)
         rest = np.swapaxes(shoulder_turn @ forearm, -1, -2) @ before @ across
-        last = np.arctan2(rest @ np.cross(sixth, across), rest @ across)
+        last = np.arctan2(rest @ cross(sixth, across), rest @ across)
         three = three_angles(shoulder_turn, arm.axes[:3])
         others = np.stack([elbow, angle, last, seventh], -1)
         found += [np.concatenate([way, others], -1) for way in (three, _flipped(three, arm.axes[:3]))]
@@ -141,7 +137,7 @@ def _rolled(arm: Arm, r: Array) -> Array:
 
 def _phase(axis: Array, a: Array, b: Array) -> float:
     """Return the angle about an axis at which the turned `b` is nearest to `a`."""
-    return float(np.arctan2(a @ np.cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
+    return float(np.arctan2(a @ cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
@@ -149,20 +145,29 @@ def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> 
 
     Of what their cosine would be, at most `most` counts.
     """
-    cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ np.cross(axis, b)
+    cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ cross(axis, b)
     reach = np.maximum(np.hypot(cosine, sine), 1e-9)
     share = (product - (a @ axis) * (b @ axis)) / reach
-    half = np.arccos(np.clip(share, -1, 1))
+    half = _arccos(share)
     middle = np.arctan2(sine, cosine)
     return _wrapped(np.stack([middle - half, middle + half], -1)), np.abs(share) < most
 
 
 def _frame(a: Array, b: Array) -> Array:
     """Return right-handed frames (n, 3, 3) whose first axis is along `a` and whose second lies in the plane of `a` and `b`."""
-    first = a / np.maximum(np.linalg.norm(a, axis=-1), 1e-9)[:, None]
+    first = a / np.maximum(_length(a), 1e-9)[:, None]
     across = b - np.einsum("ni,ni->n", first, b)[:, None] * first
-    second = across / np.maximum(np.linalg.norm(across, axis=-1), 1e-9)[:, None]
+    second = across / np.maximum(_length(across), 1e-9)[:, None]
     return np.stack([first, second, cross(first, second)], -1)
+
+
+def _length(vectors: Array) -> Array:
+    """Return the lengths (n,) of vectors (n, 3); `numpy.linalg.norm` takes twice as long over a few of them."""
+    return np.asarray(np.sqrt(np.add.reduce(vectors * vectors, axis=-1)))
+
+
+def _arccos(cosine: Array) -> Array:
+    return np.asarray(np.arccos(np.minimum(np.maximum(cosine, -1), 1)))
 
 
 def _wrapped(angle: Array) -> Array:
@@ -179,11 +184,11 @@ def three_angles(r: Array, axes: Array) -> Array:
     c = cross(a1, a2)
     if abs(a1 @ a3) > 0.5:
         v = np.einsum("nij,j->ni", r, a1)
-        y = np.arccos(np.clip(v @ a1, -1, 1))
+        y = _arccos(v @ a1)
         x = np.arctan2(v @ a2, -(v @ c))
     else:
         v = np.einsum("nij,j->ni", r, a3) * np.sign(c @ a3)
-        y = np.arcsin(np.clip(v @ a1, -1, 1))
+        y = np.arcsin(np.minimum(np.maximum(v @ a1, -1), 1))
         x = np.arctan2(-(v @ a2), v @ c)
     rest = np.swapaxes(turn(a1, x) @ turn(a2, y), -1, -2) @ r
     moved = np.einsum("nij,j->ni", rest, a2)

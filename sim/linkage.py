@@ -17,6 +17,8 @@ from sim.urdf import Array, Model, read_model, rotation
 WIDER = 0.25
 """The share of the way from `opened` to the end of a joint to which it is opened."""
 
+HERE = np.zeros(3)
+
 BASE = "base"
 """The link of a generated URDF that stands fast."""
 
@@ -52,14 +54,15 @@ def about(axis: Array, angle: float) -> Array:
     return matrix
 
 
-def solids(mechanism: Mechanism, model: Model, values: Mapping[str, float]) -> Iterator[Solid]:
-    """Yield the solids of a mechanism with its joints at `values`, named after it and their parts."""
+def solids(mechanism: Mechanism, model: Model, values: Mapping[str, float], aside: Array = HERE) -> Iterator[Solid]:
+    """Yield the solids of a mechanism with its joints at `values`, named after it and their parts, all of it `aside` by metres."""
     owners = {urdf_name(mechanism, link.name): link.name for link in mechanism.links}
     for link, primitives in model.primitives.items():
         owner = owners.get(link, mechanism.name)
         turned, shift = moved(mechanism, model, owner, values)
         for part in primitives:
-            yield Solid(owner, part.kind, part.half, turned @ part.center + shift, turned @ part.rotation, part.name)
+            center = turned @ part.center + shift + aside
+            yield Solid(owner, part.kind, part.half, center, turned @ part.rotation, part.name)
 
 
 def open_values(mechanism: Mechanism) -> dict[str, float]:

@@ -13,7 +13,7 @@ import pybullet
 from reasoner.embodiment.values import Link, Mechanism
 from sim.bodies import load_written
 from sim.collision import Solid
-from sim.linkage import moved, read_mechanism, solids, urdf_name, wide, written
+from sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, wide, written
 from sim.urdf import Array, Model
 
 TRIP, STAY = 0.6, 0.3
@@ -58,9 +58,9 @@ class Mechanic:
         zero, origin = self.model.frames[urdf_name(self.mechanism, name)]
         return turned @ zero, turned @ origin + shift
 
-    def solids(self, values: Mapping[str, float] | None = None) -> Iterator[Solid]:
-        """Yield what an arm must not touch."""
-        return solids(self.mechanism, self.model, self.values() if values is None else values)
+    def solids(self, values: Mapping[str, float] | None = None, aside: Array = HERE) -> Iterator[Solid]:
+        """Yield what an arm must not touch, `aside` by some metres."""
+        return solids(self.mechanism, self.model, self.values() if values is None else values, aside)
 
     def set(self, name: str, opened: bool) -> None:
         """Begin with a link open or shut: the only time, but for interventions, that a joint is set instead of moved."""

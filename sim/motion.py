@@ -69,6 +69,9 @@ class Traveller(Protocol):
     def follow(self, poses: Array) -> Array | None:
         """Return the joints' values along poses, or None if these can't be followed."""
 
+    def first(self, ways: Sequence[Array]) -> int | None:
+        """Return the number of the first of some ways, sampled poses, that can be followed, or None."""
+
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
         """Yield poses (n, 6) to pass through, to be tried before a search."""
 
@@ -107,9 +110,20 @@ class Reacher:
     def follow(self, poses: Array) -> Array | None:
         """Return the postures along sampled poses, or None if one is out of reach, in collision or past a singularity."""
         q, valid = self.solve(poses)
+        return q if self._goes(q, valid) else None
+
+    def first(self, ways: Sequence[Array]) -> int | None:
+        """Return the number of the first of some ways that can be followed, or None; all are solved at once, which is faster."""
+        q, valid = self.solve(np.concatenate(ways))
+        ends = np.cumsum([len(way) for way in ways])[:-1]
+        pairs = zip(np.split(q, ends), np.split(valid, ends), strict=True)
+        return next((i for i, pair in enumerate(pairs) if self._goes(*pair)), None)
+
+    def _goes(self, q: Array, valid: Flags) -> bool:
+        """Return whether postures are within reach, follow one another and touch nothing."""
         if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP):
-            return None
-        return q if self.free(q[COARSE // 2 :: COARSE]).all() and self.free(q).all() else None
+            return False
+        return bool(self.free(q[COARSE // 2 :: COARSE]).all() and self.free(q).all())
 
     def begin(self, poses: Array) -> Array | None:
         """Return the postures along sampled poses up to where `follow` would refuse them, or None if it refuses the first."""
@@ -200,14 +214,14 @@ def connect(
         Bound on the number of samples.
     """
     within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # a search would end at the others as well
+    if within and reacher.follow(line(start, goals[within[0]])) is not None:
+        return within[0], np.stack([start, goals[within[0]]])
     for i in within:
-        goal = goals[i]
-        if reacher.follow(line(start, goal)) is not None:
-            return i, np.stack([start, goal])
-        for middle in reacher.detours(start, goal):
-            corners = np.stack([start, *middle, goal])
-            if reacher.follow(polyline(corners)) is not None:
-                return i, corners
+        ends = start, goals[i]
+        ways = [np.stack(ends), *(np.stack([start, *middle, goals[i]]) for middle in reacher.detours(*ends))]
+        chosen = reacher.first([polyline(corners) for corners in ways])
+        if chosen is not None:
+            return i, ways[chosen]
     found = _rrt_connect(reacher, start, [goals[i] for i in within], rng, attempts) if within else None
     if found is None:
         return None

@@ -116,7 +116,7 @@ def _error(arm: Arm, q: Array, last: Array, p: Array) -> tuple[Array, Array]:
     tip = np.einsum("nij,j->ni", rotations[:, -1], arm.tip) + shifts[:, -1]
     axes = np.einsum("nkij,kj->nki", rotations, arm.axes)
     origins = np.einsum("nkij,kj->nki", rotations, arm.origins) + shifts
-    columns = np.concatenate([np.cross(axes, tip[:, None] - origins), axes], -1)
+    columns = np.concatenate([cross(axes, tip[:, None] - origins), axes], -1)
     missed = _angle(last @ np.swapaxes(rotations[:, -1], -1, -2))
     return np.concatenate([p - tip, missed], -1), np.swapaxes(columns, -1, -2)
 
