@@ -133,8 +133,8 @@ class Attempt:
             scenes = [_scene(reacher, *movers, stage, CLOSE if stage.near else reacher.margin) for stage in stages]
             found = _free(scenes, solved, order)
             if not found and self.world.noise:  # what isn't seen well may be farther
-                margins = (CLOSE - 2 * self.world.blur if stage.near else CLOSE for stage in stages)
-                scenes = [_scene(reacher, *movers, *pair) for pair in zip(stages, margins, strict=True)]
+                least = CLOSE - 2 * self.world.blur
+                scenes = [_scene(reacher, *movers, stage, least) for stage in stages]
                 found = _free(scenes, solved, order)
             if not found:
                 raise _blocked(scenes, [q[order] for q in solved], objects)
@@ -185,7 +185,7 @@ class Attempt:
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
             if self.world.noise and not reacher.free(reacher.solve(np.array(targets))[0]).any():
-                reacher = replace(reacher, margin=CLOSE)
+                reacher = replace(reacher, margin=CLOSE - 2 * self.world.blur)
             free = reacher.follow(start[None]) is not None
             left = start if free else leave(reacher, start)
             reached = None if left is None else connect(reacher, left, targets, self.world.rng, SAMPLES)

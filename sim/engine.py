@@ -243,12 +243,12 @@ class Engine:
     def look(self, before: int = 0) -> None:
         """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move.
 
-        After some looks `before`, of which the mean is what is perceived, it is that of all.
+        Each is the mean of several, as of bodies; after some `before`, of which the mean is what is perceived, it is that of all.
         """
         self.errors.clear()
         if self.noise:
             for mechanic in self.mechanics:
-                seen = self.rng.normal(0.0, self.noise, 3)
+                seen = self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
                 self.shifts[mechanic.body] = (before * self.shift(mechanic) + seen) / (before + 1)
 
     def shift(self, mechanic: Mechanic) -> Array:

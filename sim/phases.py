@@ -38,7 +38,7 @@ from sim.motion import pose_of, rotations, turned_near
 from sim.pouring import FOLD, reach_over
 from sim.running import Run
 from sim.stages import Stage
-from sim.touch import FINGERS, ROOM, go_around, off_centre, room
+from sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
 from sim.urdf import Array
 from sim.verdict import REFUTED, SkillError
 
@@ -280,11 +280,13 @@ def _joint(run: Run, phase: Phase) -> None:
             "no grasp", (link,), f"a motion of the joint of {link} follows none that brought the hand there"
         )
     for left in range(ANCHORS, 0, -1):
+        attempt.hand.command(attempt.hand.measured())
+        if run.gripped:
+            draw_back(run)
         value = mechanic.values()[link]
         if enough is not None and enough():
             break
         values = np.linspace(value, value + (goal - value) / left, 4)
-        attempt.hand.command(attempt.hand.measured())
         share = Ways(way.first, way.first + (way.last - way.first) / ANCHORS, way.swivel)
         poses = np.concatenate(_moved(run, phase, attempt.hand.pose[None], share, values.tolist()))
         poses[:, 3] = np.unwrap(poses[:, 3])

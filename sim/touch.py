@@ -110,6 +110,14 @@ def off_centre(run: Run) -> Array:
     return shift
 
 
+def draw_back(run: Run) -> None:
+    """Draw the hand back while its fingers press something ahead of it, beside what they hold."""
+    hand = run.attempt.hand
+    for _ in range(YIELDS):
+        if hand.push() < run.numbers["force"] or not _shift(run, -ASIDE_BY * hand.frame()[0][:, 0]):
+            return
+
+
 FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
     "": lambda run, phase: None,
     "open": _open,
@@ -121,20 +129,23 @@ FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
 def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     """Go around something: what a finger meets on the way is farther on its side than it was seen, so the hand gives way.
 
-    What the palm meets has come far enough into the hand, which draws back a little.
+    What the palm meets has come far enough into the hand, which draws back a little. So does a hand that meets a link on its way
+    around a handle: there is room beside a handle, so what it meets is ahead of it, what the handle is on, say.
     """
     hand = run.attempt.hand
+    still = name in run.world.links
+    body = run.world.links[name].body if still else run.world.bodies[name].body
     speed = run.number(phase.speed) * min(max(room(run, name) / ROOM, SLOWEST), 1.0)
     back = -ASIDE_BY * hand.frame()[0][:, 0]
     patience = YIELDS
     while True:
-        enough = (lambda: hand.meets(run.world.bodies[name].body)) if patience else None
+        enough = (lambda: hand.meets(body)) if patience else None
         run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
-        if not patience or not hand.meets(run.world.bodies[name].body):
+        if not patience or not hand.meets(body):
             break
         patience -= 1
         first, second = finger_forces(run, name)
-        if not first and not second:
+        if still or (not first and not second):
             _shift(run, back)
             goal = hand.pose
             break

@@ -130,6 +130,26 @@ def test_fingers_open_less_at_a_handle_with_little_room_beside_it() -> None:
         assert world.observe()[Symbol("OPENED", ("door",))] == "false"
 
 
+@pytest.mark.parametrize(
+    ("name", "link", "opened", "off"),
+    [
+        ("kitchen-corner", "door", False, 0.0085),
+        ("centrifuge", "cover", True, 0.012),
+    ],
+)
+def test_a_hand_gives_way_to_what_a_handle_that_seems_farther_is_on(
+    name: str, link: str, opened: bool, off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = confab.load(name)
+    with World(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
+        world.links[link].set(link, opened)
+        farther = {mechanic.body: np.array([off, 0.0, 0.0]) for mechanic in world.mechanics}
+        monkeypatch.setattr(world, "look", lambda before=0: world.shifts.update(farther))
+        skill = by_skill(scene.embodiment)["operate_back" if opened else "operate"]
+        perform(world, skill, {"hand": "left_hand", "object": link})
+        assert world.observe()[Symbol("OPENED", (link,))] == str(not opened).lower()
+
+
 def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
     scene = kitchen()
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:

@@ -64,7 +64,7 @@ def test_looks_at_a_mechanism_again_are_averaged() -> None:
             for before in range(3):
                 world.look(before)
             seen.append(world.shift(world.mechanics[0]))
-        assert np.std(seen) == pytest.approx(0.01 / np.sqrt(3), rel=0.1)
+        assert np.std(seen) == pytest.approx(0.01 / np.sqrt(18), rel=0.1)
 
 
 def test_a_straight_line_that_the_elbow_is_in_the_way_of_is_gone_with_the_elbow_turning(
