@@ -82,11 +82,16 @@ class Refiner:
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.besides: dict[Cell, str] = {}
         """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
-        self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
+        self.failed: dict[object, list[tuple[int, list[tuple[Cell, str]]]]] = {}
+        """Of what was asked, in how many worlds a refinement was searched in vain, and what held there."""
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
         """What search found, by the state: steps after which another can't be refined are done again on the next way."""
         self.long: set[str] = set()
         """Behaviours whose last refinement was too long for a few relevant steps, which are tried last then."""
+        self.vain: set[str] = set()
+        """Behaviours for a refinement of which a large world was searched in vain, and long."""
+        self.thorough = True
+        """Whether a large world is searched for a refinement of these, too."""
         self.advice: Advice | None = None
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
@@ -173,6 +178,7 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         now = self.table.now
+        widths = self.worlds(below)[: None if self.thorough or name not in self.vain else -1]
         question = name, arguments, self.segments.tidy, tuple(self.besides)
         here = question, frozenset(self.table.since(0).items())
         if here in self.found:
@@ -180,11 +186,11 @@ class Refiner:
                 self.redo(step)
             self.hits += 1
             return self.found[here]
-        for facts in self.failed.get(question, ()):
-            if all(now[situation].get(key) == value for (situation, key), value in facts):
+        for tried, facts in self.failed.get(question, ()):
+            if tried >= len(widths) and all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
         self.misses += 1
-        widths = self.worlds(below)
+        worked = self.segments.worked
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
             attempts: list[Effort | Sequence[Width]] = [SHORT, widths]
@@ -193,7 +199,9 @@ class Refiner:
         if found is None:
             around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
-            self.failed.setdefault(question, []).append(facts)
+            self.failed.setdefault(question, []).append((len(widths), facts))
+            if self.segments.worked - worked > NEAR.work + WIDER.work:
+                self.vain.add(name)
             return None
         (self.long.add if len(found) > SHORT.depth else self.long.discard)(name)
         self.found[here] = tuple(found)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.refinement_cache import Advice, RefinedStep, Refiner, Template
+from planner.hierarchical.refinement_cache import MUCH, Advice, RefinedStep, Refiner, Template
 from planner.hierarchical.subplans import Effort, Segments
 from planner.hierarchical.subproblem import Width
 from planner.plan import Outcome, Plan, Reason, Status, Step
@@ -192,12 +192,14 @@ class Call:
         kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
         keep = self.segments.keeping(kept)
         mark, worked = len(self.table.trail), self.segments.worked
+        self.refiner.thorough = not isinstance(attempt, Effort) and attempt[-1].work >= MUCH
         if attempt is ADVISED:
             steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
         else:
             steps = self.refiner.achieve(level, targets, keep, attempt)
         if steps is not None and self.wary is not None:
             steps = self.wary(steps, mark, lambda: self.refiner.achieve(level, targets, keep, attempt))
+        self.refiner.thorough = True
         if steps is None:
             self.vain += self.segments.worked - worked
             return False

@@ -1,6 +1,10 @@
 """Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
 
+import pytest
+
+from planner.hierarchical import refinement_cache
 from planner.hierarchical.planner import beside, plan
+from planner.hierarchical.refinement_cache import NEAR, WHOLE, WIDER
 from planner.hierarchical.serialization import Call, compiled
 from planner.plan import Status
 from planner.validation import validate
@@ -134,6 +138,21 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     assert other.refiner.do(1, "SEND", ("item0",)) == first
     assert other.refiner.do(1, "SEND", ("item1",)) is None
     assert other.refiner.misses == 0
+
+
+def test_where_a_large_world_was_searched_long_and_in_vain_small_ones_come_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = slide(3)
+    call = Call(problem, compiled(problem), None, 10_000)
+    assert call.refiner.do(1, "SEND", ("item0",)) is not None  # and rode down
+    looked: list[object] = []
+    monkeypatch.setattr(call.refiner, "achieve", lambda level, targets, keep, effort: looked.append(effort))
+    monkeypatch.setattr(refinement_cache, "SHORT", (NEAR,))
+    call.refiner.vain.add("SEND")
+    for call.refiner.thorough in (False, True, False):
+        assert call.refiner.do(1, "SEND", ("item1",)) is None
+    assert looked == [(NEAR,), (NEAR, WIDER), (NEAR,), (NEAR, WIDER, WHOLE)]
 
 
 def test_what_level_1_does_not_see_and_all_goals_at_once_undid_is_a_goal_again() -> None:
