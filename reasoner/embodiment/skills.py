@@ -18,9 +18,28 @@ SELECT DISTINCT ?behavior ?term WHERE {
 } ORDER BY ?behavior ?term"""
 MOTIONS = ("", "free", "line", "yielding", "joint", "rise", "home", "over", "drive")
 FINGERS = ("", "open", "shut", "grasp")
+BROUGHT = ("", "base")
 CONDITIONS = ("empty", "holding", "place", "thing")
 QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
 """What phases may say: `sim.phases` has a table for each."""
+VERDICTS = (
+    "unreachable",
+    "goal in collision",
+    "no path",
+    "tracking error",
+    "object disturbed",
+    "no grasp",
+    "slip or drop",
+    "under-pour",
+    "spill",
+    "toppled",
+    "misplaced",
+    "stuck",
+    "too slow",
+    "ill-defined",
+    "unexpected",
+)
+"""What a guard may say behind ``else``: `sim.verdict.CODES` says what each means."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
 TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")
@@ -96,8 +115,10 @@ def _phase(facts: Facts, node: str) -> Phase:
     for what, said, known in (
         ("motion", [found.motion], MOTIONS),
         ("fingers", [found.fingers], FINGERS),
+        ("bring", [found.bring], BROUGHT),
         ("when", found.when, CONDITIONS),
         ("guard on", [guard.quantity for guard in (*found.until, *found.checks)], QUANTITIES),
+        ("guard with else", [guard.code for guard in (*found.until, *found.checks) if guard.code], VERDICTS),
     ):
         for word in said:
             if word not in known:

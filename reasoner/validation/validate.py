@@ -7,6 +7,7 @@ form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
 our own rules       `reasoner.validation.rules.RULES`, for what a query can't say well
 measures of bodies  `reasoner.embodiment.measures.RULES`, where there is a robot
+joints, features    `reasoner.embodiment.joint_checks.RULES`, likewise
 skills in phases    `reasoner.embodiment.skill_checks.RULES`, likewise
 logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
 ==================  ========================================================================
@@ -25,7 +26,7 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 import ontology
-from reasoner.embodiment import measures, skill_checks
+from reasoner.embodiment import joint_checks, measures, skill_checks
 from reasoner.embodiment.facts import EmbodimentError
 from reasoner.embodiment.reading import read_embodiment
 from reasoner.files import silent_about_numbers
@@ -191,7 +192,7 @@ def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) ->
         why = "physics reads the file in the same way"
         yield places.finding("unreadable-body", error.node or graph.scene, str(error), why, "see the message")
         return
-    for rule, faults in (measures.RULES | skill_checks.RULES).items():
+    for rule, faults in (measures.RULES | joint_checks.RULES | skill_checks.RULES).items():
         for name, what, why, remedy in faults(embodiment):
             yield places.finding(rule, name if "://" in name else reading.names.iri(name), what, why, remedy)
 
