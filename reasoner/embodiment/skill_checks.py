@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from reasoner.embodiment.facts import camel
 from reasoner.embodiment.skills import TERM
 from reasoner.embodiment.values import Embodiment, Phase, SkillUse
 
@@ -73,9 +74,10 @@ def unknown_setting(embodiment: Embodiment) -> Iterator[Fault]:
         for phase, term in unset(use):
             yield (
                 phase.iri,
-                f"phase {phase.name} of {use.skill} has '{term}', which is neither a number nor a setting of the skill",
+                f"phase {phase.name} of {use.skill} has '{camel(term)}', which is neither a number nor a setting of the skill",
                 "nobody can tell how much that is",
-                f"state e:{term} of the skill, or mend the spelling",
+                f"state e:{camel(term)} of the skill, or mend the spelling; one of your own is declared first: "
+                f":{camel(term)} a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting",
             )
 
 

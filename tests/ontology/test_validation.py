@@ -259,3 +259,18 @@ def test_an_ontology_is_told_at_its_own_line_where_an_individual_has_the_last_pa
         encoding="utf-8",
     )
     assert {finding.rule: finding.line for finding in validate([file])}["file-name-and-iri"] == 3
+
+
+def test_a_setting_of_one_s_own_is_named_as_it_is_written_with_how_it_is_declared(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path, WITH_BODIES)
+    file = tmp_path / "watering-bodies.ttl"
+    phase = """
+    e:lift e:phase :sway .
+    :sway a owl:NamedIndividual, e:Phase ; c:index 9 ; rdfs:label "sway"@en ; e:motion "rise" ; e:above "swayWidth" .
+    """
+    file.write_text(file.read_text(encoding="utf-8") + phase, encoding="utf-8")
+    told = {finding.remedy for finding in validate([scene]) if finding.rule == "unknown-setting"}
+    assert told and all(":swayWidth a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting" in said for said in told)
+    own = ":swayWidth a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting . e:lift :swayWidth 0.1 .\n"
+    file.write_text(file.read_text(encoding="utf-8") + own, encoding="utf-8")
+    assert not [finding for finding in validate([scene]) if finding.rule in ("unknown-setting", "unreadable-body")]
