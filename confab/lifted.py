@@ -90,6 +90,8 @@ class Sayings:
         subject = f"{self.name(variable)} "
         said, end = list(map(self.condition, asked)), self.condition(last)
         if not all(text.startswith(subject) for text in (*said, end)):
+            if which == "every" and said:
+                return f"{who} such that {' and '.join(said)} is such that {end}"
             return f"{who} is such that {' and '.join((*said, end))}"
         that = " and ".join(text.removeprefix(subject) for text in said)
         return f"{who}{f' that {that}' if that else ''} {end.removeprefix(subject)}"

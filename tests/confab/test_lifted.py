@@ -41,6 +41,10 @@ OF_LOCK = RelationCondition("gateOf", ("?other", "?lock"))
             ),
             "every gate but gate that is a gate of lock is shut",
         ),
+        (
+            Witness("?other", "Gate", (RelationCondition("gateOf", ("?gate", "?other")), SHUT), negated=True),
+            "every gate such that gate is a gate of other is such that other is shut",
+        ),
         (RelationCondition("gateOf", ("?gate", "?lock"), negated=True), "gate isn't a gate of lock"),
         (ValueCondition("GATE", ("?gate",), "open", negated=True), "gate isn't open"),
     ],
