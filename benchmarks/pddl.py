@@ -5,7 +5,9 @@
     CONFAB_PEERS=PYTHON …                            with a Python that has pyperplan and up-fast-downward already
     CONFAB_ALL=1 …                                   every problem, not only four per folder
     CONFAB_DOMAINS=ferry,satellite …                 these folders only
-    CONFAB_PLANNERS=confab,lama-first …              these planners only (or ``grounding``, ``read-back``; ``enhsp``, which
+    CONFAB_PLANNERS=confab,lama-first …              these planners only: ``confab`` is the flat core alone, ``confab-whole`` what
+                                                     ``confab plan`` does without an engine, ``confab-engine`` what it does
+                                                     with an engine's name (or ``grounding``, ``read-back``; ``enhsp``, which
                                                      takes numbers, where the peers' Python has up-enhsp)
 
 Each run is a process of its own with 30 s of CPU and 4 GB. A folder holds ``…/domain.pddl`` and problems, beside the domain or in
@@ -39,8 +41,15 @@ SECONDS, BYTES = 30, 4 * 2**30
 ROOT = Path(__file__).resolve().parents[1]
 PER_FOLDER = 4
 RUNS = ROOT / "confab-out" / "pddl-runs"
-OURS = ("planner/grounded/*.py", "reasoner/pddl/*.py", "reasoner/symbols.py")
+CORE = ("planner/grounded/*.py", "reasoner/pddl/*.py", "reasoner/symbols.py")
+OURS = {
+    "confab": CORE,
+    "confab-whole": (*CORE, "planner/*.py", "planner/hierarchical/*.py"),
+    "confab-engine": (*CORE, "confab/engines.py"),
+}
 """The files that say what our plans are."""
+ENGINE = "fast-downward"
+"""What ``confab-engine`` hands the level to."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +123,12 @@ def peers() -> str:
 
 def planners(python: str | None) -> dict[str, list[str]]:
     """Return each planner's command; ``{domain}``, ``{problem}`` and ``{plan}`` are put in."""
-    ours = [sys.executable, "-m", "benchmarks.pddl", "{domain}", "{problem}", "{plan}"]
-    confab = {"confab": ours}
+    files = ["{domain}", "{problem}", "{plan}"]
+    confab = {
+        "confab": [sys.executable, "-m", "benchmarks.pddl", *files],
+        "confab-whole": [sys.executable, "-m", "benchmarks.learning", *files],
+        "confab-engine": [sys.executable, "-m", "benchmarks.pddl", *files, ENGINE],
+    }
     if python is None:
         return confab
     inside = "import importlib.util as u, pathlib; print(pathlib.Path(u.find_spec('up_fast_downward').origin).parent)"
@@ -135,8 +148,8 @@ def planners(python: str | None) -> dict[str, list[str]]:
 
 def kept(name: str, command: Sequence[str], domain: Path, problem: Path) -> Run:
     """Return what a planner does on a problem, from an earlier benchmark if neither has changed; a plan of ours is judged."""
-    ours = name.startswith("confab")
-    code = [file.read_bytes() for pattern in OURS for file in sorted(ROOT.glob(pattern))] if ours else []
+    ours = name in OURS
+    code = [file.read_bytes() for pattern in OURS.get(name, ()) for file in sorted(ROOT.glob(pattern))]
     texts = [*code, domain.read_bytes(), problem.read_bytes(), f"{name} {SECONDS} {BYTES}".encode()]
     place = RUNS / f"{name}-{hashlib.sha256(b'|'.join(texts)).hexdigest()[:24]}.json"
     if place.exists():
@@ -364,5 +377,19 @@ def _solve(domain: str, problem: str, target: str) -> None:
         write(found.plan)
 
 
+def _by_engine(domain: str, problem: str, target: str, engine: str) -> None:
+    """Solve one problem with an engine, as ``confab plan --engine`` does, and write its plan."""
+    from confab.engines import plan_by_engine
+    from reasoner.pddl.importing import imported
+    from reasoner.pddl.syntax import parse_files
+
+    scene = imported(parse_files(Path(domain), Path(problem)))
+    found = plan_by_engine(scene.problem, engine)
+    print(found.status, found.reason.text if found.reason else "")
+    if found.plan is not None:
+        lines = (scene.line(step.behavior, step.arguments) for step in found.plan.steps)
+        Path(target).write_text("".join(f"({line})\n" for line in lines if line))
+
+
 if __name__ == "__main__":
-    _solve(*sys.argv[1:4])
+    _by_engine(*sys.argv[1:5]) if len(sys.argv) > 4 else _solve(*sys.argv[1:4])

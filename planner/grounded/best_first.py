@@ -27,7 +27,7 @@ from operator import or_
 from time import perf_counter
 from typing import NamedTuple, TypeAlias
 
-from planner.grounded.grounding import ground
+from planner.grounded.grounding import MOST_ROWS, ground
 from planner.grounded.hff import Evaluate, Evaluation
 from planner.grounded.hff import heuristic as relaxed
 from planner.grounded.hff_amounts import heuristic as with_amounts
@@ -126,6 +126,8 @@ def plan_level(
     initial: State | None = None,
     goal: State | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
+    most_work: float = math.inf,
+    most_rows: int | None = None,
 ) -> Outcome:
     """Plan one level of a problem, the lowest if none is given.
 
@@ -137,6 +139,10 @@ def plan_level(
         In place of the problem's own; by default what is at rest in the beginning is wanted to be so in the end.
     limits : Limits
         The time includes grounding.
+    most_work : float
+        As for `search`.
+    most_rows : int, optional
+        As for `ground`.
 
     Returns
     -------
@@ -148,7 +154,7 @@ def plan_level(
     level = problem.domain.levels[-1] if level is None else level
     goal = problem.goal_on(level) if goal is None else goal
     try:
-        task = ground(problem, level, initial, goal, deadline=deadline)
+        task = ground(problem, level, initial, goal, most_rows or MOST_ROWS, deadline)
     except (TooLargeError, OutOfTimeError) as error:
         return Outcome(
             Status.GAVE_UP, reason=Reason(f"grounding stopped at a limit: {error}"), seconds=perf_counter() - began
@@ -157,7 +163,7 @@ def plan_level(
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY, seconds=perf_counter() - began)
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
-    found = search(task, limits, deadline)
+    found = search(task, limits, deadline, most_work=most_work)
     plan = Plan(task.steps(found.plan)) if found.status is Status.SOLVED else None
     return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began)
 

@@ -117,7 +117,10 @@ class Program:
     ) -> Sequence[str]:
         if len(candidates) <= few:
             return candidates
-        return self.alike.unlike(candidates, representatives(self.alike.groups(candidates), who, {}), now)
+        groups = self.alike.groups(candidates)
+        if len(groups) == len(candidates):
+            return candidates  # none is like another one
+        return self.alike.unlike(candidates, representatives(groups, who, {}), now)
 
     def size(self, level: int) -> int:
         """Return how many behaviours a level has at most, quantified over all individuals."""

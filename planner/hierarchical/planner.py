@@ -30,6 +30,7 @@ from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import Call, Compiled, compiled
+from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from planner.transitions import arguments_of
@@ -44,6 +45,10 @@ DETOURS = 1.25
 """A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
 KEPT = 1.5
 """Steps of the most abstract level are kept though, by primitives that come to nothing, the plan is up to so many times as long."""
+FLAT = 50_000_000
+"""What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
+FLAT_ROWS = 300_000
+"""The largest join of such a task, on the way to its operators."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -103,6 +108,8 @@ def _plan(
         return call.outcome(status, plan, reason, perf_counter() - begin)
 
     try:
+        if improve and len(call.program.levels) == 1 and (flat := flat_first(call, limits)) is not None:
+            return outcome(flat.status, flat.plan, flat.reason)
         levels = call.program.levels if leave_levels else call.program.levels[:1]
         recovery = Recovery(call, levels)
         solved = False
@@ -142,7 +149,20 @@ def _plan(
     return outcome(flat.status, found, flat.reason)
 
 
-def lowest_alone(call: Call, limits: Limits) -> Outcome:
+def flat_first(call: Call, limits: Limits) -> Outcome | None:
+    """Plan a task of one level as a whole by bounded work; None where that isn't enough, or rules know all kinds of its goals.
+
+    One level has no refinements for goals in series to go by, and may be too large to be grounded, or its goals too many.
+    """
+    if call.advice is not None and call.advice.expects:
+        return None
+    found = lowest_alone(call, limits, FLAT, FLAT_ROWS)
+    if found.status is Status.UNSOLVABLE and (reason := impossible(call.problem, call.program)):
+        return replace(found, reason=reason)  # in the words of the task
+    return None if found.status is Status.GAVE_UP else found
+
+
+def lowest_alone(call: Call, limits: Limits, most_work: float = math.inf, most_rows: int | None = None) -> Outcome:
     """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
     from planner.grounded.best_first import plan_level
     from planner.validation import validate
@@ -154,7 +174,7 @@ def lowest_alone(call: Call, limits: Limits) -> Outcome:
     goal = problem.goal_on(lowest)
     for wanted in (goal, {**rests, **goal}):
         left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-        flat = plan_level(problem, lowest, goal=wanted, limits=Limits(limits.expansions, left))
+        flat = plan_level(problem, lowest, None, wanted, Limits(limits.expansions, left), most_work, most_rows)
         for level, counts in flat.search.items():
             call.segments.counts[level].add(counts)
         if not rests or flat.plan is None or not validate(problem, flat.plan):

@@ -64,13 +64,13 @@ class Alike:
         Of a large group the first and the last few are looked at: what is used up is used up from one end.
         """
         found = list(known)
-        states: dict[int | None, set[tuple[str | None, ...]]] = {}
-        for one in known:
-            states.setdefault(self.sort.get(one), set()).add(self._state(one, now))
+        sorts = {self.sort.get(one) for one in known}
         for group in self.groups(members):
-            seen = states.setdefault(self.sort.get(group[0]), set())
-            if seen and len(group) == 1:
+            sort = self.sort.get(group[0])
+            if len(group) == 1:
+                found += group if sort not in sorts else ()
                 continue
+            seen = {self._state(one, now) for one in known if self.sort.get(one) == sort}
             for one in group if len(group) <= 2 * ENDS else (*group[:ENDS], *group[-ENDS:]):
                 state = self._state(one, now)
                 if state not in seen:
