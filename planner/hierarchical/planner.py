@@ -108,11 +108,14 @@ def _plan(
         return call.outcome(status, plan, reason, perf_counter() - begin)
 
     try:
-        if improve and len(call.program.levels) == 1 and (flat := flat_first(call, limits)) is not None:
-            return outcome(flat.status, flat.plan, flat.reason)
         levels = call.program.levels if leave_levels else call.program.levels[:1]
-        recovery = Recovery(call, levels)
         solved = False
+        if improve and len(call.program.levels) == 1:
+            solved = by_rules_alone(call)
+            if not solved and (flat := flat_first(call, limits)) is not None:
+                return outcome(flat.status, flat.plan, flat.reason)
+            call = call if solved else rested(call, advised)
+        recovery = Recovery(call, levels)
         if len(levels) > 1 and not call.at_rest():
             solved = soon(recovery)
             if not solved:
@@ -149,13 +152,16 @@ def _plan(
     return outcome(flat.status, found, flat.reason)
 
 
+def by_rules_alone(call: Call) -> bool:
+    """Achieve the goals one after the other as rules advise, if they know all kinds of them; whether that succeeded."""
+    return call.advice is not None and call.advice.expects and call.serialise(Recovery(call, (), solvable=True).harder)
+
+
 def flat_first(call: Call, limits: Limits) -> Outcome | None:
-    """Plan a task of one level as a whole by bounded work; None where that isn't enough, or rules know all kinds of its goals.
+    """Plan a task of one level as a whole by bounded work; None where that isn't enough.
 
     One level has no refinements for goals in series to go by, and may be too large to be grounded, or its goals too many.
     """
-    if call.advice is not None and call.advice.expects:
-        return None
     found = lowest_alone(call, limits, FLAT, FLAT_ROWS)
     if found.status is Status.UNSOLVABLE and (reason := impossible(call.problem, call.program)):
         return replace(found, reason=reason)  # in the words of the task

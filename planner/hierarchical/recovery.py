@@ -69,7 +69,7 @@ class Recovery:
         found: list[tuple[int, Attempt]] = []
         if self.call.advice is not None:
             found.append((self.call.program.levels[0], ADVISED))
-        for level in self.levels or self.call.program.levels:
+        for level in self.call.program.levels if self.levels is None else self.levels:
             *small, large = self.call.refiner.worlds(level)
             found += [(level, attempt) for attempt in (LONGER, (*small,), (large,), ALL)[: self.attempts]]
         return found
