@@ -217,7 +217,7 @@ def search(
     begun = evaluate(task.initial)
     if begun is None:
         return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
-    lookahead, marks = ahead(task), cache(lambda: landmarks(task))
+    lookahead, marks = ahead(task, deadline), cache(lambda: landmarks(task, deadline))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
         (
             turn.share,
@@ -432,7 +432,7 @@ def _best_first(
                     return came_from, after
 
 
-def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
+def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
     """Return a function that carries out a relaxed plan as far as it goes, from a state: what is reached, and by which operators.
 
     Where no operator of it is applicable, one is replaced by an applicable one that brings about what it was to bring about for
@@ -509,6 +509,8 @@ def ahead(task: Task) -> Callable[[int, Sequence[int]], Path]:
         while True:
             state, done, stuck = in_turn(state, left)
             path += done
+            if deadline is not None and perf_counter() > deadline:
+                return state, path
             if not done:
                 instead = replaced(state, stuck) or enabling(state, stuck)
                 if instead is None:

@@ -17,6 +17,7 @@ from __future__ import annotations
 import heapq
 from collections import defaultdict
 from collections.abc import Callable, Generator
+from time import perf_counter
 
 from planner.grounded.hff import Evaluate
 from planner.grounded.task import Task
@@ -26,6 +27,9 @@ MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
 """What the states kept by one search may take, about, and what one of them takes besides its bits."""
 CHILD, VISIT = 20, 2
 """Bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited."""
+
+LOOK = 1_000
+"""Operators between two looks at the clock."""
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""
@@ -107,8 +111,10 @@ def by_novelty(
     return None
 
 
-def landmarks(task: Task) -> int:
+def landmarks(task: Task, deadline: float | None = None) -> int:
     """Return facts that every plan makes true at some time: a fact's are those that all ways to it have in common.
+
+    None where there is no time: thousands of ways to each of thousands of facts take seconds.
 
     Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
     """
@@ -117,7 +123,9 @@ def landmarks(task: Task) -> int:
     before = None
     while before != behind:
         before = behind[:]
-        for needs, adds in ways:
+        for number, (needs, adds) in enumerate(ways):
+            if number % LOOK == 0 and deadline is not None and perf_counter() > deadline:
+                return 0
             needed = 0
             for bit in needs:
                 if behind[bit] < 0:
