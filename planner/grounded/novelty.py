@@ -114,7 +114,7 @@ def by_novelty(
 def landmarks(task: Task, deadline: float | None = None) -> int:
     """Return facts that every plan makes true at some time: a fact's are those that all ways to it have in common.
 
-    None where there is no time: thousands of ways to each of thousands of facts take seconds.
+    No fact where time is over: thousands of ways to each of thousands of facts take seconds.
 
     Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
     """

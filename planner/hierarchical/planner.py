@@ -6,6 +6,7 @@ never that there is no plan.
 ======================  ==============================================  ==============================
 stage                   decides                                         module
 ======================  ==============================================  ==============================
+flat search             of one level alone, a bounded while             `planner.grounded.best_first`
 goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
 static proofs           where these get stuck: that a goal lacks a      `planner.hierarchical.unsolvability`
                         static fact, or two goals want one value

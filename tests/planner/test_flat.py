@@ -18,6 +18,8 @@ from planner.grounded.hff_dense import heuristic as by_arrays
 from planner.grounded.novelty import Seen, by_novelty, landmarks
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
+from planner.hierarchical import planner as fast
+from planner.hierarchical.serialization import Call
 from planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
 from planner.solve import MODES, Request, solve
 from planner.validation import validate
@@ -359,7 +361,7 @@ def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monke
 
 
 def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.grounded.best_first.landmarks", lambda task: np.empty(1 << 55))
+    monkeypatch.setattr("planner.grounded.best_first.landmarks", lambda *_: np.empty(1 << 55))
     outcome = plan_level(carrier(8))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert not validate(carrier(8), outcome.plan)
@@ -370,3 +372,19 @@ def test_a_call_that_runs_out_of_memory_gives_up_and_says_so(mode: str, monkeypa
     monkeypatch.setitem(MODES, mode, lambda request: np.empty(1 << 55))
     outcome = solve(Request(carrier(2), mode))
     assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, OUT_OF_MEMORY)
+
+
+def test_a_problem_of_one_level_is_planned_as_a_whole_and_in_series_only_where_that_is_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def series(*_: object) -> bool:
+        raise AssertionError("goals in series")
+
+    monkeypatch.setattr(Call, "serialise", series)
+    lift = carrier(8)
+    outcome = fast.plan(lift)
+    assert outcome.plan is not None
+    assert validate(lift, outcome.plan) == []
+    monkeypatch.setattr(fast, "FLAT", 0)
+    with pytest.raises(AssertionError, match="goals in series"):
+        fast.plan(lift)
