@@ -24,7 +24,8 @@ SHORT = Effort(depth=4)
 """For a refinement that a few relevant steps make; a longer one is searched in a small world."""
 MUCH = 1_500_000
 """What a search in a large world may cost, in states times operators."""
-NEAR, WIDER, WIDE, WHOLE = Width(10, 0, 50_000), Width(20), Width(160, 4, MUCH), Width(None, work=MUCH)
+NEAR, WIDER = Width(10, 0, 50_000), Width(20)
+WIDE, WHOLE = Width(160, 4, MUCH, patient=True), Width(None, work=MUCH, patient=True)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""

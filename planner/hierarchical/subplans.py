@@ -82,6 +82,8 @@ class Segments:
 
     def __post_init__(self) -> None:
         self.expanded = self.worked = self.doubted = 0
+        self.in_vain = 0
+        """Searches of large worlds that ended at their limit."""
         self.tidy: frozenset[Cell] = frozenset()
         """What refinements leave as it was, though it might be anything in the end."""
         bound = self.program.bind(self.table)

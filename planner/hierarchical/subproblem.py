@@ -53,12 +53,27 @@ class Width:
     """How much of the world is looked at, and how long.
 
     `questions` is the most values that chains towards one target may lead through, None takes the whole world; `spares` how many
-    values there are beside these of each sort that they belong to. `work` bounds one search, in states times operators.
+    values there are beside these of each sort that they belong to. `work` bounds one search, in states times operators; a `patient`
+    one of a call may take twice or four times as long where others came to nothing, as in `luby`.
     """
 
     questions: int | None
     spares: int = 1
     work: int = 200_000
+    patient: bool = False
+
+
+def luby(number: int) -> int:
+    """Return how long the n-th try may be: whatever length is needed, no other order is sooner there by more than a log factor.
+
+    Luby, Sinclair and Zuckerman, "Optimal speedup of Las Vegas algorithms", Information Processing Letters 47 (1993).
+
+    >>> [luby(number) for number in range(1, 16)]
+    [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]
+    """
+    while number & (number + 1):
+        number -= (1 << number.bit_length() - 1) - 1
+    return (number + 1) // 2
 
 
 class World:
@@ -102,12 +117,14 @@ class World:
             self.segments.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
-        limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
+        times = luby(self.segments.in_vain + 1) if self.width.patient else 1
+        limits, most = Limits(times * self.width.work // LEAST), BITS * times * self.width.work
         found = search(self.task, limits, self.segments.deadline, most_work=most, portfolio=WORLD)
         work = max(LEAST * found.counts.expanded, found.work // BITS)
         self.segments.spend(self.level, found.counts, MAKING * size + work)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
+            self.segments.in_vain += self.width.patient and found.status is Status.GAVE_UP
             return None
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
