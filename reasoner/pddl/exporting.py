@@ -275,8 +275,12 @@ class _Export:
                 elif boolean:
                     where.append(self.predicate(situation, arguments, value, contrary=True))
                 else:
-                    other = self.fresh(action, "other")
-                    where.append(self.predicate(situation, arguments, other))
+                    wanted = self.predicate(situation, arguments, "?")[:-1]
+                    known = (n[len(wanted) - 1 : -1] for n in (*where, *action.needs) if n.startswith(wanted))
+                    other = next(known, None)  # the value that it has is asked for, too
+                    if other is None:
+                        other = self.fresh(action, "other")
+                        where.append(self.predicate(situation, arguments, other))
                     values = self.range_of(situation)
                     where.append(self.different(other, value, values, values))
             case ClassCondition(term, kind, False):

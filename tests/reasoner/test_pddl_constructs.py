@@ -519,3 +519,18 @@ def test_of_a_goal_all_facts_are_goals_of_their_own_also_those_for_all_objects()
     outcome = plan_level(found)
     assert outcome.plan is not None
     assert sorted(step.behavior for step in outcome.plan.steps) == ["F", "F", "G", "G", "G", "REACH_GOAL"]
+
+
+def test_a_value_that_is_asked_for_twice_makes_one_parameter() -> None:
+    domain = """(define (domain sky) (:requirements :strips :typing :negative-preconditions)
+        (:types scope direction) (:predicates (at ?s - scope ?d - direction))
+        (:action turn :parameters (?s - scope ?new ?old - direction)
+            :precondition (and (at ?s ?old) (not (at ?s ?new))) :effect (and (at ?s ?new) (not (at ?s ?old)))))"""
+    problem = """(define (problem p) (:domain sky) (:objects s - scope a b - direction)
+        (:init (at s a)) (:goal (and (at s b))))"""
+    exported = to_pddl(imported(parse(domain, problem)).problem, 1)
+    assert "(different ?old ?new)" in exported.domain
+    assert "?other" not in exported.domain
+    again = plan_level(imported(parse(exported.domain, exported.problem)).problem)
+    assert again.plan is not None
+    assert [step.arguments for step in again.plan.steps] == [("s", "b", "a")]
