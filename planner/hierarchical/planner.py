@@ -48,7 +48,7 @@ KEPT = 1.5
 """Steps of the most abstract level are kept though, by primitives that come to nothing, the plan is up to so many times as long."""
 FLAT = 50_000_000
 """What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
-FLAT_ROWS = 300_000
+FLAT_ROWS = 30_000
 """The largest join of such a task, on the way to its operators."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
