@@ -1,3 +1,5 @@
+import re
+
 """What follows is explained by what it follows from, in the ontology's labels."""
 
 from pathlib import Path
