@@ -1,7 +1,6 @@
-import re
-
 """What follows is explained by what it follows from, in the ontology's labels."""
 
+import re
 from pathlib import Path
 
 import confab
