@@ -50,6 +50,8 @@ FLAT = 50_000_000
 """What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
 FLAT_ROWS = 30_000
 """The largest join of such a task, on the way to its operators."""
+REDONE = 2_000
+"""Steps that may be done again to find out which are needless: a table of a thousand took twice as long without a bound."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -330,7 +332,7 @@ def without_needless(call: Call, positions: Sequence[int]) -> list[RefinedStep]:
     if abstract(call, call.steps) < len(call.steps):
         return call.steps  # where a level was left, what is put aside may be what brings something to rest
     kept = dict(enumerate(call.steps))
-    for number in positions[:AGAIN]:
+    for number in positions[: min(AGAIN, REDONE // max(1, len(kept)))]:
         if number in kept:
             call.redo([step for other, step in kept.items() if other < number])
             later = {other: refiner.again(step) for other, step in kept.items() if other > number}
