@@ -20,6 +20,7 @@ flat search             the rest, solved or unsolvable, until a limit   `planner
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -331,16 +332,23 @@ def without_needless(call: Call, positions: Sequence[int]) -> list[RefinedStep]:
     refiner, table = call.refiner, call.table
     if abstract(call, call.steps) < len(call.steps):
         return call.steps  # where a level was left, what is put aside may be what brings something to rest
-    kept = dict(enumerate(call.steps))
-    for number in positions[: min(AGAIN, REDONE // max(1, len(kept)))]:
-        if number in kept:
-            call.redo([step for other, step in kept.items() if other < number])
-            later = {other: refiner.again(step) for other, step in kept.items() if other > number}
-            if all(map(call.met, call.goal)):
-                before = {other: step for other, step in kept.items() if other < number}
-                kept = before | {other: step for other, step in later.items() if step is not None}
+    rest, kept = deque(enumerate(call.steps)), []
+    tried = set(sorted(positions)[: min(AGAIN, REDONE // max(1, len(rest)))])
     table.undo(0)
-    return list(kept.values())
+    while rest:
+        number, step = rest.popleft()
+        if number in tried:
+            mark = len(table.trail)
+            later = [(other, refiner.again(one)) for other, one in rest]
+            reached = all(map(call.met, call.goal))
+            table.undo(mark)
+            if reached:
+                rest = deque([(other, one) for other, one in later if one is not None])
+                continue
+        refiner.redo(step)
+        kept.append(step)
+    table.undo(0)
+    return kept
 
 
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
