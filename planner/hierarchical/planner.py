@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.hierarchical.concerns import concerns, put_aside
+from planner.hierarchical.concerns import Concern, concerns, put_aside
 from planner.hierarchical.detours import AGAIN, without_detours
 from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
@@ -257,7 +257,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     first, call.steps = call.steps, fewer(call)
     concerned = concerns(call.refiner, call.steps)
     aside = put_aside(concerned)
-    needed = without_needless(call, list(aside))
+    needed = without_needless(call, concerned, list(aside))
     if len(needed) < len(call.steps):
         call.steps = needed
         concerned = concerns(call.refiner, call.steps)
@@ -327,23 +327,35 @@ def fewer(call: Call) -> list[RefinedStep]:
     return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
 
 
-def without_needless(call: Call, positions: Sequence[int]) -> list[RefinedStep]:
-    """Return a call's steps without those at some positions, each with what then can't be done, that the goals don't need."""
+def without_needless(call: Call, concerned: Sequence[Concern], positions: Sequence[int]) -> list[RefinedStep]:
+    """Return a call's steps without those at some positions, each with what then can't be done, that the goals don't need.
+
+    That one is needed is seen as soon as the step can't be done that touched a goal last, and that goal isn't met.
+    """
     refiner, table = call.refiner, call.table
     if abstract(call, call.steps) < len(call.steps):
         return call.steps  # where a level was left, what is put aside may be what brings something to rest
     rest, kept = deque(enumerate(call.steps)), []
     tried = set(sorted(positions)[: min(AGAIN, REDONE // max(1, len(rest)))])
+    last = {cell: number for number, one in enumerate(concerned) for cell in one.touched if cell in call.goal}
+
+    def without() -> Iterator[tuple[int, RefinedStep]]:
+        for number, step in rest:
+            again = refiner.again(step)
+            if again is not None:
+                yield number, again
+            elif any(last.get(cell) == number and not call.met(cell) for cell in concerned[number].touched):
+                return
+
     table.undo(0)
     while rest:
         number, step = rest.popleft()
         if number in tried:
-            mark = len(table.trail)
-            later = [(other, refiner.again(one)) for other, one in rest]
+            mark, later = len(table.trail), list(without())
             reached = all(map(call.met, call.goal))
             table.undo(mark)
             if reached:
-                rest = deque([(other, one) for other, one in later if one is not None])
+                rest = deque(later)
                 continue
         refiner.redo(step)
         kept.append(step)
