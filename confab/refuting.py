@@ -28,7 +28,7 @@ def refuted_in(scene: Known, report: Report) -> tuple[Refutation, ...]:
         return ()
     chain = chain_to(report.plan, failure.step.path)
     why = ": ".join(filter(None, (failure.verdict.code, ", ".join(failure.verdict.objects))))
-    return refuted_by(scene.problem, chain, failure.verdict.facts, why)
+    return refuted_by(scene.problem, chain, failure.verdict.facts, why, failure.verdict.likewise)
 
 
 def knowing(scene: S, refutations: Sequence[Refutation]) -> S:

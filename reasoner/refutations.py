@@ -14,17 +14,27 @@ from reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, Proble
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with its arguments, the facts as long as which it can't be carried out, and why not."""
+    """A behaviour with its arguments, the facts as long as which it can't be carried out, and why not.
+
+    An empty argument stands for any.
+    """
 
     behavior: str
     arguments: tuple[str, ...]
     facts: tuple[Fact, ...]
     why: str = ""
 
+    def covers(self, other: Refutation) -> bool:
+        """Tell whether it says all that another one says."""
+        same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
+        return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
+
     def __str__(self) -> str:
         """Return it in words, e.g. ``not OPEN hand door while bottle LOCATION before_door: no path``."""
         facts = ", ".join(map(str, self.facts))
-        return f"not {' '.join((self.behavior, *self.arguments))} while {facts}" + (f": {self.why}" if self.why else "")
+        return f"not {' '.join((self.behavior, *(one or 'any' for one in self.arguments)))} while {facts}" + (
+            f": {self.why}" if self.why else ""
+        )
 
 
 def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem:
@@ -37,6 +47,7 @@ def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem
         same = [
             EqualityCondition(parameter.name, argument)
             for parameter, argument in zip(behavior.parameters, one.arguments, strict=True)
+            if argument
         ]
         facts = [_condition(fact) for fact in one.facts]
         condition = AnyOf(((*same, *facts),), negated=True)

@@ -381,24 +381,6 @@ class Engine:
         after, target = mechanic.frame(link, {**mechanic.values(), **values})
         return after @ before.T @ rotation, target + after @ before.T @ (base - origin)
 
-    def check_swing(self, link: str, values: Sequence[float]) -> None:
-        """Raise `SkillError` if a body stands where a link passes on its way through some values of its joint."""
-        mechanic = self.links[link]
-        for name, thing in self.bodies.items():
-            if self.carried_by(name) == link:
-                continue
-            rotation, base = self.sense(name)
-            spheres = column(*outline(thing.shape), bottom=height_of(thing.shape) / 10)
-            points = base + spheres.centers @ rotation.T
-            gaps = [
-                float((solid.distance(points) - spheres.radii).min())
-                for value in values[1:]
-                for solid in mechanic.solids({**mechanic.values(), link: value})
-                if solid.name == link
-            ]
-            if min(gaps, default=1.0) <= 0:
-                raise SkillError("no path", (link, name), f"{name} stands in the way of {link}", clearance_m=min(gaps))
-
     def in_hand(self, hand: Manipulator, body: str) -> tuple[Array, Array]:
         """Return a body's rotation and base in the hand's frame."""
         rotation, point = hand.frame()

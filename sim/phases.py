@@ -38,15 +38,13 @@ from sim.motion import pose_of, rotations, turned_near
 from sim.pouring import FOLD, reach_over
 from sim.running import Run
 from sim.stages import Stage
+from sim.swings import SAMPLES, check_swing
 from sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
 from sim.urdf import Array
 from sim.verdict import REFUTED, SkillError
 
 LOOKS = 3
 """So often is looked, if things aren't seen exactly, before there is no way, or before what was met on it stops a hand."""
-
-SAMPLES = 9
-"""Values of a joint at which its path is foreseen."""
 
 ANCHORS = 8
 """So many times on a joint's path the hand looks where it and the joint have come to."""
@@ -237,7 +235,7 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
     values = np.linspace(mechanic.values()[link], run.number(phase.value, link), SAMPLES)
     held, name = run.attempt.held, run.attempt.hand.hand.name
     moved = [run.world.surroundings(name, held, {link: float(value)}) for value in values]
-    run.world.check_swing(link, [float(value) for value in values])
+    check_swing(run.world, link, values.tolist())
     found = _moved(run, phase, poses, way, values.tolist())
     return [Stage(at, ignored, around, True, True, SLACK) for at, around in zip(found[1:], moved[1:], strict=True)]
 

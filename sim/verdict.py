@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from reasoner.refutations import Refutation
 from reasoner.symbols import Fact
 
 CODES = {
@@ -37,6 +38,7 @@ class Verdict:
     """How a step went in the world. `measured` has numbers by name; the name ends with the unit.
 
     `facts` say where everything was that took part, if a planner of motions found no way: as long as they hold there is none.
+    If it is the joint of a link that `swings` into something, `likewise` has what else is refuted by that, whoever does it.
     """
 
     ok: bool
@@ -45,6 +47,8 @@ class Verdict:
     measured: Mapping[str, float] = field(default_factory=dict)
     message: str = ""
     facts: tuple[Fact, ...] = ()
+    swings: str = ""
+    likewise: tuple[Refutation, ...] = ()
 
     def __str__(self) -> str:
         """Return one line, e.g. ``tracking error: hidden wall (joint_lag_rad 0.084)``."""

@@ -9,11 +9,13 @@ from types import TracebackType
 from typing import Protocol
 
 from reasoner.embodiment.values import Embodiment
+from reasoner.refutations import Refutation
 from reasoner.symbols import Fact, State, Symbol
 from sim.engine import RATE, Engine
 from sim.perception import Draft, perceiver
 from sim.skills import perform
 from sim.staging import Perturbation, furnish, stage
+from sim.swings import refuted
 from sim.verdict import REFUTED, SkillError, Verdict
 
 
@@ -148,4 +150,9 @@ class World(Engine):
         spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}
         asked = [s for s in self.symbols if s.situation in spatial and s.arguments[0] in verdict.objects]
         seen = self.observe() if {s.arguments[0] for s in asked} - {*step.arguments} else {}
-        return replace(verdict, facts=tuple(Fact(symbol, seen[symbol]) for symbol in asked if symbol in seen))
+        facts = tuple(Fact(symbol, seen[symbol]) for symbol in asked if symbol in seen)
+        if not verdict.swings:
+            return replace(verdict, facts=facts)
+        exact = Refutation(step.behavior, step.arguments, facts)
+        likewise = sorted(refuted(self, self.symbols, verdict.swings), key=lambda one: one.covers(exact))
+        return replace(verdict, facts=facts, likewise=tuple(likewise))

@@ -509,7 +509,8 @@ class _Run:
             text = f"stopped after {len(self.failures)} failures, the last of {step}: {verdict.message or code}"
             self.give_up(End.GAVE_UP, Reason(text, verdict.objects))
             return
-        refuted = refuted_by(self.belief, chain, getattr(verdict, "facts", ()), code)
+        facts, likewise = getattr(verdict, "facts", ()), getattr(verdict, "likewise", ())
+        refuted = refuted_by(self.belief, chain, facts, code, likewise)
         if refuted and not self.refuted.keys() >= {*refuted}:
             self.refuted |= dict.fromkeys(refuted)
             self.rely_on_all_but(self.withdrawn)

@@ -10,14 +10,14 @@ What a planner of motions refutes is known at once, and more exactly: there is n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from planner.acting.episode import Episode
 from planner.plan import Limits, Plan, Planner, Status, Step
 from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, Problem
+from reasoner.symbols import Fact, Problem, ValueEffect
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
@@ -77,7 +77,9 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
     return replace(problem, relations=relations)
 
 
-def refuted_by(problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str) -> tuple[Refutation, ...]:
+def refuted_by(
+    problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
+) -> tuple[Refutation, ...]:
     """Return what is refuted when a primitive can't be done while some facts hold: it, and what is above it with its arguments.
 
     Parameters
@@ -88,13 +90,43 @@ def refuted_by(problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], w
     facts : sequence of Fact
         Where everything was that took part; none, if nothing can be said. A level above is refuted only if it sees them all.
     why : str
+    likewise : sequence of Refutation
+        Primitives that are refuted for the same reason, whoever does them. What is above them is refuted where nothing else does
+        what it does. Where they say all that is refuted, and more, the rest is left out.
     """
-    found, needed = [], {*chain[-1].arguments}
-    for step in chain if facts else ():
-        level = problem.domain.behaviors[step.behavior].level
-        if needed <= {*step.arguments} and all(problem.sees(level, fact.symbol, fact.value) for fact in facts):
-            found.append(Refutation(step.behavior, step.arguments, tuple(facts), why))
-    return tuple(found)
+    exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
+    for step in chain if facts and not any(one.covers(exact) for one in likewise) else ():
+        if {*exact.arguments} <= {*step.arguments} and _seen(problem, step.behavior, facts):
+            found.append(replace(exact, behavior=step.behavior, arguments=step.arguments))
+    behaviors = {one.behavior for one in likewise}
+    above = (wide for one in likewise for wide in _above(problem, one, behaviors))
+    return tuple(dict.fromkeys((*found, *above, *likewise)))
+
+
+def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
+    """Tell whether the level of a behaviour sees some facts."""
+    level = problem.domain.behaviors[behavior].level
+    return all(problem.sees(level, fact.symbol, fact.value) for fact in facts)
+
+
+def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
+    """Yield behaviours of levels above that do what a refuted one does, if only those that are refuted `likewise` do it."""
+    every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
+    bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
+    for effect in own.effects:
+        same = [(other, e) for other in every.values() for e in other.effects if _alike(e, effect)]
+        if {*effect.arguments} != {*bound} or not {o.name for o, _ in same if o.level == own.level} <= {*likewise}:
+            continue
+        for other, e in same:
+            if other.level < own.level and _seen(problem, other.name, one.facts):
+                who = dict(zip(e.arguments, (bound[term] for term in effect.arguments), strict=True))
+                arguments = tuple(who.get(parameter.name, "") for parameter in other.parameters)
+                yield replace(one, behavior=other.name, arguments=arguments)
+
+
+def _alike(one: ValueEffect, other: ValueEffect) -> bool:
+    """Tell whether two effects make the same true."""
+    return (one.situation, one.value) == (other.situation, other.value)
 
 
 def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:

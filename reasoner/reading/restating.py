@@ -94,6 +94,8 @@ def refuted(graph: KnowledgeGraph, reading: Reading, one: Refutation) -> Iterato
     yield ox.Triple(node, ox.NamedNode(CORE + "alternative"), every)
     yield from _individual(every, "AllOf", "all of this")
     for number, (term, argument) in enumerate(zip(terms, one.arguments, strict=True), 1):
+        if not argument:
+            continue  # whatever it is
         part = ox.NamedNode(f"{node.value}.argument{number}")
         yield ox.Triple(every, ox.NamedNode(CORE + "condition"), part)
         yield from _individual(part, "EqualityCondition", f"it is {argument}")
