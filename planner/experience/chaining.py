@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from math import inf
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from planner.experience.matching import Bind, Find, finder, soft
 from planner.hierarchical.operators import FEW, Achiever
@@ -41,8 +41,7 @@ Goal: TypeAlias = "tuple[Cell, str]"
 Steps: TypeAlias = "list[RefinedStep]"
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """A way to follow a rule now: the symbol that it is for, the individuals in its roles, and which conditions are unmet."""
 
     rule: Rule
@@ -190,6 +189,10 @@ class Chains:
         if isinstance(asked, ValueCondition) and defined and (level, asked.situation) in self.rules:
             key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
             return [((asked.situation, key), TRUE if (asked.value == TRUE) is not asked.negated else FALSE)]
+        if isinstance(asked, ValueCondition) and not defined and not asked.negated:
+            key = key_of(tuple([env.get(a, a) for a in asked.arguments]))
+            if key in self.call.table.now[asked.situation]:
+                return [((asked.situation, key), env.get(asked.value, asked.value))]
         wants = self.call.segments.wants.of(achiever, asked, env, level)
         return [((situation, key), value) for situation, key, values in wants for value in values]
 
@@ -245,14 +248,15 @@ class Chains:
         """Return the nearest ways to a goal, each with its distance, the best first."""
         for everybody in (False, True):
             most = self.distance(level, goal, everybody)
-            if most < inf:
-                ways = [
-                    (cost, way)
-                    for way in self.ways(level, goal, everybody)
-                    if (cost := self.cost(level, way, everybody, most + 2)) < below
-                ]
-                if ways:
-                    return self.best(level, ways)
+            left, ways = self.ways(level, goal, everybody) if most < inf else [], list[tuple[float, Candidate]]()
+            for far in range(int(most), int(min(most + SLACK + 1, below))) if left else ():
+                near = [way for way in left if all(self.mended(level, way, n, far - 1, everybody) for n in way.unmet)]
+                ways += [(far, way) for way in near]
+                if len(ways) >= TRIES:
+                    break
+                left = [way for way in left if way not in near]
+            if ways:
+                return self.best(level, ways)
         return []
 
     def best(self, level: int, ways: list[tuple[float, Candidate]]) -> list[tuple[float, Candidate]]:
@@ -342,6 +346,8 @@ class Chains:
             if done is None:
                 return None
             steps += done
+            if self.brings(ground, above[-1]):
+                break
             same = self.same(level, way, ground, above[-1])
             if same is None or self.cost(level, same, True, cost + SLACK) > cost + SLACK:
                 return steps
@@ -355,6 +361,11 @@ class Chains:
         self.spend(DONE)
         step = call.refiner.do(level, *ground)
         return None if step is None else [*steps, step]
+
+    def brings(self, ground: Ground, goal: Goal) -> bool:
+        """Whether a step can be done now and brings a goal about."""
+        done = self.call.segments.forward[ground[0]](*ground[1])
+        return done is not None and (*goal[0], goal[1]) in done[1]
 
     def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
         """Do steps that lead to goals of which none can be reached after the others: what their last steps ask comes first.

@@ -74,6 +74,8 @@ class Guide:
         self.wasted, self.vain = 0, 0.0
         self.serial = True
         """Whether goals can be reached one after the other, for all that is known."""
+        self.reached: set[str] = set()
+        """Situation types of which rules reached a goal, and then there was still a way to another one."""
         self.orders = frozenset(orders)
         self.constants = frozenset(call.program.named) | {TRUE, FALSE}
         self.before = _before(call.goal, orders, call.program)
@@ -151,10 +153,12 @@ class Guide:
         other = self.another(targets) if level == self.first and self.serial else None
         try:
             steps = self.led(level, targets, keep)
-            if steps is not None and other is not None and self.chains.far(level, other) == inf:
-                call.table.undo(start)
-                self.serial = False  # not tried again
-                steps = self.chains.together(level, list(self.open().items()))
+            if steps is not None and other is not None:
+                self.serial = self.chains.far(level, other) < inf
+                self.reached.add(other[0][0])
+                if not self.serial:  # not tried again
+                    call.table.undo(start)
+                    steps = self.chains.together(level, list(self.open().items()))
         except TooMuchError:
             steps = None
         finally:
@@ -170,9 +174,9 @@ class Guide:
         return None
 
     def another(self, targets: Mapping[Cell, str]) -> tuple[Cell, str] | None:
-        """Return another open goal of the same kind as a target to which chains lead now."""
+        """Return another open goal of a target's kind to which chains lead now, if that wasn't asked of the kind before."""
         alike = self.call.program.alike.sort
-        kinds = {(cell[0], *map(alike.get, arguments_of(cell[1]))) for cell in targets}
+        kinds = {(cell[0], *map(alike.get, arguments_of(cell[1]))) for cell in targets if cell[0] not in self.reached}
         for cell, value in reversed(self.call.goal.items()):
             if (
                 cell not in targets
