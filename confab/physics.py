@@ -115,10 +115,12 @@ class Report:
             seen = "; ".join(f"{fact} (seen: {first.state[fact.symbol]})" for fact in missed)
             return f"failed: {len(first.steps)} primitives did what they promise, but the goal isn't reached: {seen}{several}"
         poured = " and ".join(f"{share:.0%}" for share in first.poured)
+        unseen = [fact for fact in first.believed if fact.symbol in self.goal]
         return (
             f"verified: {len(first.steps)} primitives"
             + (f", poured {poured} of a serving" if poured else "")
             + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s"
+            + (f"; not seen in the end, believed: {', '.join(map(str, unseen))}" if unseen else "")
             + (f"; on trust, since nothing perceives it: {', '.join(self.trusted)}" if self.trusted else "")
             + several
         )

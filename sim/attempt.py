@@ -78,12 +78,14 @@ class Attempt:
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
-        """Return the attempt with nothing in the hand any more."""
+        """Return the attempt with nothing in the hand any more; where that is was felt until now."""
+        if self.held in self.world.bodies:
+            self.world.remember(self.held, *self.world.truth(self.held))
         return replace(self, held=None)
 
     def body(self, name: str) -> str:
         """Return the name of a body, or raise if the world has no such body any more."""
-        if name not in self.world.bodies:
+        if name not in self.world.bodies or not self.world.knows(name):
             raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen", seen=0.0)
         return name
 

@@ -22,6 +22,7 @@ from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_
 from sim.collision import Solid, Surroundings, box, column, rim
 from sim.mechanisms import Mechanic
 from sim.robot import Manipulator
+from sim.sight import Sight, Sought, look, over_the_shoulders
 from sim.urdf import Array, Spheres
 from sim.verdict import SkillError
 
@@ -101,6 +102,12 @@ class Engine:
             int, Array
         ] = {}  # by mechanism's body: how far off it is perceived, since it was last looked at
         self.errors: dict[str, tuple[int, Array]] = {}  # by body: when it was looked at, how far off it was seen
+        self.known: dict[
+            str, tuple[str, Array, Array]
+        ] = {}  # by body: what carried it when seen last, and where in its frame
+        self.told: dict[tuple[str, str], float] = {}  # by vessel and filling: servings that were seen last
+        self.sighted: tuple[int, Sight] | None = None
+        self.remembered: dict[str, int] = {}
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.filled: dict[str, float] = {}
@@ -226,14 +233,82 @@ class Engine:
     def sense(self, name: str) -> tuple[Array, Array]:
         """Return a body's rotation and base as the robot perceives them: the mean of several looks, each with its noise.
 
-        Until the simulation goes on it is the same.
+        Until the simulation goes on it is the same. One that is hidden is believed to be where it was, with what carried it there.
+
+        Raises
+        ------
+        SkillError
+            The body isn't seen, and nothing is known of it.
         """
-        rotation, position = self.truth(name)
-        if self.noise:
-            if name not in self.errors or self.errors[name][0] != self.steps:
-                self.errors[name] = self.steps, self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
-            position = position + self.errors[name][1]
-        return rotation, position
+        if name in self.bodies:
+            rotation, position = self.truth(name)
+            if self.noise:
+                if name not in self.errors or self.errors[name][0] != self.steps:
+                    self.errors[name] = self.steps, self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
+                position = position + self.errors[name][1]
+            if self.perceives(name):
+                if self.remembered.get(name) != self.steps:
+                    self.remember(name, rotation, position)
+                return rotation, position
+        if not self.knows(name):
+            raise SkillError("misplaced", (name,), f"{name} is nowhere to be seen", seen=0.0)
+        return self._believed(name)
+
+    def remember(self, name: str, rotation: Array, position: Array) -> None:
+        """Take note of where a body is, in the frame of what carries it there."""
+        carrier = self.carried_by(name, position)
+        frame, origin = self.carrier(carrier)
+        self.known[name], self.remembered[name] = (
+            (carrier, frame.T @ rotation, frame.T @ (position - origin)),
+            self.steps,
+        )
+
+    def sight(self) -> Sight:
+        """Return what the cameras see; what is seen to be gone is no longer believed to be where it was."""
+        if self.sighted is None or self.sighted[0] != self.steps:
+            self.sighted = self.steps, Sight()
+            poses = {name: self._believed(name) for name in self.known}
+            things = [
+                Sought(name, *self._thing(name), poses.get(name)) for name in dict.fromkeys((*self.bodies, *poses))
+            ]
+            found = look(self.client, self._cameras(), things)
+            for name in found.gone:
+                del self.known[name]
+            self.sighted = self.steps, found
+        return self.sighted[1]
+
+    def _thing(self, name: str) -> tuple[int, Shape, tuple[Array, Array] | None]:
+        thing = self.bodies.get(name)
+        if thing is None:
+            return -1, self.embodiment.bodies[name].shape, None
+        return thing.body, thing.shape, self.truth(name)
+
+    def _believed(self, name: str) -> tuple[Array, Array]:
+        carrier, turned, base = self.known[name]
+        frame, origin = self.carrier(carrier)
+        return frame @ turned, origin + frame @ base
+
+    def _cameras(self) -> Array:
+        """Return where cameras are (n, 3): as the scene states, else over the shoulders of each robot."""
+        if self.embodiment.cameras:
+            return np.array(self.embodiment.cameras)
+        found = []
+        for robot in self.embodiment.robots:
+            yaw = float(self.bases[robot.name].pose()[2]) if robot.name in self.bases else robot.yaw
+            shoulders = np.array([self.hands[hand.name].arm.shoulder for hand in robot.hands])
+            found.append(over_the_shoulders(shoulders, yaw))
+        return np.concatenate(found)
+
+    def perceives(self, name: str) -> bool:
+        """Tell whether a body is seen, or felt in a hand."""
+        return name in self.bodies and (
+            name in self.sight().seen or any(self.held(hand) == name for hand in self.hands)
+        )
+
+    def knows(self, name: str) -> bool:
+        """Tell whether a body is perceived, or believed to be somewhere."""
+        self.sight()
+        return name in self.known or self.perceives(name)
 
     @property
     def blur(self) -> float:
@@ -268,10 +343,13 @@ class Engine:
         point: Array = origin + turned @ np.array(place.position)
         return point
 
-    def carried_by(self, name: str) -> str:
-        """Return the carrier of the place at which a body is: a link or a body; empty if it is at none that is carried."""
+    def carried_by(self, name: str, base: Array | None = None) -> str:
+        """Return the carrier of the place at which a body is: a link or a body; empty if it is at none that is carried.
+
+        It is where it is, or at `base`.
+        """
         carried = [place for place in self.embodiment.places.values() if place.carrier not in ("", name)]
-        base = self.truth(name)[1]
+        base = self.truth(name)[1] if base is None else base
         gaps = {place.name: float(np.linalg.norm(self.place(place.name) - base)) for place in carried}
         best = min(gaps, key=gaps.__getitem__, default="")
         return self.embodiment.places[best].carrier if best and gaps[best] < BESIDE else ""
@@ -323,7 +401,11 @@ class Engine:
         """Return how many servings of a filling a vessel contains, as the robot perceives it."""
         if not self.beads:
             return float(filling in self.contents.get(vessel, ()))
-        return self.inside(vessel, filling, sensed=True) / self.embodiment.fillings[filling].serving
+        seen = self.perceives(vessel)
+        if seen or (vessel in self.bodies and (vessel, filling) not in self.told):
+            inside = self.inside(vessel, filling, sensed=seen)
+            self.told[vessel, filling] = inside / self.embodiment.fillings[filling].serving
+        return self.told.get((vessel, filling), 0.0)
 
     def servings(self, vessel: str) -> Fraction:
         """Return how many servings a vessel contains, as the robot perceives it; without beads, as it is counted."""
@@ -350,7 +432,7 @@ class Engine:
         for mechanic in self.mechanics:
             solids += mechanic.solids({**mechanic.values(), **(values or {})}, self.shift(mechanic))
         for name, thing in self.bodies.items():
-            if name != held:
+            if name != held and self.knows(name):
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
                 for low, high, radius in cylinders(thing.shape):
                     size, center = (
@@ -373,7 +455,7 @@ class Engine:
     def taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return where a body will be perceived when links have moved to `values` and taken along what they carry."""
         rotation, base = self.sense(name)
-        link = self.carried_by(name)
+        link = self.known[name][0]
         if link not in values:
             return rotation, base
         mechanic = self.links[link]

@@ -233,10 +233,12 @@ def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> N
             hand.open()
     opened = value == use.values.get("opened", "true")
     goal = {name: wide(mechanic.link(name)) if opened else 0.0}
-    along = {body: world.taken_along(body, goal)[1] for body in world.bodies if world.carried_by(body) == name}
+    frame, origin = mechanic.frame(name)
+    along = {body: frame.T @ (world.truth(body)[1] - origin) for body in world.bodies if world.carried_by(body) == name}
     mechanic.set(name, opened)
-    for body, base in along.items():
-        thing = world.bodies[body]
+    frame, origin = mechanic.frame(name, {**mechanic.values(), **goal})
+    for body, local in along.items():
+        thing, base = world.bodies[body], origin + frame @ local
         _set(world, thing.body, base + np.array([0.0, 0.0, center_height(thing.shape)]))
 
 

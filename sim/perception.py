@@ -18,6 +18,7 @@ import numpy as np
 
 from reasoner.amounts import written
 from reasoner.embodiment.values import PerceiverUse
+from reasoner.symbols import FALSE, TRUE
 from sim.base import astray
 from sim.bodies import height_of
 from sim.engine import Engine
@@ -56,7 +57,7 @@ def tilt_of(rotation: Array) -> float:
 def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return the place on which the object stands, or `in_hand` if a hand carries it."""
     body = arguments[0]
-    if body not in world.bodies:
+    if not world.knows(body):
         return None
     rotation, position = world.sense(body)
     place, distance = world.nearest_place(position)
@@ -80,7 +81,7 @@ def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 def observe_content(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return which of the situation type's values the vessel contains at least `least` servings of (the most), or `empty`."""
-    if arguments[0] not in world.bodies:
+    if not world.knows(arguments[0]):
         return None
     amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings if name in use.choices}
     enough = {name: amount for name, amount in amounts.items() if amount >= use.numbers["least"]}
@@ -95,7 +96,7 @@ def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...],
 
 def observe_servings(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
     """Return how many servings the vessel contains, to the nearest `grain`."""
-    if arguments[0] not in world.bodies:
+    if not world.knows(arguments[0]):
         return None
     grain = Fraction(str(use.numbers["grain"]))
     return written(round(world.servings(arguments[0]) / grain) * grain)
@@ -135,7 +136,11 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
         return use.values["raised"]
     if held is not None and height < numbers["contact_height"]:
         return held
-    near = [(float(np.hypot(*(world.sense(body)[1] - top)[:2])), body) for body in world.bodies if body != held]
+    near = [
+        (float(np.hypot(*(world.sense(body)[1] - top)[:2])), body)
+        for body in world.bodies
+        if body != held and world.knows(body)
+    ]
     gap, body = min(near, default=(np.inf, ""))
     if gap < (numbers["beside"] if held is not None else numbers["between"]):
         return body
@@ -170,6 +175,22 @@ def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
     """Open the link, or leave it shut."""
     draft.opened[arguments[0]] = value == use.values.get("opened", "true")
+
+
+# ------------------------------------------------------------------------------------------ what is in view
+
+
+def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
+    """Return whether an object is known and hidden by something else than a robot."""
+    name = arguments[0]
+    if not world.knows(name):
+        return None
+    robots = {hand.body for hand in world.hands.values()}
+    return TRUE if not world.perceives(name) and world.sight().covers.get(name) not in robots else FALSE
+
+
+def arrange_nothing(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
+    """Leave it to where things are."""
 
 
 # ------------------------------------------------------------------------------------------ where a robot stands
@@ -214,6 +235,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
     "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True),
+    "perceive_covered": Perceiver(observe_covered, arrange_nothing, "unexpected"),
     "perceive_stand": Perceiver(observe_stand, arrange_stand, "misplaced", True),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),
 }

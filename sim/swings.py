@@ -43,9 +43,12 @@ def gap(world: Engine, link: str, values: Sequence[float], body: str, pose: tupl
 def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
     """Raise `SkillError` if a body stands where a link passes on its way through some values of its joint."""
     for name in world.bodies:
-        if world.carried_by(name) == link:
+        if not world.knows(name):
             continue
-        left = gap(world, link, values[1:], name, world.sense(name))
+        pose = world.sense(name)
+        if world.known[name][0] == link:
+            continue
+        left = gap(world, link, values[1:], name, pose)
         if left <= 0:
             error = SkillError("no path", (link, name), f"{name} stands in the way of {link}", clearance_m=left)
             error.verdict = replace(error.verdict, swings=link)
@@ -84,7 +87,7 @@ def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
 def _in_the_way(world: Engine, symbol: Symbol, link: str) -> Iterator[Fact]:
     """Yield where a body would be in the way: at which places, and in a hand that has taken it from where it is."""
     use, body = world.embodiment.perceivers[symbol.situation], symbol.arguments[0]
-    if use.perceiver != "perceive_place" or body not in world.bodies:
+    if use.perceiver != "perceive_place" or body not in world.bodies or not world.knows(body):
         return
     one = world.links[link].link(link)
     values = np.linspace(one.shut, one.opened, SAMPLES).tolist()

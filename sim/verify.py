@@ -9,7 +9,7 @@ from typing import Any
 
 from planner.validation import successor
 from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import FALSE, TRUE, Problem, State
+from reasoner.symbols import FALSE, TRUE, Fact, Problem, State
 from sim.engine import Clock, Engine
 from sim.perception import perceiver
 from sim.staging import Perturbation
@@ -34,8 +34,8 @@ class StepReport:
 class Rollout:
     """One execution of a plan.
 
-    `poured` is the share of a serving that arrived, per pour; `state` what was perceived last; `cpu_seconds` leaves out what
-    filming took (`clock.rendering`).
+    `poured` is the share of a serving that arrived, per pour; `state` what was perceived last, `believed` what of that rests on
+    belief since it is hidden; `cpu_seconds` leaves out what filming took (`clock.rendering`).
     """
 
     seed: int
@@ -46,6 +46,7 @@ class Rollout:
     simulated_seconds: float
     state: State = field(default_factory=dict)
     clock: Clock = field(default_factory=Clock, compare=False)
+    believed: tuple[Fact, ...] = ()
 
     @property
     def failure(self) -> StepReport | None:
@@ -61,6 +62,7 @@ class Rollout:
             "poured": [round(share, 6) for share in self.poured],
             "cpu_seconds": round(self.cpu_seconds, 3),
             "simulated_seconds": round(self.simulated_seconds, 4),
+            "believed": [str(fact) for fact in self.believed],
         }
 
 
@@ -144,7 +146,9 @@ def verify(
         poured = tuple(min(1.0, r.verdict.measured["poured"]) for r in reports if "poured" in r.verdict.measured)
         ok = len(reports) == len(steps) and all(report.verdict.ok for report in reports)
         cpu = time.process_time() - begin - world.clock.rendering
-        return Rollout(seed, ok, tuple(reports), poured, cpu, world.seconds, world.observe(), world.clock)
+        seen = world.observe()
+        hidden = world.believed(seen)
+        return Rollout(seed, ok, tuple(reports), poured, cpu, world.seconds, seen, world.clock, hidden)
 
 
 def compare(world: World, expected: State, verdict: Verdict) -> Verdict:

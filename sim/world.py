@@ -8,6 +8,8 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Protocol
 
+import numpy as np
+
 from reasoner.embodiment.values import Embodiment
 from reasoner.refutations import Refutation
 from reasoner.symbols import Fact, State, Symbol
@@ -83,7 +85,10 @@ class World(Engine):
         self.symbols += [symbol for symbol in joints if symbol not in initial]  # what isn't said to be open is shut
         self.perturb = perturb
         furnish(self, perturb)
-        stage(self, self._draft(initial), perturb, beads)
+        draft = self._draft(initial)
+        stage(self, draft, perturb, beads)
+        for name, place in draft.places.items():  # what isn't seen is believed to be where the scene says
+            self.remember(name, np.eye(3), self.place(place))
         self.watch = watch
 
     def __enter__(self) -> World:
@@ -112,6 +117,11 @@ class World(Engine):
             if value is not None:
                 state[symbol] = value
         return state
+
+    def believed(self, state: State) -> tuple[Fact, ...]:
+        """Return the facts of a state that is perceived now which are believed and not seen: of what is hidden."""
+        hidden = {name for name in self.known if not self.perceives(name)}
+        return tuple(Fact(symbol, value) for symbol, value in state.items() if symbol.arguments[0] in hidden)
 
     def execute(self, step: Step) -> Verdict:
         """Let the robot carry out a primitive; return whether its postcondition holds in the world.

@@ -71,6 +71,7 @@ def read_embodiment(
         perceivers=_perceivers(facts, names),
         mechanisms=mechanisms(facts, names, folders),
         stands={names(node): _stand(facts, node, names) for node in facts.members("Stand")},
+        cameras=tuple(facts.position(node) for node in facts.members("Camera")),
     )
 
 

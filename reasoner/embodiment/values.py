@@ -299,6 +299,7 @@ class Embodiment:
     perceivers: Mapping[str, PerceiverUse]
     mechanisms: tuple[Mechanism, ...] = ()
     stands: Mapping[str, Stand] = field(default_factory=dict)
+    cameras: tuple[Vector, ...] = ()
 
     def hand(self, name: str) -> tuple[Robot, Hand]:
         """Return the hand of that name with its robot; raise `KeyError` that lists the hands there are."""

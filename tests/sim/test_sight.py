@@ -1,0 +1,134 @@
+"""What is in view: under a lid, in a shut cupboard or drawer things are believed to be where they were, until uncovered."""
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+import confab
+from confab.physics import Report
+from confab.scene import Scene
+from planner.acting.episode import Change, Intervention
+from planner.plan import Plan
+from reasoner.embodiment.values import Embodiment, Mechanism, Part, PerceiverUse, Place
+from reasoner.symbols import Fact, Symbol
+from sim.faults import displaced
+from sim.live import LiveWorld, take_away
+from sim.perception import observe_covered
+from sim.verdict import SkillError
+from sim.verify import Rollout, verify
+from sim.world import World
+
+CUP, JAR, LID = (Symbol("LOCATION", (name,)) for name in ("cup", "jar", "lid"))
+
+
+@cache
+def kitchen() -> Scene:
+    return confab.load("kitchen-corner")
+
+
+def set_joint(world: World, link: str, opened: bool) -> None:
+    """Open or shut a link at once, with what it carries."""
+    live = LiveWorld(world, {})
+    live.disturb(Intervention(Change.WORLD, (Fact(Symbol("OPENED", (link,)), str(opened).lower()),)))
+
+
+def covered(world: World, name: str) -> str | None:
+    return observe_covered(world, PerceiverUse("COVERED", "perceive_covered"), (name,))
+
+
+def with_hollow_pot() -> Embodiment:
+    """The kitchen with a pot into which the jar goes, as high as the jar and a little more."""
+    sides = ((0.065, 0.0, 0.01, 0.14), (-0.065, 0.0, 0.01, 0.14), (0.0, 0.065, 0.14, 0.01), (0.0, -0.065, 0.14, 0.01))
+    walls = (Part(f"wall{i}", "box", (dx, dy, 0.14), (x, y, 0.07)) for i, (x, y, dx, dy) in enumerate(sides))
+    body = kitchen().embodiment
+    furniture = tuple(one for one in body.mechanisms if one.name != "pot")
+    pot = Mechanism("pot", (0.6, 0.0, 0.7), 0.0, tuple(walls), ())
+    places = {"pot_top": Place("pot_top", (0.0, 0.0, 0.14), "pot"), "in_pot": Place("in_pot", (0.0, 0.0, 0.0), "pot")}
+    return replace(body, mechanisms=(*furniture, pot), places={**body.places, **places})
+
+
+def test_what_is_in_a_shut_cupboard_is_believed_and_seen_once_it_is_open() -> None:
+    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+        state = world.observe()
+        assert state[CUP] == "shelf"
+        assert Fact(CUP, "shelf") in world.believed(state)
+        assert covered(world, "cup") == "true"
+        assert covered(world, "lid") == "false"
+        set_joint(world, "door", True)
+        assert world.believed(world.observe()) == ()
+        assert covered(world, "cup") == "false"
+
+
+def test_what_is_under_a_lid_is_believed_and_seen_once_the_lid_is_off() -> None:
+    initial = {**kitchen().problem.initial, JAR: "in_pot", LID: "pot_top"}
+    with World(with_hollow_pot(), initial) as world:
+        assert not world.perceives("jar")
+        assert world.observe()[JAR] == "in_pot"
+        displaced("lid", (-0.2, -0.1))(world)
+        world.run(60)
+        assert world.perceives("jar")
+        assert world.observe()[JAR] == "in_pot"
+
+
+def test_what_is_in_a_shut_drawer_goes_with_it_in_belief_and_is_seen_once_it_is_open() -> None:
+    body = replace(kitchen().embodiment, cameras=((0.62, -0.4, 2.0),))
+    with World(body, kitchen().problem.initial) as world:
+        assert not world.perceives("jar")
+        before = world.sense("jar")[1]
+        set_joint(world, "drawer", True)
+        assert world.perceives("jar")
+        shift = world.sense("jar")[1] - before
+        assert shift == pytest.approx([-0.17, 0.0, 0.0], abs=0.01)
+        set_joint(world, "drawer", False)
+        assert not world.perceives("jar")
+        assert world.sense("jar")[1] == pytest.approx(before, abs=0.005)
+        assert world.observe()[JAR] == "compartment"
+
+
+def test_what_was_taken_out_meanwhile_is_believed_to_be_there_until_it_is_uncovered() -> None:
+    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+        take_away(world, "cup")
+        assert world.observe()[CUP] == "shelf"
+        set_joint(world, "door", True)
+        assert CUP not in world.observe()
+        with pytest.raises(SkillError, match="nowhere to be seen"):
+            world.sense("cup")
+
+
+def test_what_was_moved_within_a_shut_cupboard_is_noticed_when_it_is_opened() -> None:
+    with World(kitchen().embodiment, kitchen().problem.initial) as world:
+        displaced("cup", (0.0, -0.07))(world)
+        world.run(30)
+        assert world.observe()[CUP] == "shelf"
+        believed = world.sense("cup")[1]
+        set_joint(world, "door", True)
+        assert world.sense("cup")[1] - believed == pytest.approx([0.0, -0.07, 0.0], abs=0.005)
+
+
+def test_a_plan_stops_where_uncovering_shows_that_the_belief_is_wrong() -> None:
+    scene = kitchen()
+    steps = scene.plan().plan.primitives[:1]
+    assert steps[0].behavior == "F3_OPEN"
+    rollout = verify(
+        scene.embodiment,
+        scene.problem.initial,
+        steps,
+        [{**scene.problem.initial, Symbol("OPENED", ("door",)): "true"}],
+        prepare=lambda world: take_away(world, "cup"),
+    )
+    failure = rollout.failure
+    assert failure is not None
+    assert failure.verdict.message == "BEVERAGE of cup: expected no_beverage, seen nothing that can be told"
+    assert CUP not in rollout.state
+
+
+def test_the_verdict_of_a_goal_that_is_hidden_says_that_it_was_not_seen() -> None:
+    scene = kitchen()
+    plan = Plan(())
+    with World(scene.embodiment, scene.problem.initial) as world:
+        state = world.observe()
+        rollout = Rollout(0, True, (), (), 1.0, 1.0, state, believed=world.believed(state))
+    assert "; not seen in the end, believed: cup LOCATION shelf" in Report(plan, {CUP: "shelf"}, (rollout,)).summary()
+    assert "believed" not in Report(plan, {LID: "right_spot"}, (rollout,)).summary()
+    assert rollout.as_json()["believed"] == ["cup BEVERAGE no_beverage", "cup LOCATION shelf"]
