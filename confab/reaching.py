@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 
 import pyoxigraph as ox
 
 import ontology
 from confab.known import Known, S
-from reasoner.graph.knowledge import BASE, KnowledgeError
+from reasoner.embodiment.reach import reach_hash, reach_relation
+from reasoner.graph.knowledge import BASE, KnowledgeError, text
 from reasoner.vocabulary import EMBODIMENT, EPISODES
 
 log = logging.getLogger(__name__)
@@ -18,6 +20,9 @@ SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :sym
   FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
   FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
 """A file with an episode, or a memory, is about a scene that has its own reach."""
+
+REACHED = "SELECT DISTINCT ?place WHERE {{ ?hand <{relation}> ?place }}"
+"""The places that some hand reaches."""
 
 
 def has_robot(scene: Known) -> bool:
@@ -65,7 +70,7 @@ def with_reach(scene: S) -> S:
     KnowledgeError
         The scene is symbolic only, or lacks something that physics needs.
     """
-    from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
+    from reasoner.embodiment.reach import save_reach
     from sim.reach import fingerprint, reach
 
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):
@@ -90,3 +95,21 @@ def with_reach(scene: S) -> S:
         except OSError as error:
             log.warning("%s: %s; what was computed isn't kept", path, error.strerror)
     return type(scene)(graph, scene.seconds)
+
+
+def unreached(scene: Known) -> list[str]:
+    """Return a line for each place of the first or the wanted facts that no hand reaches, with what is in the way of each hand."""
+    from sim.reach import hindrance
+
+    graph = scene.knowledge
+    if graph.remote or not graph.select(ROBOTS):
+        return []
+    problem = scene.problem
+    used = dict.fromkeys((*problem.goal.values(), *problem.initial.values()))
+    reached = {text(row[0]) for row in graph.select(REACHED.format(relation=reach_relation(graph)))}
+    found = []
+    for place in (name for name in used if name in scene.embodiment.places and scene.names.iri(name) not in reached):
+        with suppress(ValueError):
+            why = hindrance(scene.embodiment, place)
+            found += [f"no hand reaches {place}: {'; '.join(why)}"] if why else []
+    return found

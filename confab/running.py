@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from confab.memory import Memory, undisturbed
 from confab.planning import Result
 from confab.progress import progress, tell
-from confab.reaching import has_robot, with_reach
+from confab.reaching import has_robot, unreached, with_reach
 from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene, load
 from confab.show import show
@@ -61,6 +61,8 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
         result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
         show(result)
+        for line in unreached(scene) if bodies else ():
+            tell(line)
         print(f"report    {reported(scene, result, None, None, out)}")
         return GAVE_UP if result.outcome.status is Status.GAVE_UP else NO
     report = None

@@ -36,6 +36,9 @@ from sim.verdict import REFUTED, SkillError, named
 CLOSE = 0.002
 """Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
 
+NOWHERE = 100.0
+"""Metres beyond which no arm is asked for: a pose there stands for one that no hand can have."""
+
 ROUNDED = 3
 """Samples over which corners of a path are rounded, on either side, if nothing is near them."""
 
@@ -128,8 +131,7 @@ class Attempt:
                 q, valid = spare.solve(stage.poses[left])
                 left, solved = left[valid], [before[valid] for before in (*solved, q)]
                 if not len(left):
-                    missing = max(beyond(self.hand.arm, stage.poses) for stage in stages)
-                    raise SkillError("unreachable", objects, beyond_m=missing)
+                    raise self._unreachable(stages, stage, objects)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
             movers = self.hand.mover(THIN), self.hand.mover(opening)
             scenes = [_scene(reacher, *movers, stage, CLOSE if stage.near else reacher.margin) for stage in stages]
@@ -141,6 +143,18 @@ class Attempt:
             if not found:
                 raise _blocked(scenes, [q[order] for q in solved], objects)
             return [int(left[i]) for i in found]
+
+    def _unreachable(self, stages: Sequence[Stage], at: Stage, objects: tuple[str, ...]) -> SkillError:
+        """Return what to raise where no posture is left at a stage: by how much it is too far, and where a joint is by then."""
+        if at.joint is None:
+            return SkillError("unreachable", objects, beyond_m=max(beyond(self.hand.arm, one.poses) for one in stages))
+        missing = beyond(self.hand.arm, at.poses)
+        why = "not within the limits of the arm's joints" if missing <= 0 else "too far"
+        why = "not level" if missing > NOWHERE else why
+        message = f"where the joint is at {at.joint:.3g}, the hand would be {why}"
+        return SkillError(
+            "unreachable", objects, message, joint=at.joint, **({"beyond_m": missing} if missing < NOWHERE else {})
+        )
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
         """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""

@@ -38,12 +38,16 @@ class Draft:
 
 @dataclass(frozen=True)
 class Perceiver:
-    """How a kind of situation type is read off the world and set up in it; whether its values say where something is."""
+    """How a kind of situation type is read off the world and set up in it; whether its values say where something is.
+
+    `measure` tells the numbers that the value is read off, and those that it is held against.
+    """
 
     observe: Callable[[Engine, PerceiverUse, tuple[str, ...]], str | None]
     arrange: Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]
     code: str
     spatial: bool = False
+    measure: Callable[[Engine, tuple[str, ...]], Mapping[str, float]] | None = None
 
 
 def tilt_of(rotation: Array) -> float:
@@ -172,6 +176,15 @@ def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     return use.values.get("shut", "false") if value <= link.shut else None
 
 
+def measure_joint(world: Engine, arguments: tuple[str, ...]) -> Mapping[str, float]:
+    """Return where a link's joint is now, from where on it counts as open, and up to where as shut."""
+    if arguments[0] not in world.links:
+        return {}
+    name, mechanic = arguments[0], world.links[arguments[0]]
+    link = mechanic.link(name)
+    return {"joint": mechanic.values()[name], "opened": link.opened, "shut": link.shut}
+
+
 def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
     """Open the link, or leave it shut."""
     draft.opened[arguments[0]] = value == use.values.get("opened", "true")
@@ -234,7 +247,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
     "perceive_servings": Perceiver(observe_servings, arrange_servings, "under-pour"),
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),
     "perceive_hand_position": Perceiver(observe_position, arrange_rest("raised"), "unexpected", True),
-    "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True),
+    "perceive_joint": Perceiver(observe_joint, arrange_joint, "stuck", True, measure_joint),
     "perceive_covered": Perceiver(observe_covered, arrange_nothing, "unexpected"),
     "perceive_stand": Perceiver(observe_stand, arrange_stand, "misplaced", True),
     "perceive_hand_tilt": Perceiver(observe_tilt, arrange_rest("upright"), "unexpected"),

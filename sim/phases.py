@@ -237,7 +237,10 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
     moved = [run.world.surroundings(name, held, {link: float(value)}) for value in values]
     check_swing(run.world, link, values.tolist())
     found = _moved(run, phase, poses, way, values.tolist())
-    return [Stage(at, ignored, around, True, True, SLACK) for at, around in zip(found[1:], moved[1:], strict=True)]
+    return [
+        Stage(at, ignored, around, True, True, SLACK, joint=float(value))
+        for at, around, value in zip(found[1:], moved[1:], values[1:], strict=True)
+    ]
 
 
 def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:

@@ -19,12 +19,15 @@ from sim.arms import read_arm
 from sim.assembly import read_robot
 from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
 from sim.linkage import with_open_mechanisms
-from sim.motion import Reacher
+from sim.motion import Reacher, beyond
 from sim.stages import MARGIN, Numbers, grip_stages
 from sim.urdf import Model
 
 VERSION = "1"
 """Counts changes of the method, so that results of an older one aren't taken for current."""
+
+STAGES = ("around what stands there", "before it", "when it is lifted")
+"""The stages of a grasp, in the order of `grip_stages`."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +46,7 @@ def reach(embodiment: Embodiment) -> Reach:
     ValueError
         No behaviour uses the skill that reaches, so there are no settings to go by.
     """
-    settings = [use.numbers for use in embodiment.skills.values() if use.skill == "reach"]
-    if not settings:
-        raise ValueError("no behaviour is carried out by the skill 'reach': what a hand reaches isn't defined")
-    numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
-    heights = sorted({body.shape.grasp_height for body in embodiment.bodies.values()}) or [settings[0]["empty_height"]]
+    numbers, heights = _settings(embodiment)
     pairs = set()
     places, solids = with_open_mechanisms(embodiment)
     for robot in embodiment.robots:
@@ -58,10 +57,69 @@ def reach(embodiment: Embodiment) -> Reach:
                 found = [
                     place
                     for place in near
-                    if all(_reaches(reacher, place, h, numbers) for h in _heights(embodiment, place, heights))
+                    if all(_reaches(reacher, place, h, numbers) for h in _heights(embodiment, place.name, heights))
                 ]
                 pairs |= {(hand.name, place.name) for place in found}
     return Reach(frozenset(pairs), fingerprint(embodiment))
+
+
+def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
+    """Return for each hand why it doesn't reach a place: what is in the way at which stage of a grasp, with every joint open.
+
+    Raises
+    ------
+    ValueError
+        No behaviour uses the skill that reaches, or nobody knows where the place is.
+    """
+    numbers, heights = _settings(embodiment)
+    places, solids = with_open_mechanisms(embodiment)
+    if place not in places:
+        raise ValueError(f"nobody knows where {place} is: what carries it may be anywhere")
+    found = []
+    for robot in embodiment.robots:
+        for stand, model in _standing(robot, embodiment):
+            for hand in robot.hands:
+                reacher = _reacher(embodiment, robot, hand, model, solids)
+                for height in _heights(embodiment, place, heights):
+                    if not _reaches(reacher, places[place], height, numbers):
+                        at = f" at {stand}" if stand else ""
+                        found.append(f"{hand.name}{at}: {_why(reacher, places[place], height, numbers)}")
+                        break
+    return tuple(dict.fromkeys(found))
+
+
+def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str:
+    """Return why no posture at a grasp height above a place passes all stages: at the first that leaves none."""
+    grip = np.array(place.position) + np.array([0.0, 0.0, height])
+    left = np.ones(1, dtype=bool)
+    for name, stage in zip(STAGES, grip_stages(grip, numbers), strict=True):
+        q, valid = reacher.solve(stage.poses)
+        valid = valid & left
+        if not valid.any():
+            missing = beyond(reacher.arm, stage.poses)
+            return (
+                f"{missing * 100:.1f} cm too far {name}"
+                if missing > 0
+                else f"no posture {name} is within all joints' limits"
+            )
+        free = reacher.free(q)
+        if not (valid & free).any():
+            gaps = reacher.mover.clearances(q[valid], reacher.around)
+            blocked = {one: int(np.sum(gap <= reacher.margin)) for one, gap in gaps.items()}
+            worst = max(blocked, key=lambda one: (blocked[one], -float(gaps[one].max())))
+            return f"{worst} is in the way {name}"
+        left = valid & free
+    return "nothing"
+
+
+def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
+    """Return the settings of the skill that reaches, and the heights at which the scene's bodies are grasped."""
+    settings = [use.numbers for use in embodiment.skills.values() if use.skill == "reach"]
+    if not settings:
+        raise ValueError("no behaviour is carried out by the skill 'reach': what a hand reaches isn't defined")
+    numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
+    grasped = sorted({body.shape.grasp_height for body in embodiment.bodies.values()})
+    return numbers, grasped or [settings[0]["empty_height"]]
 
 
 def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, Model]]:
@@ -98,9 +156,9 @@ def fingerprint(embodiment: Embodiment) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def _heights(embodiment: Embodiment, place: Place, heights: Sequence[float]) -> Sequence[float]:
+def _heights(embodiment: Embodiment, place: str, heights: Sequence[float]) -> Sequence[float]:
     """Return the heights above a place at which hands take what stands there."""
-    said = embodiment.places[place.name].height
+    said = embodiment.places[place].height
     return heights if said is None else (said,)
 
 

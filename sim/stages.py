@@ -24,7 +24,7 @@ class Stage:
     The fingers have by then `closed` around something, or are as the others' are. At a handle, which is `near` what it is on,
     a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits, and
     `fold` from where the arm would be stretched.
-    What the hand holds now is `released` by then.
+    What the hand holds now is `released` by then. The joint that is moved is at `joint`.
     """
 
     poses: Array
@@ -35,6 +35,7 @@ class Stage:
     slack: float = 0.0
     fold: float = 0.0
     released: bool = False
+    joint: float | None = None
 
 
 def fan() -> tuple[Array, Array]:

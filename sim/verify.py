@@ -158,9 +158,10 @@ def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
         got = seen.get(symbol)
         wanted = expected.get(symbol, FALSE if got in (TRUE, FALSE) else None)
         if wanted is not None and got != wanted:
-            code = perceiver(world.embodiment.perceivers[symbol.situation].perceiver).code
+            how = perceiver(world.embodiment.perceivers[symbol.situation].perceiver)
+            measured = {**verdict.measured, **(how.measure(world, symbol.arguments) if how.measure else {})}
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
             who = f"{symbol.situation} of {' '.join(symbol.arguments)}"
             message = f"{who}: expected {wanted}, seen {got or 'nothing that can be told'}"
-            return Verdict(False, code, objects, verdict.measured, message)
+            return Verdict(False, how.code, objects, measured, message)
     return verdict

@@ -14,7 +14,7 @@ from reasoner.graph.knowledge import KnowledgeError
 if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.scene import Scene
-    from planner.plan import Plan
+    from planner.plan import Outcome, Plan
     from reasoner.limits import Deadline
 
 
@@ -42,6 +42,15 @@ def doubt(scene: Scene, deadline: Deadline) -> None:
     if errors:
         more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
         remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
+
+
+def blame_reach(scene: Scene, outcome: Outcome) -> None:
+    """Say in a line each, where there is no plan, which places no hand reaches and what is in the way."""
+    if outcome.plan is None:
+        from confab.reaching import unreached
+
+        for line in unreached(scene):
+            remark(line)
 
 
 NAMED = 3

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.exceptions import Exit
 
-from confab.commands.given import doubt, json_file, load_scene, memory_for, plan_in
+from confab.commands.given import blame_reach, doubt, json_file, load_scene, memory_for, plan_in
 from confab.commands.options import (
     AS_JSON,
     GOALS,
@@ -117,6 +117,7 @@ def plan(
         # What draws trees is imported for a plan alone: there may be no time left for it.
         show_result(result.json() if as_json else result if result.solved else str(result))
     doubt(loaded, deadline)
+    blame_reach(loaded, result.outcome)
     raise Exit(EXIT[result.outcome.status.value])
 
 

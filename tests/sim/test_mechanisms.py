@@ -24,8 +24,8 @@ from sim.linkage import read_mechanism, wide
 from sim.live import LiveWorld
 from sim.skills import perform
 from sim.staging import Perturbation
-from sim.verdict import CODES, SkillError
-from sim.verify import expectations, verify
+from sim.verdict import CODES, SkillError, Verdict
+from sim.verify import compare, expectations, verify
 from sim.world import World
 
 PANEL = Mechanism(
@@ -284,3 +284,24 @@ def test_the_interpreter_has_all_that_phases_may_say() -> None:
     assert set(phases.CONDITIONS) == set(CONDITIONS)
     assert set(measuring.QUANTITIES) == set(QUANTITIES)
     assert set(VERDICTS) == set(CODES)
+
+
+def test_a_joint_that_is_not_open_is_told_as_it_is_perceived_with_its_thresholds() -> None:
+    scene = kitchen()
+    with World(scene.embodiment, scene.problem.initial) as world:
+        before = Verdict(True, measured={"joint": 1.2})
+        verdict = compare(world, {Symbol("OPENED", ("door",)): "true"}, before)
+    assert verdict.code == "stuck"
+    assert verdict.measured == pytest.approx({"joint": 0.0, "opened": 1.0, "shut": 0.06}, abs=1e-3)
+
+
+def test_where_on_a_joint_s_path_a_hand_does_not_get_is_told() -> None:
+    scene = kitchen()
+    cupboard, *others = scene.embodiment.mechanisms
+    x, y, z = cupboard.position
+    away = replace(scene.embodiment, mechanisms=(replace(cupboard, position=(x + 0.1, y + 0.35, z)), *others))
+    with World(away, scene.problem.initial) as world:
+        verdict = world.execute(Step((0,), 0, 3, "F3_OPEN", ("left_hand", "door")))
+    assert verdict.code == "unreachable"
+    assert verdict.message == "where the joint is at 1.05, the hand would be too far"
+    assert verdict.measured == pytest.approx({"joint": 1.05, "beyond_m": 0.009}, abs=0.01)

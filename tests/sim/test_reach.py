@@ -1,6 +1,7 @@
 from dataclasses import replace
 
-from sim.reach import fingerprint, reach
+from reasoner.embodiment.values import Fixture
+from sim.reach import fingerprint, hindrance, reach
 
 from .conftest import Case
 
@@ -26,3 +27,12 @@ def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_els
     assert len({fingerprint(body), fingerprint(moved), fingerprint(turned)}) == 3
     repainted = {n: replace(b, servings=9.0) for n, b in body.bodies.items()}
     assert fingerprint(replace(body, bodies=repainted)) == fingerprint(body)
+
+
+def test_what_keeps_a_hand_from_a_place_is_named_with_the_stage_of_the_grasp(serving: Case) -> None:
+    name = "location5"
+    place = serving.embodiment.places[name]
+    assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm too far around what stands there",)
+    above = Fixture("lamp", (0.5, 0.5, 0.02), (*place.position[:2], place.position[2] + 0.25))
+    hung = replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, above))
+    assert hindrance(hung, name)[0] == "left_hand: lamp is in the way when it is lifted"
