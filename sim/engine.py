@@ -41,6 +41,9 @@ LAG = 0.08
 LOOKS = 6
 """So often is looked at something before its position is told; the mean is taken, so that noise grows less."""
 
+STEADY = 5.0
+"""Standard deviations of what is perceived within which a body may be where it was."""
+
 BESIDE = 0.05
 """Metres from a place up to which a body is at it; and below a place from which on it is no longer at it."""
 
@@ -255,9 +258,16 @@ class Engine:
         return self._believed(name)
 
     def remember(self, name: str, rotation: Array, position: Array) -> None:
-        """Take note of where a body is, in the frame of what carries it there."""
+        """Take note of where a body is, in the frame of what carries it there.
+
+        What isn't seen exactly, and may not have moved, is taken for where it was, and a little for where it seems to be now.
+        """
         carrier = self.carried_by(name, position)
         frame, origin = self.carrier(carrier)
+        if self.noise and name in self.known and self.known[name][0] == carrier:
+            before = self._believed(name)[1]
+            if float(np.linalg.norm(position - before)) < STEADY * self.blur:
+                position = before + (position - before) / LOOKS
         self.known[name], self.remembered[name] = (
             (carrier, frame.T @ rotation, frame.T @ (position - origin)),
             self.steps,
@@ -318,13 +328,20 @@ class Engine:
     def look(self, before: int = 0) -> None:
         """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move.
 
-        Each is the mean of several, as of bodies; after some `before`, of which the mean is what is perceived, it is that of all.
+        Each is the mean of several; after some `before`, of which the mean is what is perceived, it is that of all.
         """
+        seen = {name: error for name, (steps, error) in self.errors.items() if before and steps == self.steps}
         self.errors.clear()
         if self.noise:
             for mechanic in self.mechanics:
-                seen = self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
-                self.shifts[mechanic.body] = (before * self.shift(mechanic) + seen) / (before + 1)
+                self.shifts[mechanic.body] = self._mean(before, self.shift(mechanic))
+            self.errors = {name: (self.steps, self._mean(before, error)) for name, error in seen.items()}
+
+    def _mean(self, before: int, error: Array) -> Array:
+        """Return the mean error of so many looks before, and of one more."""
+        seen = self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
+        mean: Array = (before * error + seen) / (before + 1)
+        return mean
 
     def shift(self, mechanic: Mechanic) -> Array:
         """Return by how much a mechanism is perceived to be elsewhere than it is."""

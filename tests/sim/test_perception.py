@@ -7,6 +7,8 @@ from benchmarks.perception import perception
 from reasoner.symbols import State
 from sim.faults import displaced, drained, lying
 from sim.staging import Perturbation
+from sim.verdict import Verdict
+from sim.verify import compare
 from sim.world import World
 
 from .conftest import Case, case
@@ -62,3 +64,17 @@ def test_errors_of_perception_under_strong_noise_are_counted_not_hidden() -> Non
     for count in (tally.wrong, tally.missed):
         assert all(count[situation, noise] == 0 for situation, noise in tally.looks if noise <= 0.002)
     assert tally.missed["LOCATION", 0.02] > tally.missed["LOCATION", 0.005]
+
+
+def test_what_is_not_as_expected_is_looked_at_again_and_what_is_not_so_stays_found(moved: Case) -> None:
+    wanted = {symbol: value for symbol, value in moved.initial.items() if symbol.situation == "LOCATION"}
+    symbol = next(iter(wanted))
+    who = symbol.arguments[0]
+    with World(moved.embodiment, moved.initial, beads=False, noise=0.002) as world:
+        world.observe()
+        world.errors[who] = world.steps, np.array([0.0, 0.0, 0.02])  # a look that was far off
+        assert symbol not in world.observe()
+        assert compare(world, {**world.observe(), **wanted}, Verdict(True)).ok
+        displaced(who, (0.1, 0.0))(world)
+        world.run(30)
+        assert compare(world, wanted, Verdict(True)).code == "misplaced"
