@@ -28,13 +28,14 @@ from time import perf_counter
 from typing import NamedTuple, TypeAlias
 
 from planner.grounded.grounding import MOST_ROWS, ground
-from planner.grounded.hff import Evaluate, Evaluation
+from planner.grounded.hff import Evaluate, EvaluateFor, Evaluation
 from planner.grounded.hff import heuristic as relaxed
 from planner.grounded.hff_amounts import heuristic as with_amounts
 from planner.grounded.hff_amounts import repeats
 from planner.grounded.hff_dense import Effort, EvaluateMany, effort
 from planner.grounded.hff_dense import heuristic as dense
-from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, landmarks
+from planner.grounded.landmarks import in_series, landmarks
+from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, path_to
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
@@ -57,12 +58,13 @@ Path: TypeAlias = "tuple[int, list[int]]"
 
 
 class Turn(NamedTuple):
-    """A search and its share of the time: by novelty or by h, with landmarks, with lookahead."""
+    """A search and its share of the time: by novelty or by h, with landmarks, with lookahead, from landmark to landmark."""
 
     share: int
     by_novelty: bool = False
     by_landmarks: bool = False
     ahead: bool = False
+    in_series: bool = False
 
     @property
     def slow(self) -> bool:
@@ -100,13 +102,12 @@ WORLD = Portfolio(
         Turn(6, by_novelty=True),
         Turn(4, ahead=True),
         Turn(3, by_novelty=True, by_landmarks=True),
-        Turn(1, by_landmarks=True, ahead=True),
-        Turn(1),
+        Turn(1, in_series=True),
     ),
     widest=1,
     restarts=False,
 )
-"""For a small world on the way to one goal: short plans, found before landmarks would pay."""
+"""For a small world on the way to one goal: short plans, found before landmarks would pay; long ones go from one to the next."""
 
 
 @dataclass(frozen=True)
@@ -205,13 +206,15 @@ def search(
     bits = _bits(task)
     needed = effort(bits)
     work = needed.followed
+    relaxing: EvaluateFor | None = None
     if task.amounts is not None and repeats(task):
         evaluate = evaluate or with_amounts(task)
         many = None
     else:
         width = min(needed.width, portfolio.widest)
         arrays = evaluate is None and needed.by_arrays(width) < width * work
-        evaluate = evaluate or _on_bits(task, relaxed(bits))
+        relaxing = relaxed(bits)
+        evaluate = evaluate or _on_bits(task, relaxing)
         many = _all_on_bits(task, cache(lambda: dense(bits))) if arrays else None
     often = _Evaluator(evaluate, many, needed, min(needed.width, portfolio.widest) if many else 1)
     begun = evaluate(task.initial)
@@ -223,6 +226,8 @@ def search(
             turn.share,
             by_novelty(task, evaluate, work, counts, marks if turn.by_landmarks else None)
             if turn.by_novelty
+            else _in_series(task, often, relaxing, counts, deadline)
+            if turn.in_series
             else _best_first(
                 task, often, counts, lookahead if turn.ahead else None, marks if turn.by_landmarks else None
             ),
@@ -251,7 +256,7 @@ def search(
                     Reason("no plan exists: all states that can be reached were searched"),
                     counts,
                 )
-            plan = _path(*end.value)
+            plan = path_to(*end.value)
             if found:
                 found(plan)
             if portfolio.restarts and kinds[turn].ahead and len(plan) > WASTEFUL * begun[0]:
@@ -285,7 +290,7 @@ def _again(
         except MemoryError:
             continue
         except StopIteration as end:
-            other = plan if end.value is None else _path(*end.value)
+            other = plan if end.value is None else path_to(*end.value)
             return other if len(other) < len(plan) and task.cost_of(other) <= task.cost_of(plan) else plan
     return plan
 
@@ -432,6 +437,22 @@ def _best_first(
                     return came_from, after
 
 
+def _in_series(
+    task: Task, evaluate: _Evaluator, relaxing: EvaluateFor | None, counts: Counts, deadline: float | None
+) -> Generator[int, None, tuple[Seen, int] | None]:
+    """Search from landmark to landmark; where that gets stuck, or the amounts have to be counted, greedily from the beginning."""
+    if relaxing is not None:
+        effort = evaluate.effort
+
+        def greedy(part: Task, one: Evaluate) -> Generator[int, None, tuple[Seen, int] | None]:
+            return _best_first(part, _Evaluator(one, None, effort, 1), counts)
+
+        found = yield from in_series(task, relaxing, effort.followed, greedy, deadline)
+        if found is not None:
+            return found
+    return (yield from _best_first(task, evaluate, counts))
+
+
 def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
     """Return a function that carries out a relaxed plan as far as it goes, from a state: what is reached, and by which operators.
 
@@ -520,13 +541,3 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
             left = stuck
 
     return carried_out
-
-
-def _path(came_from: Seen, state: int) -> list[int]:
-    parts: list[tuple[int, ...]] = []
-    while True:
-        before, operators = came_from[state]
-        if not operators:
-            return [operator for part in reversed(parts) for operator in part]
-        parts.append(operators)
-        state = before

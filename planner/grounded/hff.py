@@ -10,8 +10,8 @@ Geffner, "Heuristics for planning with action costs revisited", ECAI 2008.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias
 
 from planner.grounded.task import Task
 
@@ -21,7 +21,14 @@ Evaluation: TypeAlias = "tuple[int, list[int], list[int]] | None"
 Evaluate: TypeAlias = Callable[[int], Evaluation]
 
 
-def heuristic(task: Task) -> Evaluate:
+class EvaluateFor(Protocol):
+    """Evaluates a state, for the goal of the task or for other bits."""
+
+    def __call__(self, state: int, goal: Sequence[int] = ...) -> Evaluation:
+        """Return h of a state."""
+
+
+def heuristic(task: Task) -> EvaluateFor:
     """Return h_FF of a task, as a function of a state."""
     operators, owners = len(task), task.owners
     needs, adds = task.needs.lists(), task.adds.lists()
@@ -32,12 +39,12 @@ def heuristic(task: Task) -> Evaluate:
     for o, bits in enumerate(needs):
         for bit in bits:
             needed_by[bit].append(o)
-    goal = _bits(task.goal, task.size)
+    whole = _bits(task.goal, task.size)
     unreached = [-1] * task.size
     size = (task.size + 7) // 8
     of_byte = [[b for b in range(8) if byte >> b & 1] for byte in range(256)]
 
-    def evaluate(state: int) -> Evaluation:
+    def evaluate(state: int, goal: Sequence[int] = whole) -> Evaluation:
         left, cost, layer_of, supporter = missing[:], unreached[:], unreached[:], unreached[:]
         layer = [8 * i + b for i, byte in enumerate(state.to_bytes(size, "little")) if byte for b in of_byte[byte]]
         for bit in layer:
@@ -70,7 +77,7 @@ def heuristic(task: Task) -> Evaluate:
         if any(cost[bit] < 0 for bit in goal):
             return None
         chosen: dict[int, int] = {}  # operator: layer in which its effect is wanted first
-        waiting, seen = goal[:], set(goal)
+        waiting, seen = list(goal), set(goal)
         while waiting:
             bit = waiting.pop()
             o = supporter[bit]

@@ -17,7 +17,6 @@ from __future__ import annotations
 import heapq
 from collections import defaultdict
 from collections.abc import Callable, Generator
-from time import perf_counter
 
 from planner.grounded.hff import Evaluate
 from planner.grounded.task import Task
@@ -27,9 +26,6 @@ MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
 """What the states kept by one search may take, about, and what one of them takes besides its bits."""
 CHILD, VISIT = 20, 2
 """Bits that h_FF looks at in the time in which one successor is made, and a node of the tree visited."""
-
-LOOK = 1_000
-"""Operators between two looks at the clock."""
 
 Seen = dict[int, tuple[int, tuple[int, ...]]]
 """For each state that from which it was reached, and by which operators."""
@@ -111,34 +107,15 @@ def by_novelty(
     return None
 
 
-def landmarks(task: Task, deadline: float | None = None) -> int:
-    """Return facts that every plan makes true at some time: a fact's are those that all ways to it have in common.
-
-    No fact where time is over: thousands of ways to each of thousands of facts take seconds.
-
-    Keyder, Richter and Helmert, "Sound and complete landmarks for and/or graphs", ECAI 2010.
-    """
-    behind = [0 if task.initial >> bit & 1 else -1 for bit in range(task.size)]
-    ways = list(zip(task.needs.lists(), task.adds.lists(), strict=True))
-    before = None
-    while before != behind:
-        before = behind[:]
-        for number, (needs, adds) in enumerate(ways):
-            if number % LOOK == 0 and deadline is not None and perf_counter() > deadline:
-                return 0
-            needed = 0
-            for bit in needs:
-                if behind[bit] < 0:
-                    break
-                needed |= behind[bit] | 1 << bit
-            else:
-                for bit in adds:
-                    behind[bit] &= needed
-    found = 0
-    for bit in range(task.size):
-        if task.goal >> bit & 1:
-            found |= behind[bit] | 1 << bit
-    return found
+def path_to(came_from: Seen, state: int) -> list[int]:
+    """Return the operators that led to a state."""
+    parts: list[tuple[int, ...]] = []
+    while True:
+        before, operators = came_from[state]
+        if not operators:
+            return [operator for part in reversed(parts) for operator in part]
+        parts.append(operators)
+        state = before
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:

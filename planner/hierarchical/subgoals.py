@@ -61,6 +61,7 @@ class Wants:
         self._known: dict[tuple[object, ...], bool] = {}
         self._conditions: dict[int, tuple[bool, bool, tuple[str, ...], Condition]] = {}
         self._negations: dict[int, tuple[Condition, Condition]] = {}
+        self._possibles: dict[int, tuple[Condition, Condition]] = {}
         self._entered: dict[tuple[str, Key, bool], int] | None = (
             None  # what is defined, and how deep it was asked about
         )
@@ -124,24 +125,14 @@ class Wants:
                         values = () if wanted is None else (wanted,)
                     if values:
                         yield situation, key, values
-            case Witness(variable, kind, conditions, negated):
-                if negated:
-                    for individual in self._satisfying(achiever, condition, env):
-                        inner = {**env, variable: individual}
-                        for c in conditions:
-                            if isinstance(c, ValueCondition | Comparison) or (achiever.deep and isinstance(c, Witness)):
-                                yield from self.of(achiever, self._negation(c), inner, level)
-                else:
-                    lacking: list[tuple[str, list[Condition]]] = []
-                    changing = [c for c in conditions if not self._about(c)[0]]
-                    for individual in self.one_of_each(kind, env.values()):
-                        inner = {**env, variable: individual}
-                        if all(self.holds(achiever, c, inner) for c in conditions if c not in changing):
-                            unmet = [c for c in changing if not self.holds(achiever, c, inner)]
-                            lacking.append((individual, unmet))
-                    for individual, unmet in self._nearest(lacking) if achiever.rule else lacking:
-                        for c in unmet:
-                            yield from self.of(achiever, c, {**env, variable: individual}, level)
+            case Witness(negated=False):
+                yield from self._lacking(achiever, condition, env, level)
+            case Witness(variable, _, conditions):
+                for individual in self._satisfying(achiever, condition, env):
+                    inner = {**env, variable: individual}
+                    for c in conditions:
+                        if isinstance(c, ValueCondition | Comparison) or (achiever.deep and isinstance(c, Witness)):
+                            yield from self.of(achiever, self._negation(c), inner, level)
             case Comparison():
                 yield from self._amounts(condition, env)
             case AnyOf(alternatives, negated):
@@ -153,7 +144,19 @@ class Wants:
                 RelationCondition() | ClassCondition() | EqualityCondition()
             ):  # other individuals would have to be chosen
                 pass
-        yield from self._redetermined(achiever, condition, env)
+        yield from self._redetermined(achiever, condition, env, level)
+
+    def _lacking(self, achiever: Achiever, witness: Witness, env: Env, level: int) -> Iterator[Want]:
+        """Yield what those lack who could satisfy a witness."""
+        lacking: list[tuple[str, list[Condition]]] = []
+        changing = [c for c in witness.conditions if not self._about(c)[0]]
+        for individual in self.one_of_each(witness.kind, env.values()):
+            inner = {**env, witness.variable: individual}
+            if all(self.holds(achiever, c, inner) for c in witness.conditions if c not in changing):
+                lacking.append((individual, [c for c in changing if not self.holds(achiever, c, inner)]))
+        for individual, unmet in self._nearest(lacking) if achiever.rule else lacking:
+            for c in unmet:
+                yield from self.of(achiever, c, {**env, witness.variable: individual}, level)
 
     def defining(self, situation: str, key: Key, wanted: bool, level: int) -> Sequence[Want]:
         """Return wants, any of which may make something that is defined true, or false."""
@@ -242,10 +245,14 @@ class Wants:
         found: Number = function(*[env.get(name) for name in names])
         return found
 
-    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env) -> Iterator[Want]:
-        """Yield wants for other values of the symbols that determine a condition's variables."""
+    def _redetermined(self, achiever: Achiever, condition: Condition, env: Env, level: int) -> Iterator[Want]:
+        """Yield wants for other values of the symbols that determine a condition's variables.
+
+        With another value a witness need only be possible (that room has a door, which is shut): what it lacks is wanted, too.
+        """
         if isinstance(condition, ValueCondition) and condition.value in achiever.determined:
             return
+        possible = self._possible(condition)
         for term in self._about(condition)[2]:
             if term in achiever.determined:
                 situation, arguments = achiever.determined[term]
@@ -255,10 +262,23 @@ class Wants:
                 values = tuple(
                     value
                     for value in self.candidates(situation, key, achiever.kinds[term])
-                    if value != env[term] and self._would_hold(achiever, condition, env, term, value)
+                    if value != env[term] and self._would_hold(achiever, possible, env, term, value)
                 )
                 if values:
                     yield situation, key, values
+                if isinstance(condition, Witness) and possible is not condition:
+                    for value in values:
+                        yield from self._lacking(achiever, condition, {**env, term: value}, level)
+
+    def _possible(self, condition: Condition) -> Condition:
+        """Return the static part of a witness, always the same one, or the condition itself where it has none."""
+        if not isinstance(condition, Witness) or condition.negated:
+            return condition
+        if id(condition) not in self._possibles:
+            static = tuple(c for c in condition.conditions if self._about(c)[0])
+            found = replace(condition, conditions=static) if 0 < len(static) < len(condition.conditions) else condition
+            self._possibles[id(condition)] = found, condition
+        return self._possibles[id(condition)][0]
 
     def _about(self, condition: Condition) -> tuple[bool, bool, tuple[str, ...], Condition]:
         """Return whether nothing can change a condition, whether it compares, its variables, and itself.

@@ -15,7 +15,8 @@ from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
 from planner.grounded.hff_dense import Effort
 from planner.grounded.hff_dense import heuristic as by_arrays
-from planner.grounded.novelty import Seen, by_novelty, landmarks
+from planner.grounded.landmarks import behind, in_series, landmarks
+from planner.grounded.novelty import Seen, by_novelty
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
 from planner.hierarchical import planner as fast
@@ -28,6 +29,7 @@ from reasoner.pddl.syntax import parse
 from reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
+from tests.planner.test_wants import museum
 
 
 @pytest.fixture(scope="module", name="tabletop")
@@ -169,6 +171,29 @@ def test_what_every_plan_passes_is_a_landmark() -> None:
     assert isinstance(task, Task)
     names = {str(fact) for bit, fact in enumerate(task.facts) if landmarks(task) >> bit & 1}
     assert names == {"x0 AT here", "x0 AT there", "here ME true", "there ME true"}  # either arm will do
+
+
+def test_what_lies_behind_a_landmark_on_every_way_to_it_is_known() -> None:
+    task = ground(carrier(1))
+    assert isinstance(task, Task)
+    number = {str(fact): bit for bit, fact in enumerate(task.facts)}
+    before = behind(task)[number["x0 AT there"]]
+    assert {name for name, bit in number.items() if before >> bit & 1} == {
+        "x0 AT here",
+        "here ME true",
+        "there ME true",
+    }
+
+
+def test_a_search_from_landmark_to_landmark_leads_to_the_goal() -> None:
+    task = ground(museum(9), 2)
+    assert isinstance(task, Task)
+    walk = in_series(task, heuristic(task), 1, lambda part, evaluate: by_novelty(part, evaluate, 1, Counts()))
+    seen, state = finished(walk) or ({}, 0)
+    now = task.initial
+    for operator in seen[state][1]:
+        now = task.applied(now, operator) or 0
+    assert now == state and state & task.goal == task.goal
 
 
 def carrier(parcels: int) -> Problem:

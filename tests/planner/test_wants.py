@@ -7,9 +7,14 @@ from typing import Any
 import pytest
 
 from planner.hierarchical.operators import Achiever, Program
+from planner.hierarchical.planner import plan
+from planner.hierarchical.refinement_cache import WIDER
 from planner.hierarchical.serialization import Call, Compiled
 from planner.hierarchical.subgoals import Env, Wants
-from reasoner.symbols import Condition, Problem, RelationCondition, SituationType
+from planner.hierarchical.subproblem import focus
+from planner.plan import Limits, Status
+from planner.transitions import Cell
+from reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
 from worlds.families import family, random_table
 from worlds.rooms import rooms
 from worlds.writing import becomes, behavior, has, world
@@ -87,3 +92,53 @@ def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeyp
     found = list(call.segments.achieve["TURN", 0]("piece", spots[9]))
     assert [arguments for arguments, _, _ in found] == [("piece", "table2", *spots[8:12])]
     assert len(asked) < len(spots)
+
+
+def museum(rooms: int) -> Problem:
+    """A picture hangs at one end of a row of rooms and shall hang at the other; a crate stands between; all doors are shut."""
+    row = tuple(f"room{i}" for i in range(rooms))
+    doors = tuple(f"door{i}" for i in range(rooms - 1))
+    leads = [(door, room) for i, door in enumerate(doors) for room in row[i : i + 2]]
+    sides = tuple(RelationCondition("LEADS", ("?door", side)) for side in ("?from", "?to"))
+    open_ = Witness("?door", "Door", (has("DOOR", "?door", "open"), *sides))
+    here, there = has("CRATE_AT", "?c", "?room"), becomes("CRATE_AT", "?c", "?to")
+    return world(
+        [
+            SituationType("HANGS", ("Picture",), "HANGS"),
+            SituationType("PACKED", ("Picture",), "PACKED", level=2, rest="unpacked"),
+            SituationType("CRATE_AT", ("Crate",), "Room", level=2),
+            SituationType("DOOR", ("Door",), "DOOR", level=2, rest="shut"),
+        ],
+        [
+            behavior("MOVE", 1, "?p:Picture ?to:Room", [has("HANGS", "?p", "?at")], [becomes("HANGS", "?p", "?to")], "?at:Room"),
+            behavior("OPEN", 2, "?d:Door", [has("DOOR", "?d", "shut")], [becomes("DOOR", "?d", "open")]),
+            behavior("SHUT", 2, "?d:Door", [has("DOOR", "?d", "open")], [becomes("DOOR", "?d", "shut")]),
+            behavior("PUSH", 2, "?c:Crate ?to:Room", [has("CRATE_AT", "?c", "?from"), open_], [there], "?from:Room"),
+            behavior("PACK", 2, "?p:Picture ?c:Crate", [has("HANGS", "?p", "?room"), here],
+                     [becomes("HANGS", "?p", "crated"), becomes("PACKED", "?p", "?c")], "?room:Room"),
+            behavior("HANG", 2, "?p:Picture ?c:Crate", [has("PACKED", "?p", "?c"), here],
+                     [becomes("HANGS", "?p", "?room"), becomes("PACKED", "?p", "unpacked")], "?room:Room"),
+        ],
+        {"Picture": ("picture",), "Crate": ("crate",), "Room": row, "Door": doors, "DOOR": ("open", "shut"),
+         "HANGS": (*row, "crated"), "PACKED": ("crate", "unpacked")},
+        {"HANGS picture": row[0], "PACKED picture": "unpacked", "CRATE_AT crate": row[rooms // 2],
+         **{f"DOOR {door}": "shut" for door in doors}},
+        {"HANGS picture": row[-1]},
+        {"LEADS": leads},
+        {"crated": 2},
+    )  # fmt: skip
+
+
+def test_whoever_stands_in_the_wrong_room_wants_the_next_one_though_its_door_is_shut() -> None:
+    problem = museum(9)
+    call = Call(problem, Compiled(Program(problem)), None, 10_000)
+    target: dict[Cell, str] = {("CRATE_AT", "crate"): "room8"}
+    assert {f"room{i}" for i in range(4, 9)} | {f"door{i}" for i in range(4, 8)} <= (
+        focus(call.segments, 2, target, WIDER) or set()
+    )
+
+
+def test_a_step_that_leads_away_first_and_back_is_refined_by_few_expansions() -> None:
+    outcome = plan(museum(21), limits=Limits(expansions=2_000))
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert outcome.plan.length[1] == 1 and not outcome.given_up
