@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -40,6 +41,8 @@ NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
 OURS = 0.6
 """Of a time limit, the share of our own search where an engine is installed that is asked next."""
+OURS_WORK = 10_000_000
+"""The same without a time limit, as work in states times operators, and as much for the last resort: some twenty seconds."""
 OPTIMAL_SECONDS = 10.0
 """Where the search for the best plan stops if no time limit is given."""
 
@@ -77,8 +80,8 @@ def plan(
         File of observed facts, which replace the scene's.
     engine : str, optional
         A planner that unified-planning knows plans instead, e.g. ``fast-downward``. If left out, any installed one is tried
-        where ours gives up and levels may be left, and is given what is left of a time limit, at least two fifths of it; with
-        ``none`` none is.
+        where ours gives up and levels may be left, and is given what is left of a time limit, at least two fifths of it; without
+        one, after work of some twenty seconds, and ours goes on where it finds nothing. With ``none`` none is.
     level : int, optional
         The level that the engine plans; the lowest if left out.
     leave_levels : bool
@@ -162,10 +165,21 @@ def _plan(
             from confab.engines import some_installed
 
             seconds *= OURS if some_installed(problem) else 1.0
-        outcome = solve(Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels))
+        request = Request(problem, mode, Limits(seconds=seconds), advisor, links, grounds, leave_levels)
+        soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
+        outcome = solve(replace(request, limits=Limits(work=OURS_WORK)) if soon else request)
         if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
             return outcome
-        return _then_by_an_engine(problem, deadline, outcome)
+        began = perf_counter() - outcome.seconds
+        theirs = _by_an_engine(problem, deadline)
+        if isinstance(theirs, Outcome):
+            return replace(theirs, seconds=perf_counter() - began)
+        outcome = solve(request) if soon else outcome
+        if theirs is None or outcome.status is not Status.GAVE_UP:
+            return replace(outcome, seconds=perf_counter() - began)
+        ours = outcome.reason.text if outcome.reason else "gave up"
+        reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
+        return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
     outcome = search(problem)
     if outcome.status is Status.UNSOLVABLE and mode != "paper" and not observed:
@@ -180,23 +194,19 @@ def _plan(
     return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries)
 
 
-def _then_by_an_engine(problem: Problem, deadline: Deadline, ours: Outcome) -> Outcome:
-    """Return the plan of whichever engine is installed; where there is none, what ours said and what became of the engine."""
+def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
+    """Return the plan of whichever engine is installed, or why it found none; nothing where there is no engine."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
-        return ours
-    begin = perf_counter()
+        return None
     try:
         theirs = plan_by_engine(problem, None, None, deadline.left)
     except KnowledgeError as error:
-        said = str(error)
-    else:
-        if theirs.status is Status.SOLVED:
-            return replace(theirs, seconds=ours.seconds + perf_counter() - begin)
-        said = theirs.reason.text if theirs.reason else "it found no plan"
-    reason = Reason(f"{ours.reason.text if ours.reason else 'gave up'}; an installed engine was asked then: {said}")
-    return replace(ours, reason=reason, seconds=ours.seconds + perf_counter() - begin)
+        return str(error)
+    if theirs.status is Status.SOLVED:
+        return theirs
+    return theirs.reason.text if theirs.reason else "it found no plan"
 
 
 def _seen(reading: Reading, observed: str | Path | None) -> Reading:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -163,13 +164,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a planning call stops: seconds for the whole call (None: no limit), and expansions.
+    """Where a planning call stops: seconds for the whole call (None: no limit), expansions, and work.
 
-    These are of each search in the paper's mode; in the default one of all before the last resort, and as many for that.
+    Expansions are of each search in the paper's mode; in the default one of all before the last resort, and as many for that.
+    So is work, there alone, in states times operators (a microsecond each, about); once there is a plan it is no limit.
     """
 
     expansions: int = 200_000
     seconds: float | None = None
+    work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
         """Return when a share of the seconds from now on is over, as `perf_counter` counts; None: never."""

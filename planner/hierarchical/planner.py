@@ -32,6 +32,7 @@ from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import Call, Compiled, compiled
+from planner.hierarchical.subproblem import BITS
 from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
 from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
@@ -106,6 +107,7 @@ def _plan(
     using = using or compiled(problem)
 
     call = Call(problem, using, deadline, limits.expansions)
+    call.segments.enough = limits.work
     advised(call)
 
     def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
@@ -126,6 +128,7 @@ def _plan(
                 call = rested(call, advised)
                 recovery = Recovery(call, levels)
         if solved or achieved(recovery):
+            call.segments.enough = math.inf
             made = shortened(call, improve, leave_levels) if improve else call.tree()
             if call.settled and made.steps and made.steps[0].level != call.program.levels[0]:
                 call.given_up.insert(
@@ -149,7 +152,7 @@ def _plan(
         return outcome(Status.GAVE_UP, reason=Reason(text))
     from planner.hierarchical.flattened import regrouped
 
-    flat = lowest_alone(call, limits)
+    flat = lowest_alone(call, limits, BITS * limits.work)
     found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
@@ -226,6 +229,7 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
     """
     other = beside(call, call.problem, settled=True)
     other.segments.expanded += call.segments.expanded
+    other.segments.enough = call.segments.enough
     other.segments.counts = call.segments.counts
     advised(other)
     return other

@@ -68,7 +68,7 @@ class Segments:
     most : int
         Expansions of all searches together, after which `LimitError` is raised.
     most_work : float
-        The same for the work of small worlds, in states times operators.
+        The same for the work of small worlds, in states times operators: of one attempt.
     """
 
     program: Program
@@ -82,6 +82,8 @@ class Segments:
 
     def __post_init__(self) -> None:
         self.expanded = self.worked = self.doubted = 0
+        self.enough = math.inf
+        """The work of all attempts to find a first plan."""
         self.in_vain = 0
         """Searches of large worlds that ended at their limit."""
         self.tidy: frozenset[Cell] = frozenset()
@@ -223,8 +225,8 @@ class Segments:
         if self.worked > self.doubted:
             self.doubted = 2 * self.worked
             self.doubt()
-        if self.worked > self.most_work:
-            raise LimitError(f"{self.most_work:.0f} states times operators")
+        if self.worked > min(self.most_work, self.enough):
+            raise LimitError(f"{min(self.most_work, self.enough):.0f} states times operators")
         self.check_time()
 
     @property

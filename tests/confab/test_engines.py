@@ -87,13 +87,28 @@ def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.Mon
     gave_up = Outcome(Status.GAVE_UP, reason=Reason("the limit came first"))
     monkeypatch.setattr("planner.hierarchical.planner.plan", lambda *_, **__: gave_up)
     scene = confab.load(SCENE)
-    result = scene.plan()
+    result = scene.plan(time_limit=60)
     assert result.solved and result.json()["engine"] == "any"
     assert scene.plan(engine="none").outcome is gave_up
     monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
-    outcome = scene.plan().outcome
-    assert outcome.status is Status.GAVE_UP
-    assert outcome.reason == Reason("the limit came first; an installed engine was asked then: e: timeout")
+    for seconds, when in ((60, "then"), (None, "before")):
+        outcome = scene.plan(time_limit=seconds).outcome
+        assert outcome.status is Status.GAVE_UP
+        assert outcome.reason == Reason(f"the limit came first; an installed engine was asked {when}: e: timeout")
+
+
+def test_without_a_time_limit_an_engine_is_asked_after_bounded_work_and_ours_goes_on_where_it_finds_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("confab.planning.OURS_WORK", 0)
+    monkeypatch.setattr("confab.planning.find_spec", lambda name: name)
+    monkeypatch.setattr(engines, "some_installed", lambda problem: True)
+    scene = confab.load("towers-small")
+    assert scene.plan().json()["engine"] == "any"
+    assert scene.plan(engine="none").outcome.engine is None
+    monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
+    result = scene.plan()
+    assert result.solved and result.outcome.engine is None
 
 
 @pytest.mark.parametrize(
