@@ -39,6 +39,9 @@ CLOSE = 0.002
 NOWHERE = 100.0
 """Metres beyond which no arm is asked for: a pose there stands for one that no hand can have."""
 
+TIGHT = (0.006, 0.004, 0.003)
+"""Metres kept off everything where nothing else is left: more than `CLOSE`, since the load may slip before it is put down."""
+
 ROUNDED = 3
 """Samples over which corners of a path are rounded, on either side, if nothing is near them."""
 
@@ -134,12 +137,13 @@ class Attempt:
                     raise self._unreachable(stages, stage, objects)
             order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
             movers = self.hand.mover(THIN), self.hand.mover(opening)
-            scenes = [_scene(reacher, *movers, stage, CLOSE if stage.near else reacher.margin) for stage in stages]
-            found = _free(scenes, solved, order)
-            if not found and self.world.noise:  # what isn't seen well may be farther
-                least = CLOSE - 2 * self.world.blur
-                scenes = [_scene(reacher, *movers, stage, least) for stage in stages]
+            for least in (reacher.margin, *TIGHT, *([CLOSE - 2 * self.world.blur] if self.world.noise else [])):
+                scenes = [
+                    _scene(reacher, *movers, stage, min(CLOSE, least) if stage.near else least) for stage in stages
+                ]
                 found = _free(scenes, solved, order)
+                if found:  # little room is better than none; and what isn't seen well may be farther
+                    break
             if not found:
                 raise _blocked(scenes, [q[order] for q in solved], objects)
             return [int(left[i]) for i in found]
@@ -200,8 +204,11 @@ class Attempt:
             reacher = self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
             targets = [turned_near(start, goal) for goal in goals]
-            if self.world.noise and not reacher.free(reacher.solve(np.array(targets))[0]).any():
-                reacher = replace(reacher, margin=CLOSE - 2 * self.world.blur)
+            q = reacher.solve(np.array(targets))[0]
+            for least in (*TIGHT, CLOSE - 2 * self.world.blur):
+                if reacher.free(q).any():
+                    break
+                reacher = replace(reacher, margin=least)
             free = reacher.follow(start[None]) is not None
             left = start if free else leave(reacher, start)
             reached = None if left is None else connect(reacher, left, targets, self.world.rng, SAMPLES)
@@ -210,8 +217,7 @@ class Attempt:
                 raise SkillError("no path", named(*objects, *blame.objects), clearance_m=blame.clearance)
             turns = reached[1] if free else np.concatenate([start[None], reached[1]])
             q = reacher.solve(polyline(turns))[0]
-            near = replace(reacher, margin=min(reacher.margin, CLOSE + 2 * self.world.noise))
-            rounded = next((n for n in range(ROUNDED, 0, -1) if near.free(smooth(q, n)).all()), 0)
+            rounded = rounding(reacher, q)
         try:
             self.follow(q, corners=rounded)
         except SkillError:
@@ -320,6 +326,14 @@ class Attempt:
         if error > numbers["tolerance"]:
             raise SkillError("tracking error", self.world.touching(self.hand), tip_error_m=error)
         return {"tip_error_m": error}
+
+
+def rounding(reacher: Reacher, q: Array) -> int:
+    """Return over how many samples corners of a path may be rounded: only as far as it keeps off everything as it must.
+
+    Spheres leave the edges of a hand out by almost as much as that.
+    """
+    return next((n for n in range(ROUNDED, 0, -1) if reacher.free(smooth(q, n)).all()), 0)
 
 
 def _seen_from(world: Engine, carrier: str, body: str) -> Array:

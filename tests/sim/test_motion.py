@@ -1,13 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from reasoner.embodiment.values import Embodiment
+from reasoner.embodiment.values import Embodiment, Fixture
 from sim.arms import read_arm
+from sim.attempt import Attempt, rounding
 from sim.bodies import outline
 from sim.collision import Solid, Surroundings, box, free, read_mover
 from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
-from sim.stages import MARGIN
-from sim.urdf import Spheres, read_urdf
+from sim.stages import MARGIN, Stage
+from sim.urdf import Array, Spheres, read_urdf
+from sim.verdict import SkillError
 from sim.world import World
 
 from .conftest import Case, case
@@ -150,3 +154,43 @@ def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
             )
             gaps = np.linalg.norm(edge[:, None] - (spheres.centers @ turned.T + tip), axis=-1) - spheres.radii
             assert gaps.min(1).max() < MARGIN
+
+
+def beside(attempt: Attempt, q: Array, gap: float) -> World:
+    """Put a post as many metres beside the hand as it is at some postures, on its left; return the world."""
+    mover = attempt.hand.mover()
+    centers, radii = mover.at(q).reshape(-1, 3), np.tile(mover.spheres.radii, len(q))
+    left = int(np.argmax(centers[:, 1] + radii))
+    x, y, z = centers[left] + np.array([0.0, radii[left] + gap + 0.01, 0.0])
+    world = attempt.world
+    post = Fixture("post", (0.02, 0.02, 0.02), (float(x), float(y), float(z)))
+    world.embodiment = replace(world.embodiment, fixtures=(*world.embodiment.fixtures, post))
+    return world
+
+
+@pytest.mark.parametrize(("gap", "enough"), [(0.01, True), (0.004, True), (0.001, False)])
+def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, gap: float, enough: bool) -> None:
+    with World(moved.embodiment, moved.initial, beads=False) as world:
+        attempt = Attempt.begin(world, "left_hand")
+        pose = attempt.hand.pose
+        beside(attempt, attempt.reacher().solve(pose[None])[0], gap)
+        if enough:
+            assert attempt.choose([Stage(pose[None])], ()) == [0]
+        else:
+            with pytest.raises(SkillError, match="touch something"):
+                attempt.choose([Stage(pose[None])], ())
+
+
+def test_corners_are_rounded_only_as_far_as_the_path_keeps_off_everything(serving: Case) -> None:
+    """Among posts around a path there are some that it passes and that it would come too near to if it were rounded."""
+    corner, aside, down = np.array([0.45, 0.2, 0.95, 0.0, 0.0, 0.6]), np.eye(6)[1], np.eye(6)[2]
+    alone = replace(reacher(serving.embodiment), around=Surroundings())
+    q = alone.solve(polyline(np.array([corner - 0.15 * aside, corner, corner - 0.15 * down])))[0]
+    assert rounding(alone, q) == 3
+    near = []
+    for middle in corner[:3] + np.random.default_rng(0).uniform([-0.1, -0.15, -0.15], [0.2, 0.0, 0.0], (1200, 3)):
+        post = Solid("post", "box", np.full(3, 0.005), middle, np.eye(3))
+        among = replace(alone, around=Surroundings((post,)))
+        near += [among] if among.free(q).all() and not among.free(smooth(q, 3)).all() else []
+    assert near
+    assert all(rounding(among, q) < 3 for among in near)
