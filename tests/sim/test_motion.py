@@ -156,8 +156,8 @@ def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
             assert gaps.min(1).max() < MARGIN
 
 
-def beside(attempt: Attempt, q: Array, gap: float) -> World:
-    """Put a post as many metres beside the hand as it is at some postures, on its left; return the world."""
+def put_beside(attempt: Attempt, q: Array, gap: float) -> None:
+    """Put a post as many metres beside the hand as it is at some postures, on its left."""
     mover = attempt.hand.mover()
     centers, radii = mover.at(q).reshape(-1, 3), np.tile(mover.spheres.radii, len(q))
     left = int(np.argmax(centers[:, 1] + radii))
@@ -165,7 +165,6 @@ def beside(attempt: Attempt, q: Array, gap: float) -> World:
     world = attempt.world
     post = Fixture("post", (0.02, 0.02, 0.02), (float(x), float(y), float(z)))
     world.embodiment = replace(world.embodiment, fixtures=(*world.embodiment.fixtures, post))
-    return world
 
 
 @pytest.mark.parametrize(("gap", "enough"), [(0.01, True), (0.004, True), (0.001, False)])
@@ -173,7 +172,7 @@ def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, 
     with World(moved.embodiment, moved.initial, beads=False) as world:
         attempt = Attempt.begin(world, "left_hand")
         pose = attempt.hand.pose
-        beside(attempt, attempt.reacher().solve(pose[None])[0], gap)
+        put_beside(attempt, attempt.reacher().solve(pose[None])[0], gap)
         if enough:
             assert attempt.choose([Stage(pose[None])], ()) == [0]
         else:
