@@ -148,15 +148,15 @@ class Writer:
         self.constants: dict[str, object] = {}
         self.variables: dict[str, tuple[str, ...]] = {}
         self._fan: dict[str, float] = {}
+        self._tables = {
+            identifier(table, s): f"{table}[{s!r}]" for s in problem.domain.situations for table in ("now", "who")
+        }
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
         """Return a function of a table's `now` and `who` (and what else is given) that runs lines and returns a result."""
         body = [f"    {line}" for line in (*lines, f"return {result}")]
         text = "\n".join(body)
-        tables = {
-            identifier(table, s): f"{table}[{s!r}]" for s in self.problem.domain.situations for table in ("now", "who")
-        }
-        names = [f"    {name} = {table}" for name, table in tables.items() if name in text]
+        names = [f"    {name} = {table}" for name, table in self._tables.items() if name in text]
         exec(code("\n".join([f"def bind(now, who{given}):", *names, text])), self.constants)
         return self.constants.pop("bind")  # type: ignore[return-value]
 

@@ -30,7 +30,7 @@ from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, Valu
 WAYS, TRIES = 40, 3
 """So many ways to follow a rule are compared, and so many of the best of all rules tried."""
 SLACK = 2
-"""By so much a chain may get longer while its conditions are brought about."""
+"""By so much longer than the nearest a way may be that is tried."""
 FARTHEST = 30
 """Longer chains aren't looked for."""
 ASKED, DONE = 5, 100
@@ -237,13 +237,6 @@ class Chains:
         lacks = self.lacks(level, way, number)
         return any(self.within(level, goal, most, everybody) for goal in lacks) if lacks else most > 0
 
-    def cost(self, level: int, way: Candidate, everybody: bool, most: float) -> float:
-        """Return how long a chain is at least whose last rule is followed this way."""
-        if not way.unmet:
-            return 1
-        lacks = (self.lacks(level, way, n) for n in way.unmet)
-        return 1 + max(min((self.distance(level, g, everybody, most) for g in goals), default=1) for goals in lacks)
-
     def nearest(self, level: int, goal: Goal, below: float = inf) -> list[tuple[float, Candidate]]:
         """Return the nearest ways to a goal, each with its distance, the best first."""
         for everybody in (False, True):
@@ -301,7 +294,7 @@ class Chains:
             if cost == inf or budget.left <= 0:
                 return None
             mark = len(table.trail)
-            steps = self.go(level, way, cost, budget, (*above, goal))
+            steps = self.go(level, way, budget, (*above, goal))
             if steps:
                 on = cost
                 if (steps[-1].behavior, steps[-1].arguments) == way.ground:
@@ -326,8 +319,8 @@ class Chains:
         now = float(number(self.call.table.now[situation].get(key)))
         return min(abs(now - float(number(bound.lstrip("<>=")))) for bound in value.split(","))
 
-    def go(self, level: int, way: Candidate, cost: float, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
-        """Bring about what a way lacks, and do its step; where it turns out to be longer than promised, stop before that.
+    def go(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
+        """Bring about what a way lacks, and do its step; where it is no way any more, stop before that.
 
         Without steps the table may be changed.
         """
@@ -349,7 +342,7 @@ class Chains:
             if self.brings(ground, above[-1]):
                 break
             same = self.same(level, way, ground, above[-1])
-            if same is None or self.cost(level, same, True, cost + SLACK) > cost + SLACK:
+            if same is None:
                 return steps
             way = same
         else:
@@ -358,8 +351,11 @@ class Chains:
             return None
         budget.left -= 1
         call.segments.expand(level)
-        self.spend(DONE)
+        effort = call.segments.effort
         step = call.refiner.do(level, *ground)
+        self.spend(
+            DONE if step is not None else call.segments.effort - effort
+        )  # a refinement that was searched in vain counts
         return None if step is None else [*steps, step]
 
     def brings(self, ground: Ground, goal: Goal) -> bool:
@@ -396,7 +392,7 @@ class Chains:
             wants = [want for want in wants if not self.met(want)]
         for goal, way in ways:
             now = self.same(level, way, way.ground, goal)
-            done = self.go(level, now, 1, Budget(SLACK), (goal,)) if now is not None else None
+            done = self.go(level, now, Budget(SLACK), (goal,)) if now is not None else None
             if done is None:
                 return None
             steps += done

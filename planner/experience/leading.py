@@ -134,10 +134,14 @@ class Guide:
         return found
 
     def rank(self, cell: Cell) -> int:
-        """Return how many steps rules promise for a goal; 0 if they promise nothing."""
-        goal = cell, self.call.goal[cell]
-        found = self.bounded(self.first, lambda: self.chains.far(self.first, goal))
-        return int(found) if found and found < inf else 0
+        """Return 1 if rules promise a goal by one step, 2 if ways to it lack something, 0 if they promise nothing."""
+        level, goal, chains = self.first, (cell, self.call.goal[cell]), self.chains
+
+        def ask() -> int:
+            ways = chains.ways(level, goal) or chains.ways(level, goal, True)
+            return min((1 + bool(way.unmet) for way in ways), default=0)
+
+        return self.bounded(level, ask) or 0
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps of a level, refined, that achieve the targets and keep the rest; None, and the table as it was, without any."""
@@ -177,7 +181,7 @@ class Guide:
         """Return another open goal of a target's kind to which chains lead now, if that wasn't asked of the kind before."""
         alike = self.call.program.alike.sort
         kinds = {(cell[0], *map(alike.get, arguments_of(cell[1]))) for cell in targets if cell[0] not in self.reached}
-        for cell, value in reversed(self.call.goal.items()):
+        for cell, value in reversed(self.call.goal.items()) if kinds else ():
             if (
                 cell not in targets
                 and (cell[0], *map(alike.get, arguments_of(cell[1]))) in kinds

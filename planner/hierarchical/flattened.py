@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.grounded.best_first import SHORTEN
+from planner.grounded.best_first import SHORTEN, STEP, STEPS
 from planner.grounded.grounding import ground
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task
@@ -26,7 +26,7 @@ WORK = 1_000_000
 """Operators that are looked at to make a plan of the lowest level shorter."""
 
 
-def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Plan:
+def shortened(problem: Problem, plan: Plan, deadline: float | None = None, soon: bool = False) -> Plan:
     """Return a plan that is shorter and breaks no more that a level above asks; the same if none is found.
 
     Parameters
@@ -36,13 +36,15 @@ def shortened(problem: Problem, plan: Plan, deadline: float | None = None) -> Pl
         One that leaves a level.
     deadline : float, optional
         On the clock of `time.perf_counter`.
+    soon : bool
+        Whether no more work is worth it than flat search does on a plan that it found.
     """
     old = plan.primitives
     task = small(problem, problem.domain.levels[-1], deadline, OF_A_STEP * len(old))
     operators = task.operators_of([(s.behavior, s.arguments) for s in old]) if task is not None else None
     if task is None or operators is None:
         return plan
-    new = shorter(task, operators, WORK, deadline)
+    new = shorter(task, operators, SHORTEN + STEP * min(len(old), STEPS) if soon else WORK, deadline)
     if len(new) >= len(old):
         return plan
     flat = Plan(task.steps(new))

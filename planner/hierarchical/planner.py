@@ -250,7 +250,8 @@ def shortened(call: Call, improve: int, leave_levels: bool) -> Plan:
     from planner.hierarchical import flattened
 
     with suppress(LimitError):
-        plan = flattened.shortened(call.problem, plan, call.segments.deadline)
+        led = len(levels) == 1 and call.advice is not None and call.advice.expects
+        plan = flattened.shortened(call.problem, plan, call.segments.deadline, soon=led)
     if all(step.level == levels[0] for step in plan.steps):
         call.given_up.clear()  # there are steps of it after all
     return plan

@@ -63,7 +63,7 @@ class GoalAdvice(Advice, Protocol):
         """Whether advice is to be taken now."""
 
     def rank(self, cell: Cell) -> int:
-        """Return how many steps are promised for a goal; 0 if none are."""
+        """Return 1 if a goal is promised by one step, 2 if by more, 0 if nothing is promised."""
 
     def waits(self, cell: Cell) -> bool:
         """Whether another open goal should come first."""
