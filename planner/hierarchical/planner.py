@@ -129,7 +129,7 @@ def _plan(
                 recovery = Recovery(call, levels)
         if solved or achieved(recovery):
             call.segments.enough = math.inf
-            made = shortened(call, improve, leave_levels) if improve else call.tree()
+            made = shortened(call, improve, leave_levels, advised) if improve else call.tree()
             if call.settled and made.steps and made.steps[0].level != call.program.levels[0]:
                 call.given_up.insert(
                     0, "steps of a lower level come first: they bring to rest what isn't in the beginning"
@@ -235,7 +235,7 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
     return other
 
 
-def shortened(call: Call, improve: int, leave_levels: bool) -> Plan:
+def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
     """Return the plan of a call, made shorter; by steps of a lower level only where nothing breaks that a level above asks.
 
     A plan that left a level, has only one, or had primitives that came to nothing, is made shorter on the lowest level, too.
@@ -243,7 +243,7 @@ def shortened(call: Call, improve: int, leave_levels: bool) -> Plan:
     levels, idle = call.program.levels, False
     with suppress(LimitError):  # then the first plan is what there is
         if len(levels) > 1:
-            idle = shorten(call, improve, leave_levels)
+            idle = shorten(call, improve, leave_levels, advised)
     plan = call.tree()
     if len(levels) > 1 and not call.given_up and not idle:
         return plan
@@ -257,7 +257,7 @@ def shortened(call: Call, improve: int, leave_levels: bool) -> Plan:
     return plan
 
 
-def shorten(call: Call, improve: int, leave_levels: bool) -> bool:
+def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> bool:
     """Make the steps of a call shorter; whether some were left out that came to nothing, so that there may be more."""
     first, call.steps = call.steps, fewer(call)
     concerned = concerns(call.refiner, call.steps)
@@ -267,7 +267,7 @@ def shorten(call: Call, improve: int, leave_levels: bool) -> bool:
         call.steps = needed
         concerned = concerns(call.refiner, call.steps)
         aside = put_aside(concerned)
-    before, call.steps = call.steps, reordered(call) if aside else call.steps
+    before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
     if not leave_levels:
         return False
     kept = call.steps
@@ -368,11 +368,11 @@ def without_needless(call: Call, concerned: Sequence[Concern], positions: Sequen
     return kept
 
 
-def reordered(call: Call) -> list[RefinedStep]:
+def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
     Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
-    tried uses the most abstract level alone, and no advice: that would lead to the same steps, and costs more where goals are near.
+    tried uses the most abstract level alone, and advice for refinements: for goals it would lead to the same steps.
     """
     if len(call.steps) < DETOURS * unmet(call):
         return call.steps
@@ -383,6 +383,8 @@ def reordered(call: Call) -> list[RefinedStep]:
     for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
         other = beside(call, replace(call.problem, goal=goal), call.settled)
         other.segments.most_work = left
+        advised(other)
+        other.advice = None
         recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
             done = recovery.together(first) if at_once else other.serialise(recovery.harder)
