@@ -32,6 +32,7 @@ from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import Call, Compiled, compiled
+from planner.hierarchical.stuck import gave_up
 from planner.hierarchical.subproblem import BITS
 from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
@@ -138,25 +139,26 @@ def _plan(
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
-        return outcome(Status.GAVE_UP, reason=Reason(f"stopped at the limit: {limit}"))
+        return outcome(Status.GAVE_UP, reason=gave_up(call, f"stopped at the limit: {limit}"))
     upper = [level for level in call.program.levels if level != call.program.levels[-1]]
     if not leave_levels and upper:
         text = f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
-        return outcome(Status.GAVE_UP, reason=Reason(text))
+        return outcome(Status.GAVE_UP, reason=gave_up(call, text))
     if upper:
         call.given_up.append(
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
         )
     if recovery.too_large is not None:
         text = f"goals in series found no plan, and {recovery.too_large.text}"
-        return outcome(Status.GAVE_UP, reason=Reason(text))
+        return outcome(Status.GAVE_UP, reason=gave_up(call, text))
     from planner.hierarchical.flattened import regrouped
 
     flat = lowest_alone(call, limits, BITS * limits.work)
     found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
-    return outcome(flat.status, found, flat.reason)
+    gone = flat.status is Status.GAVE_UP and flat.reason is not None
+    return outcome(flat.status, found, gave_up(call, flat.reason.text) if gone and flat.reason else flat.reason)
 
 
 def by_rules_alone(call: Call) -> bool:
@@ -230,6 +232,7 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
     other = beside(call, call.problem, settled=True)
     other.segments.expanded += call.segments.expanded
     other.segments.enough = call.segments.enough
+    other.aim, other.refiner.at = call.aim, call.refiner.at
     other.segments.counts = call.segments.counts
     advised(other)
     return other

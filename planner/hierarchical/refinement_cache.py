@@ -94,6 +94,8 @@ class Refiner:
         self.thorough = True
         """Whether a large world is searched for a refinement of these, too."""
         self.advice: Advice | None = None
+        self.at: Ground | None = None
+        """The behaviour of the most abstract level that is being refined, or couldn't be."""
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Do a behaviour, refined to primitives, and return it so; None, and the table as it was, if that can't be done."""
@@ -191,6 +193,7 @@ class Refiner:
             if tried >= len(widths) and all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
         self.misses += 1
+        self.at = (name, arguments) if level == self.levels[0] else self.at
         worked = self.segments.worked
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
@@ -204,6 +207,7 @@ class Refiner:
             if self.segments.worked - worked > NEAR.work + WIDER.work:
                 self.vain.add(name)
             return None
+        self.at = None if level == self.levels[0] else self.at
         (self.long.add if len(found) > SHORT.depth else self.long.discard)(name)
         self.found[here] = tuple(found)
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))

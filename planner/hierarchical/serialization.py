@@ -92,6 +92,8 @@ class Call:
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
+        self.aim: dict[Cell, str] = {}
+        """The goals that were aimed at last."""
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.progressed = False
         self.vain = 0
@@ -188,6 +190,7 @@ class Call:
     def reach(self, level: int, targets: dict[Cell, str], attempt: Attempt) -> bool:
         """Do refined steps of a level after which the targets and all goals reached before hold; whether there are some."""
         first = level == self.program.levels[0]
+        self.aim, self.refiner.at = targets, None
         hidden = self.unseen if first else {}  # seldom any: no copy of all goals for each of them
         kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
         keep = self.segments.keeping(kept)

@@ -36,6 +36,8 @@ MOST_EXPANSIONS = 150
 """The most expansions of one search for a few steps."""
 EXPANSION = 100
 """An expansion takes about as long as so many states times operators of a small world: a microsecond each."""
+Asked: TypeAlias = "set[tuple[str, Key, str]]"
+"""Values of symbols that were asked for on the way to others."""
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
 """Says what a touched symbol must be in the end, given what it was in the beginning; None: whatever it came to be."""
 
@@ -270,14 +272,20 @@ class Segments:
                     yield ground
 
     def chains(
-        self, level: int, cell: Cell, value: str, questions: int = 1000, met: dict[str, None] | None = None
+        self,
+        level: int,
+        cell: Cell,
+        value: str,
+        questions: int = 1000,
+        met: dict[str, None] | None = None,
+        asked: Asked | None = None,
     ) -> Iterator[tuple[int, Ground | None]]:
         """Yield the applicable behaviours that start chains towards a value, with the chains' length, shortest first.
 
         Layer by layer from what achieves the value, through what achieves its unmet conditions; None begins a layer. All
-        individuals that came up on the way are added to `met`.
+        individuals that came up on the way are added to `met`, all values to `asked`.
         """
-        asked: set[tuple[str, Key, str]] = set()
+        asked = set() if asked is None else asked
         self.wants.concern(frozenset((*arguments_of(cell[1]), value)))
         wants: Iterable[Want] = [(*cell, (value,))]
         if cell[0] in self.program.rules:

@@ -7,7 +7,7 @@ import pytest
 
 import confab
 from planner.grounded.best_first import plan_level
-from planner.plan import Outcome, Status
+from planner.plan import Limits, Outcome, Status
 from planner.solve import Request, solve
 from reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
 from reasoner.pddl.importing import imported
@@ -67,6 +67,12 @@ def test_thirds_are_thirds_and_tenths_are_tenths() -> None:
         problem = pouring(written(portion * 3), 3, portion, refill=None)
         assert solve(Request(problem)).status is Status.SOLVED  # the last portion is there to the last drop
         assert plan_level(problem, 2).status is Status.SOLVED
+
+
+def test_who_gives_up_says_which_amount_was_in_the_way() -> None:
+    outcome = solve(Request(pouring("0.5", 2, Fraction(1)), limits=Limits(expansions=3)))
+    assert outcome.status is Status.GAVE_UP and outcome.reason is not None
+    assert outcome.reason.text.endswith("; TEA of jug: 0.5 servings there, >=1 wanted")
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from planner.paper.transitions import Model, ground
 from planner.plan import Limits, Status
 from planner.validation import validate
 from reasoner.symbols import Problem, Symbol
+from tests.planner.test_wants import museum
 from worlds.families import FAMILIES, family, random_table, table, tabletop
 from worlds.rooms import rooms
 from worlds.truth import TooManyError, World
@@ -185,6 +186,16 @@ def test_a_limit_of_expansions_is_obeyed_and_said() -> None:
     assert outcome.status is Status.GAVE_UP
     assert outcome.reason is not None
     assert "50 expansions" in outcome.reason.text
+
+
+def test_who_gives_up_says_on_the_way_to_which_goal_and_at_which_step() -> None:
+    outcome = plan(museum(21), limits=Limits(expansions=50))
+    assert outcome.reason is not None
+    assert outcome.reason.text == (
+        "stopped at the limit: 50 expansions; 0 of 1 goals were reached, picture HANGS room20 was next; "
+        "MOVE picture room20 wasn't refined there"
+    )
+    assert {"HANGS", "picture", "room20", "MOVE"} <= set(outcome.reason.terms)
 
 
 def test_improving_never_lengthens_and_stays_valid() -> None:

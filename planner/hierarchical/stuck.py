@@ -1,0 +1,56 @@
+"""Where planning was when it gave up: the goal, the step that wasn't refined, and amounts that were in the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from planner.hierarchical.serialization import Call
+from planner.hierarchical.subplans import Asked
+from planner.plan import Reason
+from planner.transitions import Cell, arguments_of
+from reasoner.amounts import bounds_written
+from reasoner.symbols import Fact, Symbol
+
+QUESTIONS, AMOUNTS = 160, 3
+"""Values that are followed from the goal to what is in its way, and amounts that are told."""
+
+
+def gave_up(call: Call, why: str) -> Reason:
+    """Return why planning gave up, with where it was, in the ontology's terms."""
+    parts, terms = [why], dict[str, None]()
+    if call.aim:
+        goals = [str(Fact(Symbol(cell[0], arguments_of(cell[1])), value)) for cell, value in call.aim.items()]
+        for cell, value in call.aim.items():
+            terms.update(dict.fromkeys((cell[0], *arguments_of(cell[1]), value)))
+        parts.append(
+            f"{len(call.kept)} of {len(call.goal)} goals were reached, {goals[0]}{', …' * (len(goals) > 1)} was next"
+        )
+    if call.refiner.at is not None:
+        name, arguments = call.refiner.at
+        parts.append(f"{' '.join((name, *arguments))} wasn't refined there")
+        terms.update(dict.fromkeys((name, *arguments)))
+    parts += lacking(call)
+    return Reason("; ".join(parts), tuple(terms))
+
+
+def lacking(call: Call) -> Iterator[str]:
+    """Yield the amounts that behaviours towards the first goal that was aimed at ask for, where the steps so far end."""
+    segments, situations = call.segments, call.problem.domain.situations
+    segments.deadline = None  # it may have passed
+    call.redo(call.steps)
+    told: dict[Cell, str] = {}
+    for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:
+        asked: Asked = set()
+        for _ in segments.chains(level, cell, value, QUESTIONS, asked=asked):
+            pass
+        told.update(
+            {
+                (name, key): wanted
+                for name, key, wanted in sorted(asked, key=str)
+                if situations[name].quantity is not None
+            }
+        )
+    for (name, key), wanted in list(told.items())[:AMOUNTS]:
+        unit = situations[name].quantity.unit  # type: ignore[union-attr]
+        there = " ".join(filter(None, (call.table.now[name].get(key, ""), unit)))
+        yield f"{name} of {', '.join(arguments_of(key))}: {there} there, {bounds_written(wanted)} wanted"
