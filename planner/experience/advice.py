@@ -155,9 +155,9 @@ def plan(
     Outcome
         `search` counts the steps of rules that were tried as expansions.
     """
-    using = using or fast.compiled(problem)
     if memory is None or not memory.leads(problem, mode):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
+    using = using or fast.compiled(problem)
     joins: dict[str, Bind | None] = {}
 
     def advised(call: Call) -> None:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.grounded.alike import lifted
 from planner.grounded.amounts import AmountTable
 from planner.grounded.formulas import Formulas
 from planner.grounded.joins import Ints, Table, pack
@@ -52,6 +53,8 @@ class Reached:
         Per schema, the individuals put in for its terms.
     changed : set of situation types
         Those that behaviours change or rules define.
+    together : set of relations
+        Those that were made for effects of one shape.
     made : set of situation types
         Those that stand for a part of a rule, which nobody has named.
     """
@@ -59,6 +62,8 @@ class Reached:
     def __init__(
         self, problem: Problem, level: int, initial: State, most: int, deadline: float | None, apart: bool = False
     ) -> None:
+        given, problem = problem, lifted(problem, level)
+        self.together = problem.relations.keys() - given.relations.keys()
         self.problem, self.level, self.most, self.deadline = problem, level, most, deadline
         known = (s for s in problem.domain.situations.values() if s.level <= level and s.quantity is None)
         self.situations = {s.name: s for s in known}

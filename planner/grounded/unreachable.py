@@ -14,6 +14,7 @@ from planner.grounded.schemas import Atom, Schema, schemas
 from planner.grounded.task import Task
 from planner.levels import said
 from planner.plan import Reason, TooLargeError
+from reasoner.language import is_variable
 from reasoner.symbols import (
     TRUE,
     Behavior,
@@ -22,6 +23,7 @@ from reasoner.symbols import (
     Fact,
     Parameter,
     Symbol,
+    ValueEffect,
     Witness,
     substituted,
 )
@@ -90,7 +92,10 @@ def _because(
         for _, effect in schema.effects:
             if effect.situation != name:
                 continue
-            schema = _opened(reached, schema)
+            single = _single(reached, schema, effect, goal)
+            if single is None:
+                continue
+            schema, effect = _opened(reached, single[0]), single[1]
             terms = _unified(
                 reached, schema, (*effect.arguments, effect.value), (*goal.symbol.arguments, goal.value), kinds
             )
@@ -148,6 +153,22 @@ def _counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ..
         before.append(condition.variable)
         condition = nested
     return len(before), *found
+
+
+def _single(reached: Reached, schema: Schema, effect: ValueEffect, goal: Fact) -> tuple[Schema, ValueEffect] | None:
+    """Return one of the effects that were made one, the first that could be the goal, with its own schema; None if none could."""
+    table = next((atom for atom in schema.atoms if atom.table[1] in reached.together), None)
+    if table is None:
+        return schema, effect
+    words = goal.symbol.arguments
+    for row in sorted(reached.problem.relations[table.table[1]]):
+        names = dict(zip(table.terms, row, strict=True))
+        arguments = tuple(names.get(t, t) for t in effect.arguments)
+        if all(is_variable(a) or is_variable(w) or a == w for a, w in zip(arguments, words, strict=True)):
+            atoms = (replace(a, terms=tuple(names.get(t, t) for t in a.terms)) for a in schema.atoms if a is not table)
+            own = tuple(a for a in atoms if a.table[0] != "class" or is_variable(a.terms[0]))
+            return replace(schema, atoms=own), replace(effect, arguments=arguments)
+    return None
 
 
 def _opened(reached: Reached, schema: Schema) -> Schema:

@@ -105,6 +105,11 @@ def _plan(
 ) -> Outcome:
     begin = perf_counter()
     deadline = limits.end(SEARCHING)
+    flat = None
+    if improve and len(problem.domain.levels) == 1 and advised is alone:
+        flat = flat_first(problem, limits, deadline)  # compiling thousands of conditional effects would take longer
+        if flat.status is Status.SOLVED:
+            return replace(flat, seconds=perf_counter() - begin)
     using = using or compiled(problem)
 
     call = Call(problem, using, deadline, limits.expansions)
@@ -119,8 +124,14 @@ def _plan(
         solved = False
         if improve and len(call.program.levels) == 1:
             solved = by_rules_alone(call)
-            if not solved and (flat := flat_first(call, limits)) is not None:
-                return outcome(flat.status, flat.plan, flat.reason)
+            if not solved:
+                flat = flat or flat_first(problem, limits, deadline)
+                for level, counts in flat.search.items():
+                    call.segments.counts[level].add(counts)
+                if flat.status is Status.UNSOLVABLE:
+                    return outcome(flat.status, None, impossible(problem, call.program) or flat.reason)
+                if flat.status is Status.SOLVED:
+                    return outcome(flat.status, flat.plan)
             call = call if solved else rested(call, advised)
         recovery = Recovery(call, levels)
         if len(levels) > 1 and not call.at_rest():
@@ -166,18 +177,19 @@ def by_rules_alone(call: Call) -> bool:
     return call.advice is not None and call.advice.expects and call.serialise(Recovery(call, (), solvable=True).harder)
 
 
-def flat_first(call: Call, limits: Limits) -> Outcome | None:
-    """Plan a task of one level as a whole by bounded work; None where that isn't enough.
+def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
+    """Plan a task of one level as a whole by bounded work; it is given up where that isn't enough.
 
     One level has no refinements for goals in series to go by, and may be too large to be grounded, or its goals too many.
     """
-    found = lowest_alone(call, limits, FLAT, FLAT_ROWS)
-    if found.status is Status.UNSOLVABLE and (reason := impossible(call.problem, call.program)):
-        return replace(found, reason=reason)  # in the words of the task
-    return None if found.status is Status.GAVE_UP else found
+    from planner.grounded.best_first import plan_level
+
+    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
+    within = Limits(limits.expansions, left)
+    return plan_level(problem, None, None, problem.goal_on(problem.domain.levels[0]), within, FLAT, FLAT_ROWS)
 
 
-def lowest_alone(call: Call, limits: Limits, most_work: float = math.inf, most_rows: int | None = None) -> Outcome:
+def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
     from planner.grounded.best_first import plan_level
     from planner.validation import validate
@@ -189,7 +201,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float = math.inf, most_r
     goal = problem.goal_on(lowest)
     for wanted in (goal, {**rests, **goal}):
         left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-        flat = plan_level(problem, lowest, None, wanted, Limits(limits.expansions, left), most_work, most_rows)
+        flat = plan_level(problem, lowest, None, wanted, Limits(limits.expansions, left), most_work)
         for level, counts in flat.search.items():
             call.segments.counts[level].add(counts)
         if not rests or flat.plan is None or not validate(problem, flat.plan):

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from planner.grounded import reachability
 from planner.grounded.best_first import ahead, plan_level, search
 from planner.grounded.grounding import ground
 from planner.grounded.hff import Evaluate, Evaluation, heuristic
@@ -20,7 +21,7 @@ from planner.grounded.novelty import Seen, by_novelty
 from planner.grounded.plan_windows import regrouped, shortened, shorter
 from planner.grounded.task import Task
 from planner.hierarchical import planner as fast
-from planner.hierarchical.serialization import Call
+from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
 from planner.solve import MODES, Request, solve
 from planner.validation import validate
@@ -413,3 +414,53 @@ def test_a_problem_of_one_level_is_planned_as_a_whole_and_in_series_only_where_t
     monkeypatch.setattr(fast, "FLAT", 0)
     with pytest.raises(AssertionError, match="goals in series"):
         fast.plan(lift)
+
+
+TURNED = """(define (domain cube) (:predicates (on ?x ?y ?z) (off ?x ?y ?z) (lit ?x))
+ (:action turn :parameters () :effect (forall (?x ?y ?z) (when (and (on ?x ?y ?z) (not (lit ?y)))
+   (and (not (on ?x ?y ?z)) (on ?y ?x ?z) (off ?z ?x ?y)))))
+ (:action light :parameters (?a) :effect (lit ?a)))"""
+CORNERS = """(define (problem p) (:domain cube) (:objects a b c d e) (:init (on a b c) (on b d e) (lit d) (off a a b))
+ (:goal (and (on b a c) (off c a b))))"""
+
+
+def test_conditional_effects_that_are_alike_are_joined_once_and_mean_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = imported(parse(TURNED, CORNERS)).problem
+    assert len(problem.domain.behaviors["TURN"].effects) == 3 * 5**3
+    task = ground(problem)
+    joins = len(reachability.Reached(problem, 1, problem.initial, 10**6, None).schemas)
+    monkeypatch.setattr(reachability, "lifted", lambda problem, level: problem)
+    singly = ground(problem)
+    assert isinstance(task, Task) and isinstance(singly, Task)
+    assert joins <= 10 < len(reachability.Reached(problem, 1, problem.initial, 10**6, None).schemas)
+    assert reached_by(task, 4) == reached_by(singly, 4)
+
+
+def test_why_one_of_many_conditional_effects_is_never_made_is_said_of_that_one() -> None:
+    task = ground(imported(parse(TURNED, CORNERS.replace("(off c a b)", "(off e e e)"))).problem)
+    assert isinstance(task, Reason)
+    assert task.text.startswith("e OFF e e true can't be reached: TURN could make it so, but ON(e, e, e) can't be")
+    assert not any("/" in term for term in task.terms)
+
+
+def reached_by(task: Task, turns: int) -> set[tuple[str, ...]]:
+    """Return the states, as facts, that so many steps lead to at most."""
+    seen, new = {task.initial}, {task.initial}
+    for _ in range(turns):
+        new = {
+            after
+            for state in new
+            for operator in task.applicable(state)[0]
+            if (after := task.applied(state, operator)) is not None
+        } - seen
+        seen |= new
+    return {tuple(sorted(str(task.facts[bit]) for bit in range(len(task.facts)) if state >> bit & 1)) for state in seen}
+
+
+def test_a_task_of_one_level_that_is_planned_as_a_whole_is_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compiled(problem: Problem) -> Compiled:
+        raise AssertionError("thousands of conditional effects would be compiled for seconds")
+
+    monkeypatch.setattr(fast, "compiled", compiled)
+    outcome = solve(Request(imported(parse(TURNED, CORNERS.replace("(off c a b)", "(lit a)"))).problem))
+    assert outcome.status is Status.SOLVED and outcome.plan is not None and len(outcome.plan.steps) == 2
