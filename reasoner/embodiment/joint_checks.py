@@ -1,4 +1,4 @@
-"""Rules of validation on joints and features of links: see `RULES` at the end.
+"""Rules of validation on joints and features of links, their solids, and the places that they carry: see `RULES` at the end.
 
 A mechanism with a URDF file has its joints from there; nothing is said of those.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from reasoner.embodiment.values import Embodiment, Feature, Link, Part
+from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part
 
 JOINT = "perceive_joint"
 """The perceiver that tells open from shut."""
@@ -87,8 +87,87 @@ def _apart(feature: Feature, part: Part) -> float:
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
 
+def part_of_two(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find solids that two links, or a link and its furniture, have in common."""
+    owners: dict[str, str] = {}
+    for name, parts in _bodies(embodiment):
+        for part in parts:
+            first = owners.setdefault(part.name, name)
+            if first != name:
+                yield (
+                    part.name,
+                    f"{part.name} is part of {first} and of {name}",
+                    "a solid moves with one of them; it would be there twice",
+                    f"give {name} a part of its own",
+                )
+
+
+def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Fault]:
+    """Find places on furniture or links that nothing bears, or inside a solid; near meshes or turned solids nothing is said."""
+    bodies = dict(_bodies(embodiment))
+    grounds = {mechanism.name: mechanism for mechanism in embodiment.mechanisms}
+    for place in embodiment.places.values():
+        parts = bodies.get(place.carrier, ())
+        near = [part for part in parts if _beside(part, place.position) <= 0]
+        if not parts or any(_odd(part) for part in parts if math.dist(part.position, place.position) < max(part.size)):
+            continue
+        x, y, z = place.position
+        tops = [part.position[2] + part.size[2] / 2 for part in near]
+        inside = [part for part, top in zip(near, tops, strict=True) if top - part.size[2] < z + SURFACE < top]
+        ground = place.carrier in grounds and _on_ground(embodiment, grounds[place.carrier], place.position)
+        if inside or not (ground or any(abs(top - z) < SURFACE for top in tops)):
+            where = f"inside {inside[0].name}" if inside else f"at no surface of {place.carrier}"
+            yield (
+                place.name,
+                f"{place.name} is {where}: it is at ({x:g}, {y:g}, {z:g}) in the frame of {place.carrier}",
+                "what is put down there would fall, or doesn't fit",
+                f"give {place.name} the height of the surface that bears it: e:z of that part plus half its sizeZ or height",
+            )
+
+
+SURFACE = 0.005
+"""Metres by which a place may be above or below what bears it."""
+
+
+def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
+    """Yield what has solids, with them: furniture and its links."""
+    for mechanism in embodiment.mechanisms:
+        if not mechanism.urdf:
+            yield mechanism.name, mechanism.parts
+            yield from ((link.name, link.parts) for link in mechanism.links)
+
+
+def _odd(part: Part) -> bool:
+    """Tell whether a solid has no flat top, or none that is easily told."""
+    return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
+
+
+def _beside(part: Part, point: tuple[float, float, float]) -> float:
+    """Return how far a point is beside an upright solid, horizontally; not above 0 if it is above, below or in it."""
+    dx, dy = point[0] - part.position[0], point[1] - part.position[1]
+    if part.kind == "cylinder":
+        return math.hypot(dx, dy) - part.size[0] / 2
+    cos, sin = math.cos(part.turned[2]), math.sin(part.turned[2])
+    return max(abs(cos * dx + sin * dy) - part.size[0] / 2, abs(cos * dy - sin * dx) - part.size[1] / 2)
+
+
+def _on_ground(embodiment: Embodiment, mechanism: Mechanism, point: tuple[float, float, float]) -> bool:
+    """Tell whether a point in the frame of furniture is on top of a fixture."""
+    cos, sin = math.cos(mechanism.yaw), math.sin(mechanism.yaw)
+    x = mechanism.position[0] + cos * point[0] - sin * point[1]
+    y = mechanism.position[1] + sin * point[0] + cos * point[1]
+    z = mechanism.position[2] + point[2]
+    return any(
+        abs(fixture.position[2] + fixture.size[2] / 2 - z) < SURFACE
+        and math.hypot(x - fixture.position[0], y - fixture.position[1]) <= math.hypot(*fixture.size[:2]) / 2
+        for fixture in embodiment.fixtures
+    )
+
+
 RULES: dict[str, Callable[[Embodiment], Iterator[Fault]]] = {
     "joint-that-stays": joint_that_stays,
     "threshold-outside": threshold_outside,
     "feature-off-its-part": feature_off_its_part,
+    "part-of-two": part_of_two,
+    "carried-off-its-surface": carried_off_its_surface,
 }
