@@ -10,7 +10,6 @@ import pyoxigraph as ox
 
 import ontology
 from confab.known import Known, S
-from reasoner.embodiment.reach import reach_hash, reach_relation
 from reasoner.graph.knowledge import BASE, KnowledgeError, text
 from reasoner.vocabulary import EMBODIMENT, EPISODES
 
@@ -70,7 +69,7 @@ def with_reach(scene: S) -> S:
     KnowledgeError
         The scene is symbolic only, or lacks something that physics needs.
     """
-    from reasoner.embodiment.reach import save_reach
+    from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
     from sim.reach import fingerprint, reach
 
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):
@@ -99,6 +98,7 @@ def with_reach(scene: S) -> S:
 
 def unreached(scene: Known) -> list[str]:
     """Return a line for each place of the first or the wanted facts that no hand reaches, with what is in the way of each hand."""
+    from reasoner.embodiment.reach import reach_relation
     from sim.reach import hindrance
 
     graph = scene.knowledge
