@@ -32,7 +32,6 @@ from planner.hierarchical.postoptimization import Improver, length, worth_it
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import Call, Compiled, compiled
-from planner.hierarchical.stuck import gave_up
 from planner.hierarchical.subproblem import BITS
 from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
@@ -150,7 +149,11 @@ def _plan(
     except UnsolvableError as proof:
         return outcome(Status.UNSOLVABLE, reason=proof.reason)
     except LimitError as limit:
+        from planner.hierarchical.stuck import gave_up
+
         return outcome(Status.GAVE_UP, reason=gave_up(call, f"stopped at the limit: {limit}"))
+    from planner.hierarchical.stuck import gave_up
+
     upper = [level for level in call.program.levels if level != call.program.levels[-1]]
     if not leave_levels and upper:
         text = f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
