@@ -403,8 +403,8 @@ def undisturbed(target: str | Path) -> AbstractContextManager[None]:
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
-def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step]]:
-    """Yield the behaviours of the most abstract level that were begun in an episode and failed, with the state where they did."""
+def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
+    """Yield the behaviours of the most abstract level that failed in an episode, with the state there and what of each failed."""
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments
@@ -412,7 +412,7 @@ def in_vain(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step]
             under = [(low.behavior, low.arguments) for low in Plan((step,)).primitives]
             if step.path == failure.step.path[:1] and wanted in under:
                 for state in (failure.state, episode.initial):
-                    yield replace(problem, initial=state, goal=episode.goal), step
+                    yield replace(problem, initial=state, goal=episode.goal), step, failure.step.path
                 break
 
 

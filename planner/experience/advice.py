@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from planner.experience.chaining import Candidate
-from planner.experience.evidence import Judge, View
+from planner.experience.evidence import Judge, View, fillers
 from planner.experience.leading import Guide, rules_in, usable
 from planner.experience.matching import Bind
 from planner.hierarchical import planner as fast
-from planner.hierarchical.refinement_cache import Template
+from planner.hierarchical.refinement_cache import Roles, Template
 from planner.hierarchical.serialization import Call, Compiled
 from planner.plan import Limits, Outcome
 from reasoner.amounts import meets
@@ -90,15 +90,23 @@ class Memory:
         )
 
     def guide(self, call: Call, mode: str, joins: dict[str, Bind | None] | None = None) -> Guide:
-        """Return the rules bound to a call, with what says which of them is most cogent; `joins` as for `Guide`."""
+        """Return the rules bound to a call, with what says which of them is most cogent, whom to take; `joins` as for `Guide`."""
         view = View(call.program, call.table, call.goal)
 
         def score(c: Candidate) -> float:
             return self.judge.told(view, c.rule, c.roles)
 
+        def ranked(behavior: str, template: Template, ways: list[Roles]) -> list[Roles]:
+            method = Method(behavior, len(ways[0]) - len(template.open), template.steps, template.open)
+            if method.name not in self.judge.preferred:
+                return ways
+            facts = (fillers(method, way, call.problem) for way in ways)
+            told = [self.judge.cogency(method, (), who) for who in facts]
+            return [way for _, way in sorted(zip(told, ways, strict=True), key=lambda one: -one[0])]
+
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
         rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or not self.harms(rule)]
-        return Guide(call, rules, self.orders, score, joins)
+        return Guide(call, rules, self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""

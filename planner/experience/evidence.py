@@ -11,7 +11,7 @@ that is new is judged by the classes above it. Who was preferred weighs a tenth 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 from typing import TypeAlias
@@ -19,7 +19,7 @@ from typing import TypeAlias
 from planner.hierarchical.operators import Program
 from planner.transitions import Cell, Table
 from reasoner.language import walk
-from reasoner.memory.experience import ITSELF, Experience, Fact, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, Fact, Method, Rule, Tally
 from reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
@@ -132,6 +132,16 @@ class View:
         return answer
 
 
+def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
+    """Return who fills those open roles of a method in which few could: alone, and beside each individual of its behaviour."""
+    found = list[Fact]()
+    for role, who in zip(method.open, roles[method.roles :], strict=True):
+        if role.source is None and who is not None and 1 < len(problem.members(role.kind)) <= CROWD:
+            asks = f"who is {role.kind}"
+            found += [(asks, who), *((f"{asks} with {other}", who) for other in roles[: method.roles] if other)]
+    return found
+
+
 @dataclass(frozen=True)
 class Factor:
     """A summand of a cogency: the fact that it is of, and its weight in ln odds."""
@@ -149,7 +159,7 @@ class Judge:
         self._weights: dict[str, dict[Fact, float]] = {}
         self._asked: dict[str, frozenset[str]] = {}
 
-    def weights(self, rule: Rule) -> Mapping[Fact, float]:
+    def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
         """Return what each fact that was counted adds to the cogency of a rule, in ln odds; its own is there in any case."""
         found = self._weights.get(rule.name)
         if found is None:
@@ -167,7 +177,7 @@ class Judge:
                     found[fact] = log(chosen / passed)
         return found
 
-    def factors(self, rule: Rule, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
+    def factors(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
         """Yield the summands of the cogency of following a rule where these facts hold."""
         weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
         for fact in (ITSELF, *facts):
@@ -178,7 +188,7 @@ class Judge:
             if c or p:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
-    def cogency(self, rule: Rule, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
+    def cogency(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
         """Return the sum."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 

@@ -21,7 +21,7 @@ from planner.experience.chaining import Budget, Candidate, Chains, TooMuchError,
 from planner.experience.matching import Bind, known
 from planner.experience.regression import ordered
 from planner.hierarchical.operators import Program
-from planner.hierarchical.refinement_cache import RefinedStep
+from planner.hierarchical.refinement_cache import RefinedStep, Roles, Template
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.subplans import Keep
 from planner.transitions import Cell, arguments_of
@@ -41,6 +41,7 @@ TWICE = 2
 """So many times something is brought about in the end: what was shut is opened once more for what belongs into it."""
 
 Score: TypeAlias = "Callable[[Candidate], float]"
+Ranked: TypeAlias = "Callable[[str, Template, list[Roles]], list[Roles]]"
 Found = TypeVar("Found")
 
 
@@ -56,6 +57,8 @@ class Guide:
         The greater, the sooner tried.
     joins : dict, optional
         What was compiled of rules for other calls over the same program; grows.
+    ranked : function of a behaviour, its template and ways to fill the roles of that, optional
+        Returns them so that who proved good comes first.
     """
 
     def __init__(
@@ -65,8 +68,9 @@ class Guide:
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
+        ranked: Ranked = lambda _, __, ways: ways,
     ) -> None:
-        self.call = call
+        self.call, self.ranked = call, ranked
         self.levels = {b.name: b.level for b in call.program.domain.behaviors.values()}
         self.by_goal: dict[tuple[int, str], list[Rule]] = {}
         self.off: dict[Cell, str] = {}

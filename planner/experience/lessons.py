@@ -14,16 +14,16 @@ from contextlib import suppress
 from dataclasses import replace
 
 from planner.experience.chaining import Candidate
-from planner.experience.evidence import View
+from planner.experience.evidence import View, fillers
 from planner.experience.leading import Guide, by_rules, rules_in, usable
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
-from planner.hierarchical.refinement_cache import Refiner
+from planner.hierarchical.refinement_cache import Refiner, Roles, Template
 from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.hierarchical.subplans import Keep
 from planner.paper.learning import LearningError
 from planner.plan import LimitError, Limits, Plan, Step
-from planner.transitions import Cell, arguments_of
+from planner.transitions import Cell, Change, arguments_of
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
 from reasoner.symbols import Problem, Symbol
 
@@ -56,6 +56,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
             lesson += shows(variant, found, using)
     rules = [one for one in lesson.said if isinstance(one, Rule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
+    lesson.personal.clear()  # whom a planner took is no preference
     experience.learn(shown(experience, lesson, problem, using))
     return plan
 
@@ -77,7 +78,7 @@ def live(
     problem: Problem,
     plan: Plan,
     failed: tuple[int, ...] | None = None,
-    vain: Iterable[tuple[Problem, Step]] = (),
+    vain: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
 ) -> None:
     """Learn from a plan that was carried out.
 
@@ -89,8 +90,8 @@ def live(
     plan : Plan
     failed : path of a step, optional
         It failed; what comes after it wasn't tried.
-    vain : iterable of (problem, step)
-        Other steps that failed, with the state in which they were begun.
+    vain : iterable of (problem, step, path)
+        Other steps of the most abstract level that failed, each with the state in which it was begun, and what of it failed.
 
     Raises
     ------
@@ -102,14 +103,28 @@ def live(
     if plan.steps:
         lesson += learned(experience, problem, plan, using, failed)
         lesson = shown(experience, lesson, problem, using) if failed is None else lesson
-    for there, step in vain:
-        lesson += in_vain(experience, there, step, using)
+    for there, step, path in vain:
+        lesson += in_vain(experience, there, step, path[1:], using)
     experience.learn(lesson)
 
 
-def grounds(steps: Sequence[Step]) -> list[tuple[str, tuple[str, ...]]]:
+def grounds(steps: Sequence[Step]) -> list[Ground]:
     """Return steps as behaviours with their arguments."""
     return [(step.behavior, step.arguments) for step in steps]
+
+
+def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Change]]:
+    """Return whom a behaviour binds now, and what it changes.
+
+    Raises
+    ------
+    LearningError
+        Its preconditions don't hold.
+    """
+    done = call.segments.forward[ground[0]](*ground[1])
+    if done is None:
+        raise LearningError(f"{' '.join((ground[0], *ground[1]))}: its preconditions don't hold there")
+    return done
 
 
 def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
@@ -153,8 +168,7 @@ def learned(
     steps = list(plan.steps)
     at = next((i for i, step in enumerate(steps) if failed and failed[:1] == step.path[:1]), None)
     if at is not None:
-        lesson = in_vain(experience, problem, steps[at], using, steps[:at])
-        return lesson
+        return in_vain(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
     lesson = shows(problem, plan, using)
     own = [rule for rule in lesson.said if isinstance(rule, Rule)]
     lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
@@ -166,30 +180,52 @@ def shows(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
     course = Course(problem, grounds(plan.steps))
     lesson = Lesson(said=list(course.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
-    for one in refined(Call(problem, using, None, SHORT.expansions), plan.steps):
-        if isinstance(one, Rule):
-            lesson.said.append(one)
-        else:
-            lesson.counted.append((one, ITSELF, CHOSEN))
+    lesson += refined(Call(problem, using, None, SHORT.expansions), plan.steps)
     return lesson
 
 
-def refined(call: Call, steps: Iterable[Step]) -> Iterator[Method | Rule]:
-    """Do steps, and yield how each was refined: the method, and the rules."""
+def refined(call: Call, steps: Iterable[Step]) -> Lesson:
+    """Do steps, and return how each was refined: the method, who was taken for it, and the rules."""
+    lesson = Lesson()
     for step in steps:
         mark = len(call.table.trail)
-        done = call.segments.forward[step.behavior](*step.arguments)
-        if done is None:
-            raise LearningError(f"{step}: its preconditions don't hold there")
+        bindings, made = changes(call, (step.behavior, step.arguments))
         if not step.steps:
-            call.segments.apply(done[1])
+            call.segments.apply(made)
             continue
-        targets = call.refiner.targets(done[1])
-        yield from refined(call, step.steps)
-        yield method_of(call.refiner, step, (*step.arguments, *done[0]))
+        targets = call.refiner.targets(made)
+        method, roles = method_of(call.refiner, step, (*step.arguments, *bindings))
+        lesson.counted.append((method, ITSELF, CHOSEN))
+        lesson.personal += taken(call, method, roles)
+        lesson += refined(call, step.steps)
         if len({inner.level for inner in step.steps}) == 1:
             keep = call.segments.refining(step.level)
-            yield from course(call, mark, targets, keep, grounds(step.steps)).rules_of()
+            lesson.said += course(call, mark, targets, keep, grounds(step.steps)).rules_of()
+    return lesson
+
+
+def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fact, Tally]]:
+    """Yield who was taken for the open roles of a method, and who was passed over that the next level would have let do it."""
+    own = fillers(method, roles, call.problem)
+    yield from ((method, fact, CHOSEN) for fact in own)
+    for place, role in enumerate(method.open, method.roles) if own else ():
+        for other in call.problem.classes[role.kind] if role.source is None else ():
+            instead = (*roles[:place], other, *roles[place + 1 :])
+            if possible(call, Template(method.steps, method.open), instead):
+                yield from ((method, f, PASSED) for f in fillers(method, instead, call.problem) if f not in own)
+
+
+def possible(call: Call, template: Template, roles: Roles) -> bool:
+    """Whether the steps of a template could be done now, however they are refined."""
+    mark, left = len(call.table.trail), len(template.steps)
+    for name, arguments in call.refiner.filled(template, roles):
+        done = call.segments.forward[name](*arguments)
+        if done is None:
+            break
+        call.segments.apply(done[1])
+        left -= 1
+    call.table.undo(mark)
+    return not left
 
 
 def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> Course:
@@ -207,10 +243,15 @@ def course(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done:
     return Course(replace(call.problem, initial=state, goal=goal), done)
 
 
-def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> Method:
-    """Return a step's refinement over roles."""
+def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
+    """Return a step's refinement over roles, and who was in these, None for whom the table told."""
     template = refiner.template(grounds(step.steps), own)
-    return Method(step.behavior, len(own), template.steps, template.open)
+    method = Method(step.behavior, len(own), template.steps, template.open)
+    who = dict(zip(range(len(own)), own, strict=True))
+    for (_, places), inner in zip(method.steps, step.steps, strict=True):
+        who.update(zip(places, inner.arguments, strict=True))
+    told = {place for place, role in enumerate(method.open, len(own)) if role.source is not None}
+    return method, tuple([None if place in told else who[place] for place in range(len(own) + len(method.open))])
 
 
 def chosen(
@@ -231,12 +272,7 @@ def chosen(
             rest = set(later[number + 1 :])
             passed = {c.ground: c for c in tried_ if c.ground != ground and c.ground not in rest}
             lesson += compared(view, done, list(passed.values()))
-        changes = call.segments.forward[ground[0]](*ground[1])
-        if changes is None:
-            raise LearningError(
-                f"step {number} ({' '.join((ground[0], *ground[1]))}): its preconditions don't hold there"
-            )
-        call.segments.apply(changes[1])
+        call.segments.apply(changes(call, ground)[1])
     return lesson
 
 
@@ -262,16 +298,21 @@ def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate])
 
 
 def in_vain(
-    experience: Experience, problem: Problem, step: Step, using: Compiled, before: Sequence[Step] = ()
+    experience: Experience,
+    problem: Problem,
+    step: Step,
+    path: Sequence[int],
+    using: Compiled,
+    before: Sequence[Step] = (),
 ) -> Lesson:
-    """Return what a step teaches that failed: the rules that would have chosen it, with its facts, and its method."""
+    """Return what a step teaches of which the sub-step with a path failed.
+
+    The rules that would have chosen it, with its facts, and whom its refinement had taken.
+    """
     call = Call(problem, using, None, SHORT.expansions)
     guide = Guide(call, rules_in(experience), usable(experience))
     for ground in grounds(before):
-        changes = call.segments.forward[ground[0]](*ground[1])
-        if changes is None:
-            raise LearningError(f"{' '.join((ground[0], *ground[1]))}: its preconditions don't hold there")
-        call.segments.apply(changes[1])
+        call.segments.apply(changes(call, ground)[1])
     view = View(using.program, call.table, call.goal)
     lesson = Lesson()
     wanted = (step.behavior, step.arguments)
@@ -280,4 +321,16 @@ def in_vain(
             facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
             lesson.counted += [(c.rule, fact, FAILED) for fact in facts]
             lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
+    for number in (*path, 0):
+        done = call.segments.forward[step.behavior](*step.arguments)
+        if done is None or number >= len(step.steps):
+            break
+        method, roles = method_of(call.refiner, step, (*step.arguments, *done[0]))
+        who = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
+        lesson.personal += who
+        lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # others might have done it in the same way
+        for earlier in grounds(step.steps[:number]):
+            with suppress(LearningError):
+                call.segments.apply(changes(call, earlier)[1])
+        step = step.steps[number]
     return lesson

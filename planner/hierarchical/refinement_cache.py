@@ -8,10 +8,10 @@ end that the refinement leaves what it must (docs/levels.md); so a template can 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
 from planner.hierarchical.subproblem import Width, World, focus, problem_of
@@ -53,11 +53,18 @@ class Template:
     open: tuple[OpenRole, ...]
 
 
+Roles: TypeAlias = "tuple[str | None, ...]"
+"""Who fills the roles of a template; None for whom the table will tell."""
+
+
 class Advice(Protocol):
-    """What may know steps before they are searched."""
+    """What may know steps before they are searched, and whom to take for them."""
 
     def follow(self, level: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep] | None:
         """Do steps that achieve the targets and keep the rest; None, and the table as it was, without any."""
+
+    def ranked(self, behavior: str, template: Template, ways: list[Roles]) -> list[Roles]:
+        """Return ways to fill the roles of a behaviour's template, who proved good first."""
 
 
 class Refiner:
@@ -173,7 +180,7 @@ class Refiner:
         individuals = arguments + bindings
         known = self.templates.setdefault(name, [])
         for position, template in enumerate(known):
-            for roles in self.roles(template, individuals):
+            for roles in self.roles(template, individuals, name):
                 steps = self.replay(below, template, roles, targets, keep)
                 if steps is not None:
                     self.hits += 1
@@ -301,33 +308,36 @@ class Refiner:
     # ------------------------------------------------------------------------------------------------------- templates
 
     def replay(
-        self, level: int, template: Template, roles: Sequence[str | None], targets: Mapping[Cell, str], keep: Keep
+        self, level: int, template: Template, roles: Roles, targets: Mapping[Cell, str], keep: Keep
     ) -> tuple[RefinedStep, ...] | None:
         """Do a template's steps; None, and the table as it was, if one can't be done or it leaves what it mustn't."""
-        mark = len(self.table.trail)
+        mark, steps = len(self.table.trail), list[RefinedStep]()
+        for name, arguments in self.filled(template, roles):
+            step = self.do(level, name, arguments)
+            if step is None:
+                break
+            steps.append(step)
+        if len(steps) < len(template.steps) or self.left_wrong(mark, targets, keep) is not None:
+            self.table.undo(mark)
+            return None
+        if template.open and (self.drifting or len(steps) >= LONG):
+            return self.lean(tuple(steps), mark, targets, keep)
+        return tuple(steps)
+
+    def filled(self, template: Template, roles: Roles) -> Iterator[Ground]:
+        """Yield a template's steps, each as the table tells when those before are done; it ends where the table doesn't tell."""
         filled = list(roles)
         first = len(roles) - len(template.open)
-        steps = []
         for name, places in template.steps:
             for place in places:
                 if filled[place] is None:
                     situation, arguments = template.open[place - first].source  # type: ignore[misc]
                     key = key_of(tuple(filled[i] or "" for i in arguments))
                     filled[place] = self.table.now[situation].get(key)
-            if None in [filled[place] for place in places]:
-                self.table.undo(mark)
-                return None
-            step = self.do(level, name, tuple([filled[place] or "" for place in places]))
-            if step is None:
-                self.table.undo(mark)
-                return None
-            steps.append(step)
-        if self.left_wrong(mark, targets, keep) is not None:
-            self.table.undo(mark)
-            return None
-        if template.open and (self.drifting or len(steps) >= LONG):
-            return self.lean(tuple(steps), mark, targets, keep)
-        return tuple(steps)
+            who = tuple([found for place in places if (found := filled[place]) is not None])
+            if len(who) < len(places):
+                return
+            yield name, who
 
     def lean(
         self, steps: tuple[RefinedStep, ...], mark: int, targets: Mapping[Cell, str], keep: Keep
@@ -377,11 +387,11 @@ class Refiner:
             lifted.append((name, tuple(places[argument] for argument in arguments)))
         return Template(tuple(lifted), tuple(opened))
 
-    def roles(self, template: Template, individuals: tuple[str, ...]) -> Iterator[tuple[str | None, ...]]:
-        """Yield ways to fill the roles of a template: the parent's individuals, None for what the table will tell, others."""
-        if not template.open:
-            yield individuals
-            return
+    def roles(self, template: Template, individuals: tuple[str, ...], behavior: str | None = None) -> Iterable[Roles]:
+        """Return ways to fill the roles of a template: the parent's individuals, None for what the table will tell, others.
+
+        Of a behaviour's template as advice ranks them.
+        """
         wants = self.segments.wants
         choices: list[Sequence[str | None]] = []
         for role in template.open:
@@ -391,8 +401,10 @@ class Refiner:
                 choices.append(wants.candidates(role.becomes, "", role.kind))
             else:
                 choices.append(wants.one_of_each(role.kind))
-        for chosen in islice(product(*choices), CHOICES):
-            yield individuals + chosen
+        ways: list[Roles] = [individuals + chosen for chosen in islice(product(*choices), CHOICES)]
+        if self.advice is None or behavior is None or len(ways) < 2:
+            return ways
+        return self.advice.ranked(behavior, template, ways)
 
 
 def open_role(

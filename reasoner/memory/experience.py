@@ -243,7 +243,7 @@ class Experience:
                 weight = decay ** (self.episodes.get(replica, epoch) - epoch)
                 table = found.setdefault(name, {})
                 chosen, passed = table.get(fact, (0.0, 0.0))
-                table[fact] = chosen + weight * tally.chosen, passed + weight * tally.passed_over
+                table[fact] = chosen + weight * tally.chosen, passed + weight * (tally.passed_over + tally.failed)
         return found
 
     def __iter__(self) -> Iterator[tuple[tuple[str, int], str, Fact, Tally]]:

@@ -18,11 +18,11 @@ from planner.hierarchical import recovery
 from planner.hierarchical.operators import Program
 from planner.hierarchical.serialization import Call, compiled
 from planner.hierarchical.subplans import EXPANSION
-from planner.plan import Outcome, Reason, Status
+from planner.plan import Outcome, Plan, Reason, Status, Step
 from planner.validation import validate
 from reasoner.amounts import LESS, MORE
 from reasoner.language import terms
-from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Lesson, Method, Order, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Order, Tally
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse_files
 from reasoner.symbols import Problem, RelationCondition, ValueCondition, Witness
@@ -226,29 +226,47 @@ def test_a_class_never_seen_does_exactly_as_well() -> None:
     assert expanded(one) == expanded(other)
 
 
-def two_hands(experience: Experience) -> tuple[Rule, Fact, Fact]:
-    """Return a rule in which one of two hands does as well as the other, and who is preferred by it."""
-    rule = next(r for r in rules_in(experience) if any(role == "?hand" for role, _ in r.kinds))
-    return rule, ("who is hand", "left"), ("who is hand", "right")
+def hands(made: Plan | None) -> set[str]:
+    return {a for step in made.primitives for a in step.arguments if a.startswith("hand")} if made else set()
+
+
+def by_the_other_hand(step: Step) -> Step:
+    other = {"hand1": "hand2", "hand2": "hand1"}
+    return replace(
+        step,
+        arguments=tuple(other.get(a, a) for a in step.arguments),
+        steps=tuple(map(by_the_other_hand, step.steps)),
+    )
 
 
 def test_a_preference_that_flips_is_relearned_within_ten_episodes_after_forty() -> None:
-    experience = Experience("robot")
-    experience.merge(taught().experience)
-    rule, left, right = two_hands(experience)
-
-    def prefers(one: Fact, other: Fact) -> bool:
-        judge = Memory(experience).judge
-        return judge.cogency(rule, [], [one]) > judge.cogency(rule, [], [other])
-
+    within, experience = problem("served", 2, 7), Experience("robot")
+    one = teach(experience, within)
+    assert one is not None and hands(one) == {"hand1"}  # all could be done by either
+    other = Plan(tuple(map(by_the_other_hand, one.steps)))
     for _ in range(40):
-        experience.learn(Lesson(personal=[(rule, left, Tally(chosen=1)), (rule, right, Tally(passed_over=1))]))
-    assert prefers(left, right)
+        live(experience, within, other)
+    assert hands(plan(within, Memory(experience)).plan) == {"hand2"}
     episodes = 0
-    while not prefers(right, left):
-        experience.learn(Lesson(personal=[(rule, right, Tally(chosen=1)), (rule, left, Tally(passed_over=1))]))
+    while hands(plan(within, Memory(experience)).plan) != {"hand1"}:
+        live(experience, within, one)
         episodes += 1
     assert episodes <= 10
+
+
+def test_a_hand_that_failed_at_a_place_is_not_taken_for_it_again_and_the_way_of_doing_it_is_not_to_blame() -> None:
+    within, experience = problem("served", 2, 7), Experience("robot")
+    made = teach(experience, within)
+    assert made is not None
+    top = next(step for step in made.steps if step.behavior == "B1_MOVE")
+    put = next(step for step in top.walk() if step.behavior == "B3_REACH_HAND_LOCATION")
+    live(experience, within, Plan(()), vain=[(within, top, put.path)])
+    hand, place = put.arguments
+    again = plan(within, Memory(experience)).plan
+    assert again is not None and validate(within, again) == []
+    assert all({hand, place} - set(step.arguments) for step in again.primitives)
+    blamed = [experience.said[name] for name, its in experience.totals().items() if its.get(ITSELF, Tally()).failed]
+    assert not any(isinstance(one, Method) and one.open for one in blamed)
 
 
 def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
