@@ -30,6 +30,7 @@ ASKED = (
     (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
     (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),
     (re.compile(r"who wants (\S+) as (\S+)"), "who shall have {0} as {1}: {answer}"),
+    (re.compile(r"who is (\S+) with (\S+)"), "{0} is {answer} beside {1}"),
     (re.compile(r"who is (\S+)"), "{0} is {answer}"),
     (re.compile(r"(\S+) is a (\S+)"), "{0} is a {1}: {answer}"),
     (re.compile(r"(\S+) of (\S+)"), "the {0} of {1}: {answer}"),

@@ -7,7 +7,7 @@ paper's links between facts and quantified behaviours, which the paper's mode re
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -23,7 +23,7 @@ from planner.paper.learning import learn as learn_plan
 from planner.plan import Plan, Step
 from reasoner.files import alone, write_whole
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Method, Order, Rule, Tally
+from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Method, Order, Rule, Tally
 from reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from reasoner.memory.links import Links
 from reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 MOST_LINKS = 20_000
 """What would give the paper's memory more links isn't learned for the paper's mode, which plans small scenes alone."""
+SHOWN = 3
+"""So many are said of whom a method took lately."""
 
 
 @dataclass
@@ -318,6 +320,7 @@ class Memory:
 
     def also(self) -> list[str]:
         """Return the orders and methods that were learned, as sentences with how often."""
+        from planner.experience.evidence import DECAY
         from planner.experience.leading import usable
 
         say, totals = self.sayings(), self.experience.totals()
@@ -325,10 +328,17 @@ class Memory:
             f"{say.said(order)}: so in {totals[order.name][ITSELF].chosen} cases" for order in usable(self.experience)
         ]
         methods = [one for one in self.experience.said.values() if isinstance(one, Method)]
-        counted_ = [(totals.get(one.name, {}).get(ITSELF, Tally()).chosen, say.said(one)) for one in methods]
+        liked = self.experience.preferences(DECAY)
+        counted_ = [
+            (totals.get(one.name, {}).get(ITSELF, Tally()).chosen, say.said(one), liked.get(one.name, {}))
+            for one in methods
+        ]
         return [
             *orders,
-            *(f"{text}: {times} times" for times, text in sorted(counted_, key=lambda pair: (-pair[0], pair[1]))),
+            *(
+                f"{text}: {times} times{''.join(f'; {who}' for who in preferred(say, facts))}"
+                for times, text, facts in sorted(counted_, key=lambda row: (-row[0], row[1]))
+            ),
         ]
 
     def __repr__(self) -> str:
@@ -373,6 +383,12 @@ def _labels(scene: Known) -> Callable[[], Labels]:
         return labels_of(scene.knowledge, scene.names, scene.problem)
 
     return read
+
+
+def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
+    """Return in words who was taken for something lately, and who wasn't or failed, the clearest first."""
+    clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
+    return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
 
 def counted(number: int, noun: str) -> str:
