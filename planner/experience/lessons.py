@@ -200,7 +200,9 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
         lesson += refined(call, step.steps)
         if len({inner.level for inner in step.steps}) == 1:
             keep = call.segments.refining(step.level)
-            lesson.said += course(call, mark, targets, keep, grounds(step.steps)).rules_of()
+            rules = list(course(call, mark, targets, keep, grounds(step.steps)).rules_of())
+            lesson.said += rules
+            lesson.counted += [(rule, ITSELF, CHOSEN) for rule in rules]
     return lesson
 
 
