@@ -13,6 +13,7 @@ reached no such goals yet, or knows none of them.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -89,8 +90,10 @@ class Memory:
             )
         )
 
-    def guide(self, call: Call, mode: str, joins: dict[str, Bind | None] | None = None) -> Guide:
-        """Return the rules bound to a call, with what says which of them is most cogent, whom to take; `joins` as for `Guide`."""
+    def guide(
+        self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
+    ) -> Guide:
+        """Return rules bound to a call, with what says which of them is cogent, and whom to take; `joins` as for `Guide`."""
         view = View(call.program, call.table, call.goal)
 
         def score(c: Candidate) -> float:
@@ -106,7 +109,7 @@ class Memory:
 
         upper = {b.name for b in call.program.domain.at_level(call.program.levels[0])}
         rules = [rule for rule in self.rules if mode != "guarded" or rule.does[0] not in upper or not self.harms(rule)]
-        return Guide(call, rules, self.orders, score, joins, ranked)
+        return Guide(call, [*rules, *also], self.orders, score, joins, ranked)
 
     def warmed(self, using: Compiled) -> Compiled:
         """Return what was compiled, with the methods that did more good than harm as refinements to try first."""

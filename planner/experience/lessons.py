@@ -13,9 +13,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
+from planner.experience.advice import Memory
 from planner.experience.chaining import Candidate
 from planner.experience.evidence import View, fillers
-from planner.experience.leading import Guide, by_rules, rules_in, usable
+from planner.experience.leading import by_rules, rules_in
 from planner.experience.regression import Course
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Refiner, Roles, Template
@@ -137,7 +138,7 @@ def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compi
 def tried(experience: Experience, problem: Problem, using: Compiled, new: Sequence[Rule] = ()) -> Lesson:
     """Return how good what is known, and what is new, proves on a problem: which of its goals it reaches by itself."""
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Guide(call, [*rules_in(experience), *new], usable(experience))
+    guide = Memory(experience).guide(call, also=new)
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)
@@ -171,7 +172,7 @@ def learned(
         return in_vain(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
     lesson = shows(problem, plan, using)
     own = [rule for rule in lesson.said if isinstance(rule, Rule)]
-    lesson += chosen([*rules_in(experience), *rules, *own], experience, problem, steps, using)
+    lesson += chosen([*rules, *own], experience, problem, steps, using)
     return lesson
 
 
@@ -259,9 +260,9 @@ def method_of(refiner: Refiner, step: Step, own: tuple[str, ...]) -> tuple[Metho
 def chosen(
     rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
 ) -> Lesson:
-    """Return what a plan chose where rules applied: the candidates of least rank that it did, and those that it passed over."""
+    """Return what a plan chose where what is known, and some rules, applied: what it did of that, and what it passed over."""
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Guide(call, rules, usable(experience))
+    guide = Memory(experience).guide(call, also=rules)
     view = View(using.program, call.table, call.goal)
     later = grounds(steps)
     lesson = Lesson()
@@ -278,13 +279,18 @@ def chosen(
     return lesson
 
 
+def judged(view: View, c: Candidate, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
+    """Yield what is counted of a rule that was followed, and of what held of who was in its roles."""
+    return ((c.rule, fact, tally) for fact in (ITSELF, *view.facts(c.rule, c.roles)))
+
+
 def compared(view: View, done: Sequence[Candidate], passed: Sequence[Candidate]) -> Lesson:
     """Return what is counted where these were chosen and those passed over."""
     lesson = Lesson()
-    for candidates, tally in ((done, CHOSEN), (passed, PASSED)):
-        for c in {c.rule.name: c for c in candidates}.values() if tally is CHOSEN else candidates:
-            facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
-            lesson.counted += [(c.rule, fact, tally) for fact in facts]
+    for c in {c.rule.name: c for c in done}.values():
+        lesson.counted += judged(view, c, CHOSEN)
+    for c in passed:
+        lesson.counted += judged(view, c, PASSED)
     for c in done:
         for other in passed:
             who = [
@@ -312,7 +318,7 @@ def in_vain(
     The rules that would have chosen it, with its facts, and whom its refinement had taken.
     """
     call = Call(problem, using, None, SHORT.expansions)
-    guide = Guide(call, rules_in(experience), usable(experience))
+    guide = Memory(experience).guide(call)
     for ground in grounds(before):
         call.segments.apply(changes(call, ground)[1])
     view = View(using.program, call.table, call.goal)
@@ -320,8 +326,7 @@ def in_vain(
     wanted = (step.behavior, step.arguments)
     for c in guide.every(guide.open()):
         if c.ground == wanted:
-            facts: list[Fact] = [ITSELF, *view.facts(c.rule, c.roles)]
-            lesson.counted += [(c.rule, fact, FAILED) for fact in facts]
+            lesson.counted += judged(view, c, FAILED)
             lesson.personal += [(c.rule, fact, PASSED) for fact in view.individuals(c.rule, c.roles)]
     for number in (*path, 0):
         done = call.segments.forward[step.behavior](*step.arguments)

@@ -25,9 +25,10 @@ from reasoner.language import terms
 from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Order, Tally
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import parse_files
-from reasoner.symbols import Problem, RelationCondition, ValueCondition, Witness
+from reasoner.symbols import Problem, RelationCondition, SituationType, ValueCondition, Witness
 from tests.planner.small import van
 from worlds.lessons import backwards, problem, taught
+from worlds.writing import becomes, behavior, has, world
 
 FAMILIES = "served", "swap", "rotate", "handover", "blocked", "full"
 FERRY = """(define (domain ferry) (:requirements :strips :typing) (:types car place)
@@ -282,6 +283,36 @@ def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
     before = Memory(experience).judge.cogency(one.rule, [], [])
     experience.learn(Lesson(counted=[(one.rule, ITSELF, Tally(failed=3))]))
     assert Memory(experience).judge.cogency(one.rule, [], []) < before
+
+
+def jugs(cups: int, stuck: int) -> Problem:
+    """Return cups to be filled from jugs of which level 1 doesn't know that all but the last can't be opened."""
+    names = tuple(f"jug{i}" for i in range(stuck + 1))
+    empty, filled = has("CUP", "?c", "empty"), [becomes("CUP", "?c", "full"), becomes("FROM", "?c", "?j")]
+    return world(
+        [SituationType("CUP", ("Cup",), "CUP"), SituationType("FROM", ("Cup",), "FROM"),
+         SituationType("CAP", ("Jug",), "CAP", level=2)],
+        [behavior("FILL", 1, "?c:Cup ?j:Jug", [empty], filled),
+         behavior("UNSCREW", 2, "?j:Jug", [has("CAP", "?j", "loose")], [becomes("CAP", "?j", "off")]),
+         behavior("POUR", 2, "?c:Cup ?j:Jug", [empty, has("CAP", "?j", "off")], filled)],
+        {"Cup": tuple(f"cup{i}" for i in range(cups)), "CUP": ("empty", "full"), "Jug": names,
+         "FROM": (*names, "none"), "CAP": ("stuck", "loose", "off")},
+        {f"CUP cup{i}": "empty" for i in range(cups)} | {f"FROM cup{i}": "none" for i in range(cups)}
+        | {f"CAP {jug}": "stuck" for jug in names} | {f"CAP jug{stuck}": "loose"},
+        {f"CUP cup{i}": "full" for i in range(cups)},
+    )  # fmt: skip
+
+
+def test_what_could_not_be_refined_is_not_tried_again_whether_taught_or_lived() -> None:
+    within, experience = jugs(10, 7), Experience("robot")
+    alone = fast.plan(within)
+    teach(experience, jugs(2, 2))
+    for _ in range(2):
+        led = plan(within, Memory(experience))
+        assert led.plan is not None and alone.plan is not None
+        assert led.plan.length == alone.plan.length
+        assert (expanded(led), led.misses) == (10, 0) < (expanded(alone), alone.misses)
+        live(experience, within, led.plan)
 
 
 def test_regression_asks_over_roles_for_what_a_step_to_the_goal_needs() -> None:
