@@ -54,7 +54,7 @@ class Sayings:
         if role is None or name in self.labels.words:
             return self.labels.name(name)
         kind = next(
-            (k for k in (role[1], role[1].upper(), role[1][:1].upper() + role[1][1:]) if k in self.labels.words),
+            (k for k in (role[1], role[1][:1].upper() + role[1][1:], role[1].upper()) if k in self.labels.words),
             role[1],
         )
         return self.labels.name(kind) + (f" {role[2]}" if role[2] else "")

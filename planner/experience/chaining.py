@@ -223,7 +223,7 @@ class Chains:
         if self.near.get(key, inf) <= most:
             return True
         if most <= 0 or self.beyond.get(key, 0) >= most:
-            self.cut |= key not in self.seen and self.beyond.get(key, 0) < inf
+            self.cut |= (key not in self.seen or key in self.near) and self.beyond.get(key, 0) < inf
             return False
         before, self.beyond[key] = self.beyond.get(key, 0), most  # met again on the way, it isn't nearer
         self.seen.add(key)
@@ -293,12 +293,15 @@ class Chains:
         for cost, way in self.nearest(level, goal, below):
             if cost == inf or budget.left <= 0:
                 return None
-            mark = len(table.trail)
+            mark, left = len(table.trail), budget.left
             steps = self.go(level, way, budget, (*above, goal))
             if steps:
                 on = cost
                 if (steps[-1].behavior, steps[-1].arguments) == way.ground:
-                    on = below if self.off(goal) < off else 0.0  # an amount may need the same once more
+                    on = (
+                        below if self.off(goal) < off else 0.0
+                    )  # what is defined, or an amount, may need the same once more
+                    budget.left = left if on else budget.left
                 rest = self.attain(level, goal, budget, above, on)
                 if rest is not None and (above or self.hopeful(level, mark)):
                     return steps + rest
@@ -312,8 +315,10 @@ class Chains:
         return level != first or all(self.far(level, (cell, kept[cell])) < inf for cell in spoiled)
 
     def off(self, goal: Goal) -> float:
-        """Return by how much an amount isn't as wanted; nothing of what is none."""
+        """Return by how much an amount isn't as wanted, or in how many respects what is defined isn't; nothing of others."""
         (situation, key), value = goal
+        if situation in self.call.program.rules:
+            return len(self.call.segments.wants.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
         if self.call.program.domain.situations[situation].quantity is None:
             return 0.0
         now = float(number(self.call.table.now[situation].get(key)))
@@ -436,7 +441,9 @@ class Chains:
         found: list[tuple[int, float, int, list[Goal]]] = []
         for n in way.unmet:
             lacks = self.lacks(level, way, n)
-            near = sorted((self.far(level, g), not self.mends(way, n, g), i, g) for i, g in enumerate(lacks))
+            near = sorted(
+                (self.far(level, g), len(lacks) > 1 and not self.mends(way, n, g), i, g) for i, g in enumerate(lacks)
+            )
             if not near:
                 continue  # perhaps it comes with the others
             if near[0][0] == inf:

@@ -161,7 +161,8 @@ class Course:
             before, served = self.needed(need, done, facts, later)
             if served:
                 yield from self.links(done, served, facts, later)
-                need = {c: None for c in before if not isinstance(c, (*STATIC, EqualityCondition))}
+                others = (rest for _, rest in self.hindered(served, facts))
+                need = {c: None for c in (*before, *others) if not isinstance(c, (*STATIC, EqualityCondition))}
             undo(later, done.mark)
 
     def needed(
@@ -224,6 +225,7 @@ class Course:
         for goal in goals:
             need, own = self.needed([goal], done, facts, later)
             if own:
+                need.update(dict.fromkeys(c for who, _ in self.hindered(own, facts) for c in who))
                 order = dict.fromkeys((*goal.arguments, goal.value, *done.ground[1]))
                 order.update((t, None) for c in need for i in walk(c) for t in terms(i) if not t.startswith("?"))
                 rule = self.lifted(self.aimed(goal, facts), tuple(need), done.ground, tuple(order))
@@ -244,6 +246,17 @@ class Course:
         for situation, key, _, when in done.changes:
             if when and ((situation, key) in about if plain else situation in situations):
                 yield from when
+
+    def hindered(self, served: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
+        """Yield of what nobody may be what held of one who was, and that all others weren't."""
+        for c in served:
+            if isinstance(c, Witness) and c.negated:
+                wanted = (*c.conditions, ClassCondition(c.variable, c.kind))
+                found = self.rules.satisfied(wanted, {}, {c.variable: c.kind}, facts)
+                other = EqualityCondition(c.variable, (found or {}).get(c.variable, ""), negated=True)
+                rest = replace(c, conditions=(*c.conditions, other))
+                if found is not None and self.rules.satisfied([rest], {}, {}, facts) is not None:
+                    yield list(self.plain(wanted, found, {}, facts)), rest
 
     def lifted(
         self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]

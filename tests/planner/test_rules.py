@@ -474,3 +474,61 @@ def test_where_somebody_was_who_rests_there_becomes_a_role_like_any_other_place(
     drives = [rule for rule in rules_in(experience) if rule.does[0] == "L2_DRIVE"]
     assert drives
     assert not any("dock" in terms(c) for rule in drives for c in (rule.goal, *rule.asks))
+
+
+DAIRY = """(define (domain dairy) (:requirements :strips :typing :derived-predicates)
+(:types order cheese mould)
+(:predicates (part ?c - cheese ?o - order) (in ?c - cheese ?m - mould) (full ?m - mould) (pressed ?c - cheese)
+ (salted ?c - cheese) (rinsed) (warm) (curd) (ready ?o - order))
+(:derived (ready ?o - order) (not (exists (?c - cheese) (and (part ?c ?o) (not (salted ?c))))))
+(:action rinse :parameters () :precondition (not (rinsed)) :effect (rinsed))
+(:action warm_up :parameters () :precondition (rinsed) :effect (and (not (rinsed)) (warm)))
+(:action curdle :parameters () :precondition (warm) :effect (and (not (warm)) (curd)))
+(:action fill :parameters (?c - cheese ?m - mould) :precondition (and (curd) (not (full ?m)))
+ :effect (and (not (curd)) (in ?c ?m) (full ?m)))
+(:action press :parameters (?c - cheese ?m - mould) :precondition (in ?c ?m) :effect (pressed ?c))
+(:action salt :parameters (?c - cheese ?m - mould) :precondition (and (in ?c ?m) (pressed ?c))
+ :effect (and (not (in ?c ?m)) (not (full ?m)) (salted ?c))))"""
+
+
+def dairy(folder: Path, orders: int, each: int) -> Problem:
+    """Return orders that are ready when none of their cheeses is without salt."""
+    (folder / "domain.pddl").write_text(DAIRY)
+    part = " ".join(f"(part c{o}_{i} o{o})" for o in range(orders) for i in range(each))
+    cheeses = " ".join(f"c{o}_{i}" for o in range(orders) for i in range(each))
+    objects = f"{' '.join(f'o{o}' for o in range(orders))} - order {cheeses} - cheese m0 - mould"
+    goal = " ".join(f"(ready o{o})" for o in range(orders))
+    text = f"(define (problem p) (:domain dairy) (:objects {objects}) (:init {part}) (:goal (and {goal})))"
+    (folder / "problem.pddl").write_text(text)
+    return imported(parse_files(folder / "domain.pddl", folder / "problem.pddl")).problem
+
+
+def test_what_is_so_when_nobody_is_otherwise_is_brought_about_by_rules_one_after_the_other(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    teach(experience, dairy(tmp_path, 1, 2))
+    large = dairy(tmp_path, 3, 5)
+    outcome = plan(large, Memory(experience), improve=0)
+    assert outcome.plan is not None
+    assert validate(large, outcome.plan) == []
+    assert expanded(outcome) == len(outcome.plan.steps)
+
+
+def test_a_rule_for_what_nobody_may_be_speaks_of_whom_it_was_about(tmp_path: Path) -> None:
+    small = dairy(tmp_path, 1, 2)
+    experience = Experience("robot")
+    teach(experience, small)
+    ready = [rule for rule in rules_in(experience) if rule.goal.situation == "READY"]
+    assert ready
+    for rule in ready:
+        who = rule.does[1][0], *rule.goal.arguments
+        assert any(isinstance(c, RelationCondition) and c.arguments == who for c in rule.asks)
+
+
+def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    small = dairy(tmp_path, 1, 1)
+    teach(experience, small)
+    guide = Guide(Call(small, compiled(small), None, 1000), rules_in(experience))
+    (goal,) = guide.open().items()
+    # To press a cheese needs it in a mould, which is needed for salting it, too, and was found one rule nearer.
+    assert guide.chains.far(guide.first, goal) == 6
