@@ -139,7 +139,7 @@ def worlds() -> None:
             beside(f"lab, {lessons} lessons", scene, Memory(experience))
 
 
-def curve(world: str = "canal", episodes: int = 3) -> None:
+def curve(world: str = "laboratory", episodes: int = 3) -> None:
     """Print how the effort in a large world falls: without memory, after a lesson in a small one, after each own episode."""
     small, large = (confab.load(f"{world}-{size}").problem for size in ("small", "large"))
     experience = Experience("lesson")

@@ -22,6 +22,8 @@ KINDS = (".png", ".svg", ".pdf")
 MODES = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
 """After so long a planning call is left out of the picture."""
+MANY = 12
+"""So many episodes are named, and their counts written."""
 
 
 def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, curve: Curve | None = None) -> Curve:
@@ -57,9 +59,10 @@ class Curve:
         seen = self.scenes.index(name) if name in self.scenes else None
         self.scenes.append(name)
         for mode in MODES:
-            self.with_memory[mode].append(_expansions(scene, memory, mode))
-            again = _expansions(scene, None, mode) if seen is None else self.without[mode][seen]
-            self.without[mode].append(again)
+            alone = _expansions(scene, None, mode) if seen is None else self.without[mode][seen]
+            hopeless = seen is not None and alone is None and self.with_memory[mode][seen] is None
+            self.with_memory[mode].append(None if hopeless else _expansions(scene, memory, mode))
+            self.without[mode].append(alone)
 
     def save(self, path: Path) -> Path:
         """Draw the curves into a file, and return which."""
@@ -83,20 +86,32 @@ class Curve:
     def _figure(self) -> Figure:
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(8, 4.2), layout="constrained")
+        figure = Figure(figsize=(8, 4.6), layout="constrained")
         axes = figure.subplots()
         episodes = range(1, len(self.scenes) + 1)
+        few = len(self.scenes) <= MANY
         for mode, color, marker in zip(MODES, ("#0072b2", "#d55e00"), ("o", "s"), strict=True):
-            for values, style, what in ((self.without, "--", "without memory"), (self.with_memory, "-", "with memory")):
+            for values, style, what in ((self.without, ":", "without memory"), (self.with_memory, "-", "with memory")):
                 shown = [float("nan") if value is None else value for value in values[mode]]
                 if any(value is not None for value in values[mode]):
-                    axes.plot(episodes, shown, style, color=color, marker=marker, ms=5, label=f"{MODES[mode]}, {what}")
+                    face = color if values is self.with_memory else "white"
+                    label = f"{MODES[mode]}, {what}"
+                    axes.plot(episodes, shown, style, color=color, marker=marker, ms=5, mfc=face, label=label)
+                beside = (7, 3) if values is self.with_memory else (0, 5)
+                for episode, value in zip(episodes, values[mode], strict=True):
+                    if few and value is not None:
+                        axes.annotate(f"{value:,}", (episode, value), beside, textcoords="offset points",
+                                      ha="left" if beside[0] else "center", fontsize=7, color=color)  # fmt: skip
+        axes.margins(x=0.08, y=0.12)
         axes.set_ylim(bottom=0)
-        axes.set_xticks(list(episodes) if len(self.scenes) <= 20 else [])
+        several = len(set(self.scenes)) > 1
+        under = [name.replace("-", "\n") if several else "" for name in self.scenes]
+        names = [f"{number}\n{name}".strip() for number, name in zip(episodes, under, strict=True)]
+        axes.set_xticks(list(episodes) if few else [], names if few else [], fontsize=8)
         axes.set_xlabel("episode: what was learned before it is known")
         axes.set_ylabel("expansions")
         axes.set_title("Expansions of planning as memory grows", fontsize=11)
-        axes.legend(fontsize=8)
+        figure.legend(fontsize=8, ncols=2, loc="outside lower center")
         axes.grid(alpha=0.3)
         return figure
 
