@@ -137,8 +137,9 @@ def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compi
 
 def tried(experience: Experience, problem: Problem, using: Compiled, new: Sequence[Rule] = ()) -> Lesson:
     """Return how good what is known, and what is new, proves on a problem: which of its goals it reaches by itself."""
-    call = Call(problem, using, None, SHORT.expansions)
-    guide = Memory(experience).guide(call, also=new)
+    memory = Memory(experience)
+    call = Call(problem, memory.warmed(using), None, SHORT.expansions)
+    guide = memory.guide(call, also=new)
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)
@@ -267,7 +268,7 @@ def chosen(
     later = grounds(steps)
     lesson = Lesson()
     for number, ground in enumerate(later):
-        open_ = guide.open()
+        open_ = guide.open() if problem.domain.behaviors[ground[0]].level == guide.first else {}
         ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
         tried_ = list(guide.every(ready)) or list(guide.every(open_))
         done = [c for c in tried_ if c.ground == ground]
