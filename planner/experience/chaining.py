@@ -201,11 +201,11 @@ class Chains:
     def distance(self, level: int, goal: Goal, everybody: bool, most: float = FARTHEST) -> float:
         """Return how long a chain to a goal is at least; infinity if there is none, or a longer one."""
         for n in range(int(min(most, FARTHEST)) + 1):
-            self.cut, self.seen = False, set()
+            self.cut, self.seen, before = False, set(), len(self.near)
             if self.within(level, goal, n, everybody):
                 return n
-            if not self.cut:  # nothing of what was looked at can be reached by a chain of any length
-                self.beyond.update(dict.fromkeys(self.seen, inf))
+            if not self.cut and len(self.near) == before:  # what was looked at can be reached by a chain of no length
+                self.beyond.update((key, inf) for key in self.seen if key not in self.near)
                 return inf
         return inf
 
@@ -329,7 +329,7 @@ class Chains:
 
         Without steps the table may be changed.
         """
-        call, steps, ground = self.call, list[RefinedStep](), way.ground
+        call, steps = self.call, list[RefinedStep]()
         asks = self.achievers[way.rule.name].soft
         for _ in range(2 * len(asks) + 1):
             if not way.unmet:
@@ -344,14 +344,15 @@ class Chains:
             if done is None:
                 return None
             steps += done
-            if self.brings(ground, above[-1]):
+            if self.brings(way.ground, above[-1]):
                 break
-            same = self.same(level, way, ground, above[-1])
+            same = self.same(level, way, above[-1])
             if same is None:
                 return steps
             way = same
         else:
             return None
+        ground = way.ground
         if budget.left <= 0 or call.segments.forward[ground[0]](*ground[1]) is None:
             return None
         budget.left -= 1
@@ -396,7 +397,7 @@ class Chains:
             steps += done
             wants = [want for want in wants if not self.met(want)]
         for goal, way in ways:
-            now = self.same(level, way, way.ground, goal)
+            now = self.same(level, way, goal)
             done = self.go(level, now, Budget(SLACK), (goal,)) if now is not None else None
             if done is None:
                 return None
@@ -430,10 +431,11 @@ class Chains:
         self.found.clear()
         self.picked.clear()
 
-    def same(self, level: int, way: Candidate, ground: Ground, goal: Goal) -> Candidate | None:
-        """Return the way to do the same step by the same rule that lacks least now."""
-        now = (w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule and w.ground == ground)
-        return min(now, key=lambda w: len(w.unmet), default=None)
+    def same(self, level: int, way: Candidate, goal: Goal) -> Candidate | None:
+        """Return the way by the same rule that lacks least now: to the same step, or to one that lacks no more than before."""
+        now = (w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule)
+        now = (w for w in now if w.ground == way.ground or len(w.unmet) <= len(way.unmet))
+        return min(now, key=lambda w: (len(w.unmet), w.ground != way.ground), default=None)
 
     def mend(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
         """Bring about the next of the conditions that a way lacks."""

@@ -128,7 +128,16 @@ class _Join:
         if others:
             found.append(f"{written(role)} not in {tuple_written(map(written, others))}")
         self.bound.add(role)
-        return found + self.ready()
+        return found + self.ready() + self.ahead(role)
+
+    def ahead(self, role: str) -> list[str]:
+        """Return tests for whether somebody stands in each static relation to who fills a role, of those who aren't known yet."""
+        found = []
+        for c in self.hard:
+            if isinstance(c, RelationCondition) and not c.negated and role in c.arguments:
+                for other in sorted(others := _variables(c.arguments) - self.bound)[:1]:
+                    found.append(self.writer.adjacent(c.relation, c.arguments, other, others)[0])
+        return found
 
     def ready(self) -> list[str]:
         """Return tests for what must hold and speaks of nobody who isn't known yet, once."""

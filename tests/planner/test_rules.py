@@ -532,3 +532,44 @@ def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: P
     (goal,) = guide.open().items()
     # To press a cheese needs it in a mould, which is needed for salting it, too, and was found one rule nearer.
     assert guide.chains.far(guide.first, goal) == 6
+
+
+LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing place room - object lorry crate - thing)
+(:predicates (at ?t - thing ?p - place) (in ?c - crate ?l - lorry) (road ?a ?b - place) (free ?l - lorry ?r - room)
+ (less ?a ?b - room))
+(:action drive :parameters (?l - lorry ?a ?b - place) :precondition (and (at ?l ?a) (road ?a ?b))
+ :effect (and (not (at ?l ?a)) (at ?l ?b)))
+(:action load :parameters (?l - lorry ?p - place ?c - crate ?a ?b - room)
+ :precondition (and (at ?l ?p) (at ?c ?p) (less ?a ?b) (free ?l ?b))
+ :effect (and (not (at ?c ?p)) (in ?c ?l) (free ?l ?a) (not (free ?l ?b))))
+(:action unload :parameters (?l - lorry ?p - place ?c - crate ?a ?b - room)
+ :precondition (and (at ?l ?p) (in ?c ?l) (less ?a ?b) (free ?l ?a))
+ :effect (and (not (in ?c ?l)) (at ?c ?p) (free ?l ?b) (not (free ?l ?a)))))"""
+
+
+def lorries(folder: Path, lorries: int, crates: int, places: int) -> Problem:
+    """Return crates to carry along a road by lorries that have room for two."""
+    (folder / "domain.pddl").write_text(LORRY)
+    road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(places - 1))
+    at = " ".join(f"(at c{i} p{i % places})" for i in range(crates))
+    there = " ".join(f"(at l{i} p{i % places}) (free l{i} r2)" for i in range(lorries))
+    many = ("place", places), ("crate", crates), ("lorry", lorries), ("room", 3)
+    typed = " ".join(f"{' '.join(f'{kind[0]}{i}' for i in range(n))} - {kind}" for kind, n in many)
+    goal = " ".join(f"(at c{i} p{(i * 3 + 1) % places})" for i in range(crates))
+    text = f"""(define (problem p) (:domain lorry) (:objects {typed})
+     (:init {road} {at} {there} (less r0 r1) (less r1 r2)) (:goal (and {goal})))"""
+    (folder / "problem.pddl").write_text(text)
+    return imported(parse_files(folder / "domain.pddl", folder / "problem.pddl")).problem
+
+
+def test_who_no_longer_fits_once_the_rest_is_brought_about_is_changed_for_who_does(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    for crates, places in ((1, 3), (2, 4), (3, 4)):
+        teach(experience, lorries(tmp_path, 1, crates, places))
+    large = lorries(tmp_path, 3, 40, 12)
+    outcome = plan(large, Memory(experience), improve=0)
+    assert outcome.plan is not None
+    assert validate(large, outcome.plan) == []
+    assert expanded(outcome) == len(
+        outcome.plan.steps
+    )  # what is free of a lorry when it is there isn't what was free before
