@@ -128,6 +128,23 @@ def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Chang
     return done
 
 
+def on_one_level(steps: Sequence[Step]) -> list[Step]:
+    """Return steps, in the place of those above the lowest level their refinement: they don't see all that it changes."""
+    found, lowest = list(steps), max((step.level for step in steps), default=0)
+    while any(step.level < lowest for step in found):
+        found = [inner for step in found for inner in (step.steps if step.level < lowest else (step,))]
+        lowest = max((step.level for step in found), default=0)
+    return found
+
+
+def carry_out(call: Call, step: Step) -> None:
+    """Do a step by its refinement, which changes what the step doesn't see."""
+    for inner in step.steps:
+        carry_out(call, inner)
+    if not step.steps:
+        call.segments.apply(changes(call, (step.behavior, step.arguments))[1])
+
+
 def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
     """Return a lesson with what its own rules show on it, where there were none before: that is all that they have shown."""
     if not rules_in(experience):
@@ -179,7 +196,7 @@ def learned(
 
 def shows(problem: Problem, plan: Plan, using: Compiled) -> Lesson:
     """Return the rules and orders of a plan's steps, and those of their refinements with the methods."""
-    course = Course(problem, grounds(plan.steps))
+    course = Course(problem, grounds(on_one_level(plan.steps)))
     lesson = Lesson(said=list(course.rules_of()))
     lesson.counted += [(order, ITSELF, CHOSEN) for order in course.orders()]
     lesson += refined(Call(problem, using, None, SHORT.expansions), plan.steps)
@@ -276,7 +293,7 @@ def chosen(
             rest = set(later[number + 1 :])
             passed = {c.ground: c for c in tried_ if c.ground != ground and c.ground not in rest}
             lesson += compared(view, done, list(passed.values()))
-        call.segments.apply(changes(call, ground)[1])
+        carry_out(call, steps[number])
     return lesson
 
 
@@ -320,8 +337,8 @@ def in_vain(
     """
     call = Call(problem, using, None, SHORT.expansions)
     guide = Memory(experience).guide(call)
-    for ground in grounds(before):
-        call.segments.apply(changes(call, ground)[1])
+    for earlier in before:
+        carry_out(call, earlier)
     view = View(using.program, call.table, call.goal)
     lesson = Lesson()
     wanted = (step.behavior, step.arguments)
@@ -337,8 +354,8 @@ def in_vain(
         who = [(method, fact, FAILED) for fact in fillers(method, roles, problem)]
         lesson.personal += who
         lesson.counted += [] if who else [(method, ITSELF, FAILED)]  # others might have done it in the same way
-        for earlier in grounds(step.steps[:number]):
+        for earlier in step.steps[:number]:
             with suppress(LearningError):
-                call.segments.apply(changes(call, earlier)[1])
+                carry_out(call, earlier)
         step = step.steps[number]
     return lesson

@@ -573,3 +573,15 @@ def test_who_no_longer_fits_once_the_rest_is_brought_about_is_changed_for_who_do
     assert expanded(outcome) == len(
         outcome.plan.steps
     )  # what is free of a lorry when it is there isn't what was free before
+
+
+def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_see_where_the_van_is() -> None:
+    within = van().problem
+    whole = fast.plan(within, improve=0).plan
+    assert whole is not None
+    first, *rest = whole.steps
+    mixed = Plan((first, *(inner for step in rest for inner in step.steps)))
+    assert validate(within, mixed) == []
+    experience = Experience("robot")
+    live(experience, within, mixed)  # the second parcel is loaded where the refinement of the first step left the van
+    assert min(within.domain.behaviors[rule.does[0]].level for rule in rules_in(experience)) == 2
