@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 from planner.experience.chaining import Candidate
 from planner.experience.evidence import Judge, View, fillers
@@ -24,7 +24,7 @@ from planner.experience.matching import Bind
 from planner.hierarchical import planner as fast
 from planner.hierarchical.refinement_cache import Roles, Template
 from planner.hierarchical.serialization import Call, Compiled
-from planner.plan import Limits, Outcome
+from planner.plan import Limits, Outcome, paused_collection
 from reasoner.amounts import meets
 from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
 from reasoner.symbols import Problem
@@ -94,10 +94,10 @@ class Memory:
         self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
     ) -> Guide:
         """Return rules bound to a call, with what says which of them is cogent, and whom to take; `joins` as for `Guide`."""
-        view = View(call.program, call.table, call.goal)
+        view = cache(lambda: View(call.program, call.table, call.goal))
 
         def score(c: Candidate) -> float:
-            return self.judge.told(view, c.rule, c.roles)
+            return self.judge.told(view(), c.rule, c.roles)
 
         def ranked(behavior: str, template: Template, ways: list[Roles]) -> list[Roles]:
             method = Method(behavior, len(ways[0]) - len(template.open), template.steps, template.open)
@@ -168,11 +168,13 @@ def plan(
     """
     if memory is None or not memory.leads(problem, mode):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
-    using = using or fast.compiled(problem)
     joins: dict[str, Bind | None] = {}
 
     def advised(call: Call) -> None:
         call.advise(memory.guide(call, mode, joins))
 
-    warm = memory.warmed(using)
-    return fast.plan(problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised)
+    with paused_collection():
+        warm = memory.warmed(using or fast.compiled(problem))
+        return fast.plan(
+            problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised
+        )

@@ -22,6 +22,7 @@ from planner.experience.matching import Bind, Find, finder, soft
 from planner.hierarchical.operators import FEW, Achiever
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
+from planner.hierarchical.symmetry import representatives
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets, number, towards
 from reasoner.memory.experience import Ground, Rule
@@ -106,7 +107,7 @@ class Chains:
         self.near: dict[tuple[int, Cell, str, bool], int] = {}
         self.beyond: dict[tuple[int, Cell, str, bool], float] = {}
         """How long chains may be that lead to a goal, and how long they may not."""
-        self.picked: dict[int, Sequence[str]] = {}
+        self.picked: dict[tuple[int, str], Sequence[str]] = {}
         self.lacking: dict[tuple[int, int], tuple[Candidate, list[Goal]]] = {}
         self.seen: set[tuple[int, Cell, str, bool]] = set()
         self.needed: list[dict[Cell, str]] = []
@@ -163,15 +164,17 @@ class Chains:
             value = towards(self.call.table.now[cell[0]].get(cell[1]), value)
         return find(*arguments_of(cell[1]), value, everybody) if find is not None else iter(())
 
-    def pick(self, candidates: tuple[str, ...]) -> Sequence[str]:
-        """Return of many candidates one of each sort and state."""
+    def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
+        """Return of many candidates for the value of a situation type one of each sort and state, of free ones."""
         self.spent += 1 + len(candidates)
-        found = self.picked.get(id(candidates))
+        found = self.picked.get((id(candidates), situation))
         if found is None:
-            alike, now = self.call.program.alike, self.call.table.now
-            free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
-            found = free if len(free) <= FEW else alike.unlike(free, (), now)
-            self.picked[id(candidates)] = found
+            alike, table, wanted = self.call.program.alike, self.call.table, self.call.segments.wants.wanted
+            found = free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
+            if len(free) > FEW:
+                first = representatives(alike.groups(free), table.who.get(situation, {}), wanted.get(situation, {}))
+                found = alike.unlike(free, first, table.now)
+            self.picked[id(candidates), situation] = found
         return found
 
     def lacks(self, level: int, way: Candidate, number: int) -> list[Goal]:
@@ -198,9 +201,9 @@ class Chains:
 
     # --------------------------------------------------------------------------------------------------------- distance
 
-    def distance(self, level: int, goal: Goal, everybody: bool, most: float = FARTHEST) -> float:
+    def distance(self, level: int, goal: Goal, everybody: bool) -> float:
         """Return how long a chain to a goal is at least; infinity if there is none, or a longer one."""
-        for n in range(int(min(most, FARTHEST)) + 1):
+        for n in range(FARTHEST + 1):
             self.cut, self.seen, before = False, set(), len(self.near)
             if self.within(level, goal, n, everybody):
                 return n
@@ -237,33 +240,30 @@ class Chains:
         lacks = self.lacks(level, way, number)
         return any(self.within(level, goal, most, everybody) for goal in lacks) if lacks else most > 0
 
-    def nearest(self, level: int, goal: Goal, below: float = inf) -> list[tuple[float, Candidate]]:
-        """Return the nearest ways to a goal, each with its distance, the best first."""
+    def nearest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[float, Candidate]]:
+        """Yield the nearest ways to a goal, each with its distance, the best first; a farther one is looked for when asked."""
+        found = 0
         for everybody in (False, True):
             most = self.distance(level, goal, everybody)
-            left, ways = self.ways(level, goal, everybody) if most < inf else [], list[tuple[float, Candidate]]()
+            left = self.ways(level, goal, everybody) if most < inf and not found else []
             for far in range(int(most), int(min(most + SLACK + 1, below))) if left else ():
                 near = [way for way in left if all(self.mended(level, way, n, far - 1, everybody) for n in way.unmet)]
-                ways += [(far, way) for way in near]
-                if len(ways) >= TRIES:
-                    break
                 left = [way for way in left if way not in near]
-            if ways:
-                return self.best(level, ways)
-        return []
+                for way in islice(self.best(level, near), TRIES - found):
+                    yield far, way
+                found += len(near)
+                if found >= TRIES:
+                    return
 
-    def best(self, level: int, ways: list[tuple[float, Candidate]]) -> list[tuple[float, Candidate]]:
-        """Return the first few of the ways in the order in which to try them."""
-        groups: dict[tuple[float, int, int], list[Candidate]] = {}
-        for cost, way in ways:
-            groups.setdefault((cost, self.spoils(level, way), len(way.unmet)), []).append(way)
-        found: list[tuple[float, Candidate]] = []
-        for (cost, *_), group in sorted(groups.items()):
-            if len(found) < TRIES:
-                if self.score is not None and len(group) > 1:
-                    group.sort(key=self.score, reverse=True)
-                found += [(cost, way) for way in group]
-        return found[:TRIES]
+    def best(self, level: int, ways: Sequence[Candidate]) -> Iterator[Candidate]:
+        """Yield ways that are equally near in the order in which to try them."""
+        groups: dict[tuple[int, int], list[Candidate]] = {}
+        for way in ways:
+            groups.setdefault((self.spoils(level, way) if len(ways) > 1 else 0, len(way.unmet)), []).append(way)
+        for _, group in sorted(groups.items()):
+            if self.score is not None and len(group) > 1:
+                group.sort(key=self.score, reverse=True)
+            yield from group
 
     def spoils(self, level: int, way: Candidate) -> int:
         """Return how many changes by a way, or changes that it lacks, would spoil what is kept or was brought about for others."""
@@ -291,7 +291,7 @@ class Chains:
             return None
         table, off = self.call.table, self.off(goal)
         for cost, way in self.nearest(level, goal, below):
-            if cost == inf or budget.left <= 0:
+            if budget.left <= 0:
                 return None
             mark, left = len(table.trail), budget.left
             steps = self.go(level, way, budget, (*above, goal))
@@ -378,11 +378,11 @@ class Chains:
         ways, steps = list[tuple[Goal, Candidate]](), list[RefinedStep]()
         try:
             for goal in goals:
-                found = self.nearest(level, goal)
-                if not found:
+                found = next(self.nearest(level, goal), None)
+                if found is None:
                     return None
-                ways.append((goal, found[0][1]))
-                self.take(self.taken | used_up(found[0][1], self.call.program.problem))
+                ways.append((goal, found[1]))
+                self.take(self.taken | used_up(found[1], self.call.program.problem))
         finally:
             self.take(frozenset())
         lacks = (self.lacks(level, way, n) for _, way in ways for n in way.unmet)
@@ -406,24 +406,14 @@ class Chains:
 
     def first(self, level: int, wants: Sequence[Goal]) -> Steps | None:
         """Bring about the nearest of some wants after which those about as near are within reach."""
-        table = self.call.table
-        for far, want in self.by_distance(level, wants):
-            beside = [g for g in wants if g != want and self.distance(level, g, False, far + SLACK) < inf]
-            mark, done = len(table.trail), self.attain(level, want, Budget(far + SLACK))
+        table, far = self.call.table, {want: self.far(level, want) for want in wants}
+        for want in sorted((want for want in wants if far[want] < inf), key=far.__getitem__):
+            beside = [other for other in wants if other != want and far[other] <= far[want] + SLACK]
+            mark, done = len(table.trail), self.attain(level, want, Budget(int(far[want]) + SLACK))
             if done and all(self.far(level, other) < inf for other in beside):
                 return done
             table.undo(mark)
         return None
-
-    def by_distance(self, level: int, wants: Sequence[Goal]) -> Iterator[tuple[int, Goal]]:
-        """Yield wants with their distances, the nearest first; those that nothing leads to are left out."""
-        left = list(wants)
-        for everybody in (False, True):
-            for n in range(FARTHEST + 1):
-                for want in list(left):
-                    if self.within(level, want, n, everybody):
-                        left.remove(want)
-                        yield n, want
 
     def take(self, taken: frozenset[str]) -> None:
         """Let nobody be looked for who is taken."""

@@ -108,7 +108,7 @@ class View:
             keys = holders.get(who)
             if not keys:
                 return "nobody"
-            return next((named[key][1:] for key in keys if isinstance(key, str) and key in named), "somebody")
+            return next((role[1:] for one, role in named.items() if one in keys), "somebody")
 
         return answer
 

@@ -204,7 +204,7 @@ class Guide:
         closed: dict[Cell, int] = {}
         steps: list[RefinedStep] = []
         while off:
-            before = _before(off, self.orders, self.call.program)
+            before = _before(off, self.orders, self.call.program) if len(off) > 1 else {}
             among = sorted(
                 (sum(other in off for other in before.get(g[0], ())), -self.chains.far(level, g), i, g)
                 for i, g in enumerate(off.items())

@@ -19,8 +19,8 @@ from reasoner.symbols import Comparison, Condition, Problem, RelationCondition, 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
 """Given a goal's arguments and value, and whether everybody is asked for, yields individuals for the roles, and what is unmet."""
 
-Pick: TypeAlias = "Callable[[tuple[str, ...]], Sequence[str]]"
-"""Returns one of each sort, of many individuals."""
+Pick: TypeAlias = "Callable[[tuple[str, ...], str], Sequence[str]]"
+"""Returns one of each sort, of many individuals, free ones first where they are to be values of a situation type."""
 Bind: TypeAlias = "Callable[[Table, Pick], Find]"
 
 DEEPEST = 18
@@ -101,7 +101,9 @@ class _Join:
             )
             name, indent = written(role), "    " * (depth + 1)
             tests = " and ".join(self.tests(role))
-            picked = f"[{name} for {name} in pick({others[1]}) if {tests}]"
+            asked = (c for c in (rule.goal, *self.soft) if isinstance(c, ValueCondition) and c.value == role)
+            of = next((c.situation for c in asked), "")
+            picked = f"[{name} for {name} in pick({others[1]}, {of!r}) if {tests}]"
             if now:
                 lines.append(f"{indent}found = [{name} for {name} in dict.fromkeys([{', '.join(now)}]) if {tests}]")
                 lines.append(f"{indent}if everybody or not found: found = list(dict.fromkeys(found + {picked}))")

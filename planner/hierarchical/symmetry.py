@@ -47,6 +47,9 @@ class Alike:
             self.members.setdefault(number, []).append(individual)
         self._groups: dict[tuple[str, ...], list[list[str]]] = {}
         self._named = frozenset(named)
+        of = {s.name: s.arguments for s in problem.domain.situations.values()}
+        self._whose = {name: problem.members(kinds[0]) for name, kinds in of.items() if len(kinds) == 1}
+        """Of whom a situation type says something."""
 
     def groups(self, members: tuple[str, ...]) -> list[list[str]]:
         """Return `members` grouped by likeness, in their order."""
@@ -70,17 +73,20 @@ class Alike:
             if len(group) == 1:
                 found += group if sort not in sorts else ()
                 continue
-            seen = {self._state(one, now) for one in known if self.sort.get(one) == sort}
+            cells = [its for name, its in now.items() if group[0] in self._whose.get(name, ())]
+            seen = {self._state(one, cells) for one in known if self.sort.get(one) == sort}
+            if seen and not cells:
+                continue
             for one in group if len(group) <= 2 * ENDS else (*group[:ENDS], *group[-ENDS:]):
-                state = self._state(one, now)
+                state = self._state(one, cells)
                 if state not in seen:
                     seen.add(state)
                     found.append(one)
         return found
 
-    def _state(self, one: str, now: Mapping[str, Mapping[Key, str]]) -> tuple[str | None, ...]:
+    def _state(self, one: str, cells: Sequence[Mapping[Key, str]]) -> tuple[str | None, ...]:
         """Return the values of an individual, as far as behaviours mention them."""
-        values = (cells.get(one) for cells in now.values())
+        values = [its.get(one) for its in cells]
         return tuple([value if value in self._named else None for value in values])
 
 

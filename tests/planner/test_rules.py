@@ -1,5 +1,6 @@
 """Experience becomes rules: they lead in larger worlds and never spoil; what was never seen is treated as its like."""
 
+import gc
 import random
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +17,10 @@ from planner.grounded.task import Task
 from planner.hierarchical import planner as fast
 from planner.hierarchical import recovery
 from planner.hierarchical.operators import Program
-from planner.hierarchical.serialization import Call, compiled
+from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.hierarchical.subplans import EXPANSION
 from planner.plan import Outcome, Plan, Reason, Status, Step
+from planner.transitions import Cell
 from planner.validation import validate
 from reasoner.amounts import LESS, MORE
 from reasoner.language import terms
@@ -382,6 +384,48 @@ def test_one_lesson_carries_a_world_five_times_as_large(world: str) -> None:
     assert led.plan is not None
     assert validate(large, led.plan) == []
     assert expanded(led) <= 1.1 * led.plan.length[1]
+
+
+def test_where_anything_would_do_rules_take_what_nobody_has_and_no_goal_wants() -> None:
+    for family, n in (("swap", 20), ("swap", 40), ("rotate", 40)):
+        within = problem(family, n, 5000)
+        alone, led = fast.plan(within, improve=0), plan(within, taught(FAMILIES), improve=0)
+        assert alone.plan is not None
+        assert led.plan is not None
+        assert len(led.plan.steps) <= len(alone.plan.steps)
+
+
+def test_a_farther_way_is_looked_for_when_the_nearer_ones_are_none() -> None:
+    within = confab.load("packing-large").problem
+    experience = Experience("robot")
+    teach(experience, confab.load("packing-small").problem)
+    call = Call(within, compiled(within), None, 1000)
+    chains, goals = Memory(experience).guide(call).chains, list(Memory(experience).guide(call).open().items())
+    asked, within_ = [0], chains.within
+
+    def counted(level: int, goal: tuple[Cell, str], most: int, everybody: bool) -> bool:
+        asked[0] += 1
+        return within_(level, goal, most, everybody)
+
+    chains.within = counted  # type: ignore[method-assign]
+    ways = [chains.nearest(1, goal) for goal in goals]
+    found = [next(its, None) for its in ways]
+    once = asked[0]
+    assert all(found)
+    assert all(far >= first[0] for first, its in zip(found, ways, strict=True) if first for far, _ in its)
+    assert asked[0] > 2 * once
+
+
+def test_nothing_is_collected_while_a_call_with_memory_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    enabled = []
+
+    def watched(problem: Problem) -> Compiled:
+        enabled.append(gc.isenabled())
+        return compiled(problem)
+
+    monkeypatch.setattr(fast, "compiled", watched)
+    assert plan(problem("served", 4, 1), taught()).plan is not None
+    assert enabled == [False]
 
 
 def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
