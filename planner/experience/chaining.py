@@ -344,8 +344,6 @@ class Chains:
             if done is None:
                 return None
             steps += done
-            if self.brings(way.ground, above[-1]):
-                break
             same = self.same(level, way, above[-1])
             if same is None:
                 return steps
@@ -363,11 +361,6 @@ class Chains:
             DONE if step is not None else call.segments.effort - effort
         )  # a refinement that was searched in vain counts
         return None if step is None else [*steps, step]
-
-    def brings(self, ground: Ground, goal: Goal) -> bool:
-        """Whether a step can be done now and brings a goal about."""
-        done = self.call.segments.forward[ground[0]](*ground[1])
-        return done is not None and (*goal[0], goal[1]) in done[1]
 
     def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
         """Do steps that lead to goals of which none can be reached after the others: what their last steps ask comes first.
@@ -422,10 +415,12 @@ class Chains:
         self.picked.clear()
 
     def same(self, level: int, way: Candidate, goal: Goal) -> Candidate | None:
-        """Return the way by the same rule that lacks least now: to the same step, or to one that lacks no more than before."""
-        now = (w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule)
-        now = (w for w in now if w.ground == way.ground or len(w.unmet) <= len(way.unmet))
-        return min(now, key=lambda w: (len(w.unmet), w.ground != way.ground), default=None)
+        """Return the way by the same rule to go on with: to the same step while it lacks less and less, else what lacks least."""
+        now = [w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule]
+        own = [w for w in now if w.ground == way.ground]
+        nearer = [w for w in own if len(w.unmet) < len(way.unmet)]
+        others = [w for w in now if len(w.unmet) <= len(way.unmet)]
+        return min(nearer or [*own, *others], key=lambda w: (len(w.unmet), w.ground != way.ground), default=None)
 
     def mend(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
         """Bring about the next of the conditions that a way lacks."""
