@@ -535,12 +535,13 @@ DAIRY = """(define (domain dairy) (:requirements :strips :typing :derived-predic
  :effect (and (not (in ?c ?m)) (not (full ?m)) (salted ?c))))"""
 
 
-def dairy(folder: Path, orders: int, each: int) -> Problem:
+def dairy(folder: Path, orders: int, each: int, moulds: int = 1, domain: str = DAIRY) -> Problem:
     """Return orders that are ready when none of their cheeses is without salt."""
-    (folder / "domain.pddl").write_text(DAIRY)
+    (folder / "domain.pddl").write_text(domain)
     part = " ".join(f"(part c{o}_{i} o{o})" for o in range(orders) for i in range(each))
     cheeses = " ".join(f"c{o}_{i}" for o in range(orders) for i in range(each))
-    objects = f"{' '.join(f'o{o}' for o in range(orders))} - order {cheeses} - cheese m0 - mould"
+    many = " ".join(f"m{i}" for i in range(moulds))
+    objects = f"{' '.join(f'o{o}' for o in range(orders))} - order {cheeses} - cheese {many} - mould"
     goal = " ".join(f"(ready o{o})" for o in range(orders))
     text = f"(define (problem p) (:domain dairy) (:objects {objects}) (:init {part}) (:goal (and {goal})))"
     (folder / "problem.pddl").write_text(text)
@@ -629,3 +630,17 @@ def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_s
     experience = Experience("robot")
     live(experience, within, mixed)  # the second parcel is loaded where the refinement of the first step left the van
     assert min(within.domain.behaviors[rule.does[0]].level for rule in rules_in(experience)) == 2
+
+
+def test_a_way_is_not_changed_for_one_that_lacks_less_but_is_out_of_reach(tmp_path: Path) -> None:
+    turn, brine = (f"(:action {name} :parameters (?c - cheese) :effect ({name}ed ?c))" for name in ("turn", "brin"))
+    stays = DAIRY.replace("(and (not (in ?c ?m)) (not (full ?m)) (salted ?c))", "(salted ?c)")
+    stays = stays.replace("(and (in ?c ?m) (pressed ?c))", "(and (in ?c ?m) (pressed ?c) (turned ?c) (brined ?c))")
+    stays = stays.replace("(:action salt", f"{turn} {brine} (:action salt")
+    stays = stays.replace("(rinsed)", "(turned ?c - cheese) (brined ?c - cheese) (rinsed)", 1)
+    experience = Experience("robot")
+    teach(experience, dairy(tmp_path, 1, 2, 2, stays))
+    large = dairy(tmp_path, 2, 4, 8, stays)
+    outcome = plan(large, Memory(experience), improve=0)
+    assert outcome.plan is not None
+    assert expanded(outcome) == len(outcome.plan.steps)  # what was salted lacks but one thing: that it isn't
