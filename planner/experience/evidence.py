@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import log
 from typing import TypeAlias
 
@@ -26,7 +27,10 @@ DECAY = 0.9
 """What a case counts for when the next one came."""
 CROWD = 4
 """In roles of classes with at most so many members somebody himself may be preferred."""
-Reader: TypeAlias = "Callable[[tuple[str, ...]], list[Fact]]"
+Named: TypeAlias = "Mapping[str, str]"
+"""The roles that individuals fill."""
+Answer: TypeAlias = "Callable[[str, Named], str]"
+"""Says of somebody in a role what is asked."""
 
 
 class View:
@@ -39,7 +43,7 @@ class View:
         self.wanters: dict[tuple[str, str], list[Cell]] = {}
         for cell, value in goal.items():
             self.wanters.setdefault((cell[0], value), []).append(cell)
-        self._plans: dict[tuple[str, bool], list[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]] = {}
+        self._plans: dict[tuple[str, bool], list[tuple[int, str, Answer]]] = {}
 
     def facts(self, rule: Rule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
         """Return the facts about the individuals in a rule's roles, or those of them of which something is asked."""
@@ -59,77 +63,53 @@ class View:
             if 1 < len(members(kind)) <= CROWD
         ]
 
-    def _questions(self, rule: Rule) -> Iterator[tuple[int, str, Callable[[str, Mapping[str, str]], str]]]:
+    def _questions(self, rule: Rule) -> Iterator[tuple[int, str, Answer]]:
         members, situations = self.problem.members, self.problem.domain.situations.values()
         for i, (role, kind) in enumerate(rule.kinds):
             here, name = members(kind), role[1:]
             for other in self.kinds:
-                among = members(other)
-                if not here <= among and not here.isdisjoint(among):
-                    yield i, f"{name} is a {other}", lambda who, _, among=among: "yes" if who in among else "no"  # type: ignore[misc]
+                if not here <= members(other) and not here.isdisjoint(members(other)):
+                    yield i, f"{name} is a {other}", partial(self._belongs, members(other))
             for s in situations:
                 if len(s.arguments) == 1 and not here.isdisjoint(members(s.arguments[0])):
-                    yield i, f"{s.name} of {name}", self._value(s.name)
-                    yield i, f"wanted {s.name} of {name}", self._wanted(s.name)
+                    yield i, f"{s.name} of {name}", partial(self._value, s.name)
+                    yield i, f"wanted {s.name} of {name}", partial(self._wanted, s.name)
                 if not s.boolean and len(s.arguments) == 1 and not here.isdisjoint(members(s.range)):
-                    yield i, f"who has {name} as {s.name}", self._holders(s.name)
-                    yield i, f"who wants {name} as {s.name}", self._wanting(s.name, rule)
+                    own = rule.goal.arguments if rule.goal.situation == s.name else ()
+                    yield i, f"who has {name} as {s.name}", partial(self._holders, s.name)
+                    yield i, f"who wants {name} as {s.name}", partial(self._wanting, s.name, own)
             for relation, rows in self.problem.relations.items():
-                ends = next(iter(rows), ())
-                if len(ends) == 2:
+                if len(next(iter(rows), ())) == 2:
                     for j, (other, of) in enumerate(rule.kinds):
                         if j != i and any(a in here and b in members(of) for a, b in rows):
-                            yield i, f"{name} {relation} {other[1:]}", self._tied(rows, other)
+                            yield i, f"{name} {relation} {other[1:]}", partial(self._tied, rows, other)
 
-    def _value(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
-        now = self.table.now[situation]
+    def _belongs(self, among: Container[str], who: str, _: Named) -> str:
+        return "yes" if who in among else "no"
 
-        def answer(who: str, named: Mapping[str, str]) -> str:
-            value = now.get(who)
-            if value is None:
-                return "none"
-            return value if value in self.constants else named.get(value, "?another")[1:]
+    def _value(self, situation: str, who: str, named: Named) -> str:
+        value = self.table.now[situation].get(who, "none")
+        return value if value == "none" or value in self.constants else named.get(value, "?another")[1:]
 
-        return answer
+    def _wanted(self, situation: str, who: str, _: Named) -> str:
+        wanted = self.goal.get((situation, who))
+        if wanted is None:
+            return "nothing"
+        return "as it is" if self.table.now[situation].get(who, FALSE) == wanted else "not yet"
 
-    def _wanted(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
-        now, goal = self.table.now[situation], self.goal
-
-        def answer(who: str, _: Mapping[str, str]) -> str:
-            wanted = goal.get((situation, who))
-            return "nothing" if wanted is None else "as it is" if now.get(who, FALSE) == wanted else "not yet"
-
-        return answer
-
-    def _holders(self, situation: str) -> Callable[[str, Mapping[str, str]], str]:
-        holders = self.table.who[situation]
-
-        def answer(who: str, named: Mapping[str, str]) -> str:
-            keys = holders.get(who)
-            if not keys:
-                return "nobody"
-            return next((role[1:] for one, role in named.items() if one in keys), "somebody")
-
-        return answer
-
-    def _wanting(self, situation: str, rule: Rule) -> Callable[[str, Mapping[str, str]], str]:
-        now, wanters = self.table.now[situation], self.wanters
-        own = rule.goal.arguments if rule.goal.situation == situation else ()
-
-        def answer(who: str, named: Mapping[str, str]) -> str:
-            mine = {individual for individual, role in named.items() if role in own}
-            for _, key in wanters.get((situation, who), ()):
-                if now.get(key, FALSE) != who and key not in mine:
-                    return "somebody"
+    def _holders(self, situation: str, who: str, named: Named) -> str:
+        keys = self.table.who[situation].get(who)
+        if not keys:
             return "nobody"
+        return next((named[key][1:] for key in keys if isinstance(key, str) and key in named), "somebody")
 
-        return answer
+    def _wanting(self, situation: str, own: Container[str], who: str, named: Named) -> str:
+        now, wanters = self.table.now[situation], self.wanters.get((situation, who), ())
+        others = (key for _, key in wanters if not isinstance(key, str) or named.get(key) not in own)
+        return "somebody" if any(now.get(key, FALSE) != who for key in others) else "nobody"
 
-    def _tied(self, rows: frozenset[tuple[str, ...]], other: str) -> Callable[[str, Mapping[str, str]], str]:
-        def answer(who: str, named: Mapping[str, str]) -> str:
-            return "yes" if any(role == other and (who, end) in rows for end, role in named.items()) else "no"
-
-        return answer
+    def _tied(self, rows: Container[tuple[str, ...]], other: str, who: str, named: Named) -> str:
+        return "yes" if any(role == other and (who, end) in rows for end, role in named.items()) else "no"
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
