@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.accepting import AnyPlan, plan_of
-from confab.lifted import Sayings
 from confab.table import Table
 from planner.paper.learning import LearningError
 from planner.paper.learning import learn as learn_plan
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 
     from confab.known import Known
     from confab.labels import Labels
+    from confab.lifted import Sayings
     from planner.acting.episode import Episode
     from planner.experience.advice import Memory as Advisor
     from reasoner.symbols import Problem
@@ -281,6 +281,8 @@ class Memory:
 
     def sayings(self) -> Sayings:
         """Return what says in sentences what was learned."""
+        from confab.lifted import Sayings
+
         return Sayings(self.labels() if self.labels is not None else None)
 
     def advice(self, most: int | None = None) -> Table:

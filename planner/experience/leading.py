@@ -19,7 +19,6 @@ from typing import TypeAlias, TypeVar
 
 from planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
 from planner.experience.matching import Bind, known
-from planner.experience.regression import ordered
 from planner.hierarchical.operators import Program
 from planner.hierarchical.refinement_cache import RefinedStep, Roles, Template
 from planner.hierarchical.serialization import Call
@@ -92,7 +91,7 @@ class Guide:
     def sooner(self, first: Condition, then: Condition, env: Mapping[str, str]) -> bool:
         """Whether one condition is known to be brought about before another one."""
         one, other = fact(first, env), fact(then, env)
-        return one is not None and other is not None and ordered(one, other, self.constants) in self.orders
+        return one is not None and other is not None and Order.of(one, other, self.constants) in self.orders
 
     def open(self) -> dict[Cell, str]:
         """Return the goals of the call that don't hold now."""
@@ -285,6 +284,6 @@ def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program)
         for cell, terms in parts.items():
             if cell[0] == order.then:
                 for other in index.get(tuple(terms[j] for _, j in order.shared), ()):
-                    if other != cell and ordered(facts[other], facts[cell], constants) == order:
+                    if other != cell and Order.of(facts[other], facts[cell], constants) == order:
                         found.setdefault(cell, []).append(other)
     return found

@@ -337,7 +337,7 @@ class Course:
         """Yield for each two goals that were achieved one after the other which came first."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
-                yield ordered(first, then, self.constants)
+                yield Order.of(first, then, self.constants)
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
@@ -387,10 +387,3 @@ def ordered_inside(condition: Condition) -> Condition:
         groups = (tuple(sorted(map(ordered_inside, group), key=repr)) for group in condition.alternatives)
         return replace(condition, alternatives=tuple(sorted(groups, key=repr)))
     return condition
-
-
-def ordered(first: Fact, then: Fact, constants: frozenset[str] | set[str]) -> Order:
-    """Return the order of two goals, by what they share."""
-    one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
-    shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
-    return Order(first.symbol.situation, then.symbol.situation, tuple(shared))

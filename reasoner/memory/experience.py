@@ -23,6 +23,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 from reasoner.symbols import Condition, ValueCondition
+from reasoner.symbols import Fact as Goal
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its terms."""
@@ -84,6 +85,13 @@ class Order:
     def name(self) -> str:
         """The order's name."""
         return _named("order", (self.first, self.then, self.shared))
+
+    @classmethod
+    def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
+        """Return the order of two goals, by what they share."""
+        one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
+        shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
+        return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
 
     @property
     def reversed(self) -> Order:

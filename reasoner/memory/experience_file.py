@@ -57,8 +57,8 @@ COUNTS = re.compile(
 """Most of a file are such lines: lifted facts, or counts of a link. The rest, in any layout, is left to the Turtle parser."""
 
 
-PAPER = re.compile(r"^(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n", re.MULTILINE)
-"""The lines of the paper's links, which the paper's mode alone reads."""
+PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+)", re.MULTILINE)
+"""Lines of the paper's links, which the paper's mode alone reads; after small tables nearly all of a file."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,9 @@ class Lines:
 
 def lines(text: str) -> Lines:
     """Take a memory file apart."""
-    links, facts, rest, at = [], {}, [], 0
+    links, facts, rest, at = [], {}, list[str](), 0
+    parts = PAPER.split(text)
+    text = "".join(parts[::2])
     for match in COUNTS.finditer(text):
         if match.start() > at:
             rest.append(text[at : match.start()])
@@ -88,8 +90,7 @@ def lines(text: str) -> Lines:
             facts[fact] = asks, answer
         else:
             links.append((counter, about, Tally(*map(int, counts))))
-    text = "".join([*rest, text[at:]])
-    return Lines(links, facts, PAPER.sub("", text), "".join(PAPER.findall(text)))
+    return Lines(links, facts, "".join([*rest, text[at:]]), "".join(parts[1::2]))
 
 
 def new_replica() -> str:

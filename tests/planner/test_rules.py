@@ -2,6 +2,8 @@
 
 import gc
 import random
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -414,6 +416,11 @@ def test_a_farther_way_is_looked_for_when_the_nearer_ones_are_none() -> None:
     assert all(found)
     assert all(far >= first[0] for first, its in zip(found, ways, strict=True) if first for far, _ in its)
     assert asked[0] > 2 * once
+
+
+def test_who_only_follows_rules_does_not_load_how_they_are_learned() -> None:
+    text = "import sys, planner.experience.advice; print([m for m in sys.modules if m.endswith(('regression', 'lessons'))])"
+    assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_nothing_is_collected_while_a_call_with_memory_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
