@@ -26,7 +26,7 @@ from planner.hierarchical.symmetry import representatives
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets, number, towards
 from reasoner.memory.experience import Ground, Rule
-from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition
+from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, Witness
 
 WAYS, TRIES = 40, 3
 """So many ways to follow a rule are compared, and so many of the best of all rules tried."""
@@ -331,9 +331,12 @@ class Chains:
         """
         call, steps = self.call, list[RefinedStep]()
         asks = self.achievers[way.rule.name].soft
-        for _ in range(2 * len(asks) + 1):
-            if not way.unmet:
-                break
+        rounds, fewest = 2 * len(asks), inf
+        while way.unmet:
+            lacking = sum(len(self.lacks(level, way, n)) for n in way.unmet)
+            rounds, fewest = rounds - (lacking >= fewest), min(lacking, fewest)
+            if rounds < 0:
+                return None
             env = way.named
             facts = (fact(c, env) for i, c in enumerate(asks) if i not in way.unmet)
             self.needed.append(
@@ -348,8 +351,6 @@ class Chains:
             if same is None:
                 return steps
             way = same
-        else:
-            return None
         ground = way.ground
         if budget.left <= 0 or call.segments.forward[ground[0]](*ground[1]) is None:
             return None
@@ -440,9 +441,12 @@ class Chains:
         for *_, n, goals in sorted(found):
             lost = False
             for goal in goals[:TRIES]:
-                mark, done = len(table.trail), self.attain(level, goal, budget, above)
+                mark, left = len(table.trail), budget.left
+                done = self.attain(level, goal, budget, above)
                 if done is None:
                     continue
+                if isinstance(asks[n], Witness) and asks[n].negated:
+                    budget.left = left  # each whom it forbids has steps of its own
                 others = (its for *_, m, its in found if m != n)
                 if all(any(self.far(level, g) < inf for g in its) for its in others):
                     return done

@@ -651,3 +651,15 @@ def test_a_way_is_not_changed_for_one_that_lacks_less_but_is_out_of_reach(tmp_pa
     outcome = plan(large, Memory(experience), improve=0)
     assert outcome.plan is not None
     assert expanded(outcome) == len(outcome.plan.steps)  # what was salted lacks but one thing: that it isn't
+
+
+def test_each_of_all_of_whom_a_step_asks_something_has_steps_of_its_own(tmp_path: Path) -> None:
+    none = "(not (exists (?c - cheese) (and (part ?c ?o) (not (salted ?c)))))"
+    ship = f"(:action ship :parameters (?o - order) :precondition {none} :effect (ready ?o))"
+    shipped = DAIRY.replace(f"(:derived (ready ?o - order) {none})", ship)
+    experience = Experience("robot")
+    teach(experience, dairy(tmp_path, 1, 2, domain=shipped))
+    large = dairy(tmp_path, 2, 9, domain=shipped)
+    outcome = plan(large, Memory(experience), improve=0)
+    assert outcome.plan is not None
+    assert expanded(outcome) == len(outcome.plan.steps)
