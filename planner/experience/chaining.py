@@ -248,7 +248,8 @@ class Chains:
             left = self.ways(level, goal, everybody) if most < inf and not found else []
             for far in range(int(most), int(min(most + SLACK + 1, below))) if left else ():
                 near = [way for way in left if all(self.mended(level, way, n, far - 1, everybody) for n in way.unmet)]
-                left = [way for way in left if way not in near]
+                now = {*map(id, near)}  # two ways may be long to compare
+                left = [way for way in left if id(way) not in now]
                 for way in islice(self.best(level, near), TRIES - found):
                     yield far, way
                 found += len(near)
