@@ -12,7 +12,7 @@ A want isn't sought while it is sought already. Each step that is done costs the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from math import inf
@@ -23,7 +23,7 @@ from planner.hierarchical.operators import FEW, Achiever
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.symmetry import representatives
-from planner.transitions import Cell, arguments_of, key_of
+from planner.transitions import Cell, Key, arguments_of, key_of
 from reasoner.amounts import meets, number, towards
 from reasoner.memory.experience import Ground, Rule
 from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, Witness
@@ -100,6 +100,8 @@ class Chains:
         self.call, self.rules, self.joins, self.score, self.before = call, rules, joins, score, before
         self.finds: dict[str, Find | None] = {}
         self.achievers: dict[str, Achiever] = {}
+        self.bring: dict[tuple[int, Cell, str, bool], set[Goal]] = {}
+        self.cells: dict[int, list[dict[Key, str]]] = {}
         self.age = -1
         self.spent, self.most = 0, inf
         """How much effort was made, and how much may be, in microseconds."""
@@ -125,7 +127,7 @@ class Chains:
         """Forget what was found of another state."""
         if self.age != self.call.table.age:
             self.age = self.call.table.age
-            for known in (self.found, self.near, self.beyond, self.picked, self.lacking):
+            for known in (self.found, self.near, self.beyond, self.picked, self.lacking, self.bring):
                 known.clear()
 
     def ways(self, level: int, goal: Goal, everybody: bool = False) -> list[Candidate]:
@@ -165,16 +167,22 @@ class Chains:
         return find(*arguments_of(cell[1]), value, everybody) if find is not None else iter(())
 
     def pick(self, candidates: tuple[str, ...], situation: str) -> Sequence[str]:
-        """Return of many candidates for the value of a situation type one of each sort and state, of free ones."""
-        self.spent += 1 + len(candidates)
-        found = self.picked.get((id(candidates), situation))
+        """Return of many candidates for the value of a situation type one of each sort with values of equal sorts, of free ones."""
+        found, which = self.picked.get((id(candidates), situation)), id(candidates)
         if found is None:
-            alike, table, wanted = self.call.program.alike, self.call.table, self.call.segments.wants.wanted
+            self.spent += len(candidates)
+            table, alike, wanted = self.call.table, self.call.program.alike, self.call.segments.wants.wanted
             found = free = tuple([who for who in candidates if who not in self.taken]) if self.taken else candidates
             if len(free) > FEW:
+                if which not in self.cells:
+                    among = set(candidates)
+                    self.cells[which] = [cells for cells in table.now.values() if not among.isdisjoint(cells)]
                 first = representatives(alike.groups(free), table.who.get(situation, {}), wanted.get(situation, {}))
-                found = alike.unlike(free, first, table.now)
-            self.picked[id(candidates), situation] = found
+                sort, cells = alike.sort.get, self.cells[which]
+                unlike = {(sort(w), *[sort(its.get(w, "")) for its in cells]): w for w in (*free[::-1], *first[::-1])}
+                found = list(unlike.values())[::-1]
+            self.picked[which, situation] = found
+        self.spent += 1 + len(found)
         return found
 
     def lacks(self, level: int, way: Candidate, number: int) -> list[Goal]:
@@ -238,7 +246,26 @@ class Chains:
     def mended(self, level: int, way: Candidate, number: int, most: int, everybody: bool) -> bool:
         """Whether chains of at most so many rules may lead to a condition; of what nothing is known to lead to, one hopes so."""
         lacks = self.lacks(level, way, number)
-        return any(self.within(level, goal, most, everybody) for goal in lacks) if lacks else most > 0
+        if any(self.within(level, goal, most, everybody) for goal in lacks):
+            return True
+        return most > 0 and (not lacks or self.comes(level, way, lacks[0], most, everybody))
+
+    def comes(self, level: int, way: Candidate, goal: Goal, most: int, everybody: bool) -> bool:
+        """Whether something comes with what brings about another condition that a way lacks."""
+        wants = (its[0] for n in way.unmet if (its := self.lacks(level, way, n)) and its[0] != goal)
+        return any(
+            goal in self.brought(level, want, everybody) and self.within(level, want, most, everybody) for want in wants
+        )
+
+    def brought(self, level: int, goal: Goal, everybody: bool) -> set[Goal]:
+        """Return what all the ways to a goal bring about, if there are some that bring about more than one thing."""
+        key, problem = (level, *goal, everybody), self.call.program.problem
+        if key not in self.bring:
+            behaviors, rules = problem.domain.behaviors, self.rules.get((level, goal[0][0]), ())
+            several = any(len(behaviors[rule.does[0]].effects) > 1 for rule in rules)
+            all_ = [set(made(way, problem).items()) for way in self.ways(level, goal, everybody)] if several else []
+            self.bring[key] = {((s, key_of(who)), v) for (s, who), v in set.intersection(*all_)} if all_ else set()
+        return self.bring[key]
 
     def nearest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[float, Candidate]]:
         """Yield the nearest ways to a goal, each with its distance, the best first; a farther one is looked for when asked."""
@@ -258,9 +285,11 @@ class Chains:
 
     def best(self, level: int, ways: Sequence[Candidate]) -> Iterator[Candidate]:
         """Yield ways that are equally near in the order in which to try them."""
-        groups: dict[tuple[int, int], list[Candidate]] = {}
+        groups: dict[tuple[int, int, int], list[Candidate]] = {}
         for way in ways:
-            groups.setdefault((self.spoils(level, way) if len(ways) > 1 else 0, len(way.unmet)), []).append(way)
+            wants = [its[0] for n in way.unmet if (its := self.lacks(level, way, n))]
+            left = sum(not self.comes(level, way, want, FARTHEST, False) for want in wants) if len(ways) > 1 else 0
+            groups.setdefault((self.spoils(level, way) if len(ways) > 1 else 0, left, len(way.unmet)), []).append(way)
         for _, group in sorted(groups.items()):
             if self.score is not None and len(group) > 1:
                 group.sort(key=self.score, reverse=True)
@@ -417,17 +446,24 @@ class Chains:
         self.picked.clear()
 
     def same(self, level: int, way: Candidate, goal: Goal) -> Candidate | None:
-        """Return the way by the same rule to go on with: to the same step while it lacks less and less, else what lacks least."""
+        """Return the way by the same rule to go on with: to the same step while it lacks less and less, else what lacks least.
+
+        A way that lacks nothing but what the way to the same step lacks, too, is as good.
+        """
+
+        def lacks(its: Iterable[Candidate]) -> set[Goal]:
+            return {goal for w in its for n in w.unmet for goal in self.lacks(level, w, n)}
+
         now = [w for e in (False, True) for w in self.ways(level, goal, e) if w.rule is way.rule]
         own = [w for w in now if w.ground == way.ground]
-        nearer = [w for w in own if len(w.unmet) < len(way.unmet)]
+        nearer = [w for w in now if own and len(w.unmet) < len(way.unmet) and lacks([w]) <= lacks(own)]
         others = [w for w in now if len(w.unmet) <= len(way.unmet)]
         return min(nearer or [*own, *others], key=lambda w: (len(w.unmet), w.ground != way.ground), default=None)
 
     def mend(self, level: int, way: Candidate, budget: Budget, above: tuple[Goal, ...]) -> Steps | None:
         """Bring about the next of the conditions that a way lacks."""
         asks, env, table = self.achievers[way.rule.name].soft, way.named, self.call.table
-        found: list[tuple[int, float, int, list[Goal]]] = []
+        found, passed, last = dict[int, list[Goal]](), dict[int, dict[Cell, str]](), dict[int, tuple[bool, float]]()
         for n in way.unmet:
             lacks = self.lacks(level, way, n)
             near = sorted(
@@ -435,11 +471,20 @@ class Chains:
             )
             if not near:
                 continue  # perhaps it comes with the others
-            if near[0][0] == inf:
+            comes = self.comes(level, way, lacks[0], FARTHEST, near[0][0] == inf)
+            last[n] = comes, near[0][0] if comes else -near[0][0]
+            if near[0][0] < inf:
+                found[n], passed[n] = [g for far, *_, g in near if far < inf], self.passed(level, near[0][-1])
+            elif not comes:
                 return None
-            later = sum(m != n and self.before(asks[m], asks[n], env) for m in way.unmet)
-            found.append((later, -near[0][0], n, [g for far, *_, g in near if far < inf]))
-        for *_, n, goals in sorted(found):
+
+        def later(n: int) -> tuple[int, tuple[bool, float], int]:
+            cell, value = found[n][0]
+            first = (self.before(asks[m], asks[n], env) or passed[m].get(cell, value) != value for m in found if m != n)
+            return sum(first), last[n], n
+
+        for n in sorted(found, key=later):
+            goals = found[n]
             lost = False
             for goal in goals[:TRIES]:
                 mark, left = len(table.trail), budget.left
@@ -448,7 +493,7 @@ class Chains:
                     continue
                 if isinstance(asks[n], Witness) and asks[n].negated:
                     budget.left = left  # each whom it forbids has steps of its own
-                others = (its for *_, m, its in found if m != n)
+                others = (its for m, its in found.items() if m != n)
                 if all(any(self.far(level, g) < inf for g in its) for its in others):
                     return done
                 table.undo(mark)
@@ -456,6 +501,16 @@ class Chains:
             if not lost:  # else another condition comes first: this one put the others out of reach
                 return None
         return None
+
+    def passed(self, level: int, goal: Goal) -> dict[Cell, str]:
+        """Return what the nearest way to a goal lacks, of those that were looked at: what is brought about on the way there."""
+        for everybody in (False, True):
+            ways = self.found.get((level, *goal, everybody), ())
+            wants = [[its[0] for n in way.unmet if (its := self.lacks(level, way, n))] for way in ways]
+            far = [max((self.near.get((level, *want, everybody), inf) for want in its), default=0) for its in wants]
+            if min(far, default=inf) < inf:
+                return dict(wants[far.index(min(far))])
+        return {}
 
     def mends(self, way: Candidate, number: int, goal: Goal) -> bool:
         """Whether a want alone would do for a condition; of amounts and of what is defined that isn't asked."""
@@ -471,18 +526,23 @@ class Chains:
         return holds
 
 
-def used_up(way: Candidate, problem: Problem) -> set[str]:
-    """Return of whom a way asks something that its step makes otherwise."""
-    behavior, env = problem.domain.behaviors[way.rule.does[0]], way.named
+def made(way: Candidate, problem: Problem) -> dict[tuple[str, tuple[str, ...]], str]:
+    """Return what the step of a way makes so, as far as it says of whom."""
+    behavior = problem.domain.behaviors[way.rule.does[0]]
     put = {p.name: who for p, who in zip(behavior.parameters, way.ground[1], strict=True)}
-    made = {
+    return {
         (e.situation, tuple([put.get(a, a) for a in e.arguments])): put.get(e.value, e.value) for e in behavior.effects
     }
+
+
+def used_up(way: Candidate, problem: Problem) -> set[str]:
+    """Return of whom a way asks something that its step makes otherwise."""
+    now, env = made(way, problem), way.named
     asked = [found for c in way.rule.asks if (found := fact(c, env)) is not None]
     return {
         who
         for f in asked
-        if made.get((f.symbol.situation, f.symbol.arguments), f.value) != f.value
+        if now.get((f.symbol.situation, f.symbol.arguments), f.value) != f.value
         for who in f.symbol.arguments
     }
 

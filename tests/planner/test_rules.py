@@ -5,6 +5,7 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -415,7 +416,7 @@ def test_a_farther_way_is_looked_for_when_the_nearer_ones_are_none() -> None:
     once = asked[0]
     assert all(found)
     assert all(far >= first[0] for first, its in zip(found, ways, strict=True) if first for far, _ in its)
-    assert asked[0] > 2 * once
+    assert asked[0] > 1.5 * once
 
 
 def test_who_only_follows_rules_does_not_load_how_they_are_learned() -> None:
@@ -599,15 +600,16 @@ LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing 
  :effect (and (not (in ?c ?l)) (at ?c ?p) (free ?l ?b) (not (free ?l ?a)))))"""
 
 
-def lorries(folder: Path, lorries: int, crates: int, places: int) -> Problem:
-    """Return crates to carry along a road by lorries that have room for two."""
+def lorries(folder: Path, lorries: int, crates: int, places: int, each: int = 0) -> Problem:
+    """Return crates to carry along roads of so many places each by lorries that have room for two."""
     (folder / "domain.pddl").write_text(LORRY)
-    road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(places - 1))
+    each = each or places
+    road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(places - 1) if (i + 1) % each)
     at = " ".join(f"(at c{i} p{i % places})" for i in range(crates))
-    there = " ".join(f"(at l{i} p{i % places}) (free l{i} r2)" for i in range(lorries))
+    there = " ".join(f"(at l{i} p{(i * each + i // places) % places}) (free l{i} r2)" for i in range(lorries))
     many = ("place", places), ("crate", crates), ("lorry", lorries), ("room", 3)
     typed = " ".join(f"{' '.join(f'{kind[0]}{i}' for i in range(n))} - {kind}" for kind, n in many)
-    goal = " ".join(f"(at c{i} p{(i * 3 + 1) % places})" for i in range(crates))
+    goal = " ".join(f"(at c{i} p{(i - i % each) % places + (i * 3 + 1) % each})" for i in range(crates))
     text = f"""(define (problem p) (:domain lorry) (:objects {typed})
      (:init {road} {at} {there} (less r0 r1) (less r1 r2)) (:goal (and {goal})))"""
     (folder / "problem.pddl").write_text(text)
@@ -663,3 +665,13 @@ def test_each_of_all_of_whom_a_step_asks_something_has_steps_of_its_own(tmp_path
     outcome = plan(large, Memory(experience), improve=0)
     assert outcome.plan is not None
     assert expanded(outcome) == len(outcome.plan.steps)
+
+
+def test_who_is_somewhere_else_does_not_stand_for_all_of_his_kind(tmp_path: Path) -> None:
+    experience = Experience("robot")
+    for crates, places in ((1, 3), (2, 4), (3, 4)):
+        teach(experience, lorries(tmp_path, 1, crates, places))
+    islands = lorries(tmp_path, 12, 48, 48, 4)
+    guide = Guide(Call(islands, compiled(islands), None, 1000), rules_in(experience))
+    # On each island there is one lorry, and no other gets there.
+    assert all(guide.chains.far(guide.first, goal) < inf for goal in guide.open().items())
