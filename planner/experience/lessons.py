@@ -146,17 +146,19 @@ def carry_out(call: Call, step: Step) -> None:
 
 
 def shown(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
-    """Return a lesson with what its own rules show on it, where there were none before: that is all that they have shown."""
+    """Return a lesson with what it shows on its own problem, where nothing was known before: that is all that it has shown."""
     if not rules_in(experience):
-        lesson += tried(experience, problem, using, [one for one in lesson.said if isinstance(one, Rule)])
+        alone = Experience("alone")
+        alone.learn(lesson)
+        lesson += tried(alone, problem, using)
     return lesson
 
 
-def tried(experience: Experience, problem: Problem, using: Compiled, new: Sequence[Rule] = ()) -> Lesson:
-    """Return how good what is known, and what is new, proves on a problem: which of its goals it reaches by itself."""
+def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
+    """Return how good what is known proves on a problem: which of its goals it reaches by itself."""
     memory = Memory(experience)
     call = Call(problem, memory.warmed(using), None, SHORT.expansions)
-    guide = memory.guide(call, also=new)
+    guide = memory.guide(call)
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)

@@ -105,7 +105,7 @@ def test_advice_reads_like_a_page_and_an_edited_rule_changes_the_plan(tmp_path: 
     memory, path = confab.Memory.of(scene), tmp_path / "memory.ttl"
     memory.teach(scene, scene.plan().plan)
     memory.save(path)
-    assert "move movable to location" in memory.page()
+    assert "move movable to place" in memory.page()
     led, rules = scene.plan(memory=path), [one for one in memory.experience.said.values() if isinstance(one, Rule)]
     move = next(rule for rule in rules if rule.does[0] == "B1_MOVE")
     text = path.read_text()
