@@ -101,7 +101,7 @@ class View:
         keys = self.table.who[situation].get(who)
         if not keys:
             return "nobody"
-        return next((named[key][1:] for key in keys if isinstance(key, str) and key in named), "somebody")
+        return next((role[1:] for one, role in named.items() if one in keys), "somebody")
 
     def _wanting(self, situation: str, own: Container[str], who: str, named: Named) -> str:
         now, wanters = self.table.now[situation], self.wanters.get((situation, who), ())

@@ -70,5 +70,5 @@ def test_a_memory_of_a_shipped_scene_is_shown_in_its_labels_without_naming_the_s
     memory.teach(scene, scene.plan().plan)
     memory.save(tmp_path / "memory.ttl")
     shown = CliRunner().invoke(app, ["memory", "show", str(tmp_path / "memory.ttl")]).output
-    assert "is at location" in " ".join(shown.split())
+    assert "is at place" in " ".join(shown.split())
     assert "B1_MOVE" not in shown
