@@ -101,7 +101,9 @@ class Chains:
         self.finds: dict[str, Find | None] = {}
         self.achievers: dict[str, Achiever] = {}
         self.bring: dict[tuple[int, Cell, str, bool], set[Goal]] = {}
+        """What all ways to a goal bring about."""
         self.cells: dict[int, list[dict[Key, str]]] = {}
+        """Of candidates, by the identity of the program's tuple, the situation types that they have values of."""
         self.age = -1
         self.spent, self.most = 0, inf
         """How much effort was made, and how much may be, in microseconds."""
@@ -215,7 +217,7 @@ class Chains:
             self.cut, self.seen, before = False, set(), len(self.near)
             if self.within(level, goal, n, everybody):
                 return n
-            if not self.cut and len(self.near) == before:  # what was looked at can be reached by a chain of no length
+            if not self.cut and len(self.near) == before:  # no chain of any length leads to it
                 self.beyond.update((key, inf) for key in self.seen if key not in self.near)
                 return inf
         return inf
@@ -328,9 +330,8 @@ class Chains:
             if steps:
                 on = cost
                 if (steps[-1].behavior, steps[-1].arguments) == way.ground:
-                    on = (
-                        below if self.off(goal) < off else 0.0
-                    )  # what is defined, or an amount, may need the same once more
+                    # What is defined, or an amount, may need the same once more.
+                    on = below if self.off(goal) < off else 0.0
                     budget.left = left if on else budget.left
                 rest = self.attain(level, goal, budget, above, on)
                 if rest is not None and (above or self.hopeful(level, mark)):
@@ -388,9 +389,8 @@ class Chains:
         call.segments.expand(level)
         effort = call.segments.effort
         step = call.refiner.do(level, *ground)
-        self.spend(
-            DONE if step is not None else call.segments.effort - effort
-        )  # a refinement that was searched in vain counts
+        # A refinement that was searched in vain counts.
+        self.spend(DONE if step is not None else call.segments.effort - effort)
         return None if step is None else [*steps, step]
 
     def together(self, level: int, goals: Sequence[Goal]) -> Steps | None:
