@@ -30,6 +30,7 @@ from reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
+    Fact,
     Problem,
     RelationCondition,
     State,
@@ -66,11 +67,22 @@ def validate(problem: Problem, plan: Plan) -> list[Fault]:
     """
     check = _Check(problem, max((step.level for step in plan.walk()), default=0))
     if check.carried_out(plan.steps, 0, (), "the plan"):
-        for symbol, wanted in problem.goal.items():
-            got = check.facts.value(symbol.situation, symbol.arguments) or FALSE
-            if not meets(got, wanted):
-                check.fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
+        for fact, got in _unreached(problem, check.facts):
+            check.fault((), f"the goal {fact.symbol} = {fact.value} isn't reached: it is {got} in the end")
     return check.faults
+
+
+def open_goals(problem: Problem) -> list[Fact]:
+    """Return the goals that don't hold in the initial state, whether they are stated there or follow by rules."""
+    return [fact for fact, _ in _unreached(problem, Facts(problem, problem.initial))]
+
+
+def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
+    """Yield each goal that doesn't hold, with the value that its symbol has instead."""
+    for symbol, wanted in problem.goal.items():
+        got = facts.value(symbol.situation, symbol.arguments) or FALSE
+        if not meets(got, wanted):
+            yield Fact(symbol, wanted), got
 
 
 def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], state: State) -> dict[Symbol, str] | None:

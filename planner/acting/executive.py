@@ -37,9 +37,8 @@ from planner.acting.repair import difference, mend, replan, vanished
 from planner.acting.symbolic_world import with_individual
 from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
-from planner.validation import successor
-from reasoner.amounts import meets
+from planner.plan import LimitError, Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
+from planner.validation import open_goals, successor
 from reasoner.refutations import Refutation, with_refuted
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
@@ -50,8 +49,9 @@ logger = logging.getLogger(__name__)
 class Patience:
     """When to stop: attempts at one primitive, failures in all, primitives begun per primitive planned, and planning limits.
 
-    `rounds` is how often all that failed is tried anew, once there is no other way left: things stand otherwise by then, and a
-    hand takes them otherwise.
+    `rounds` is how often everything that failed is tried anew once no other way is left: the situation has changed by then, and
+    a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `seconds` is the time
+    for the whole episode; `planning` limits each planning call within it.
     """
 
     attempts: int = 2
@@ -59,6 +59,7 @@ class Patience:
     rounds: int = 3
     primitives: int = 20
     planning: Limits = Limits(seconds=20.0)  # noqa: RUF009 - frozen
+    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -111,13 +112,14 @@ def act(
     -------
     Episode
     """
-    if caution is not None and plan is None:
-        problem = caution.applied(problem, planner or fast_plan, patience.planning)
     run = _Run(problem, Guarded(world), list(interventions), planner, patience, tell, mending)
+    if caution is not None and plan is None:
+        run.believe(caution.applied(problem, planner or fast_plan, run.limits))
     try:
-        run.look(dict(problem.initial))
+        run.look(dict(run.belief.initial))
         run.start(plan)
         while run.going:
+            run.check_time()
             run.intervene()
             if run.puzzled:
                 run.reconsider()
@@ -129,7 +131,7 @@ def act(
                 chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
                     run.learn_from(chain, before, verdict)
-    except WorldError as error:
+    except (WorldError, LimitError) as error:
         run.break_off(str(error))
     return run.episode()
 
@@ -215,6 +217,7 @@ class _Run:
     withdrawn: set[Static] = field(default_factory=set)
     refuted: dict[Refutation, None] = field(default_factory=dict)
     rounds: int = 0
+    pondered: Counter[object] = field(default_factory=Counter)
     seconds: dict[str, float] = field(default_factory=lambda: {"planning": 0.0, "repairing": 0.0})
     unseen: frozenset[Symbol] | None = None
     sound: bool = True
@@ -222,7 +225,24 @@ class _Run:
     first: Plan = Plan(())  # noqa: RUF009 - frozen
 
     def __post_init__(self) -> None:
-        self.initial, self.believed = dict(self.belief.initial), self.belief
+        self.end = Limits(seconds=self.patience.seconds).end()
+        self.believe(self.belief)
+
+    def believe(self, problem: Problem) -> None:
+        """Begin with a situation, a goal and static facts."""
+        self.belief, self.believed, self.initial = problem, problem, dict(problem.initial)
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of a planning call that begins now: its own, and what is left of the episode's time."""
+        planning = self.patience.planning
+        left = Limits().until(self.end).seconds
+        return replace(planning, seconds=min((s for s in (planning.seconds, left) if s is not None), default=None))
+
+    def check_time(self) -> None:
+        """Raise `LimitError` if the time of the episode is over."""
+        if self.end is not None and perf_counter() > self.end:
+            raise LimitError(f"gave up after {self.patience.seconds:g} s; give more time (--time-limit)")
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -234,7 +254,7 @@ class _Run:
         if plan is None:
             self.set_aside_the_impossible(vanished(self.belief))
             begin = perf_counter()
-            steps, outcome = replan(self.belief, self.planner, self.using, self.patience.planning)
+            steps, outcome = replan(self.belief, self.planner, self.using, self.limits)
             self.seconds["planning"] += perf_counter() - begin
             if steps is None:
                 self.going = False
@@ -247,8 +267,7 @@ class _Run:
 
     def finish(self) -> None:
         """Nothing is left to be done: either what is wanted is there, or the agenda must be looked at again."""
-        missing = [Fact(s, v) for s, v in self.belief.goal.items() if not meets(self.belief.initial.get(s, FALSE), v)]
-        if missing:
+        if missing := open_goals(self.belief):
             self.doubt(f"{missing[0]} doesn't hold yet")
             return
         self.going = False
@@ -422,9 +441,16 @@ class _Run:
         """Repair the agenda, or replan; set aside what can't be reached any more."""
         why, self.puzzled = self.puzzled, ""
         self.set_aside_the_impossible(vanished(self.belief))
+        counted = (self.events, self.happened, self.failures, self.withdrawn, self.refuted)
+        standing = (*map(len, counted), self.rounds, self.status, tuple(self.belief.goal.items()))
+        self.pondered[standing] += 1
+        if self.pondered[standing] > self.patience.rounds:
+            text = f"planned {self.patience.rounds} times in the same situation, and no step could be done: {why}"
+            self.give_up(End.GAVE_UP, Reason(text))
+            return
         assert self.planned_for is not None
         begin = perf_counter()
-        limits, old = self.patience.planning, self.agenda
+        limits, old = self.limits, self.agenda
         end = limits.end()
         if self.mending:
             expected = {s: v for s, v in {**self.belief.initial, **self.missed}.items() if v is not None}
@@ -469,12 +495,11 @@ class _Run:
         doubted = self.withdrawn or self.refuted
         proved = outcome is not None and outcome.status is Status.UNSOLVABLE and not doubted
         hopeless, end = [], limits.end()
-        for symbol, value in self.belief.goal.items():
-            if proved and not meets(self.belief.initial.get(symbol, FALSE), value):
-                alone = replace(self.belief, goal={symbol: value})
-                steps, single = replan(alone, None, self.using, limits.until(end))
-                if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
-                    hopeless.append((symbol, single.reason))
+        for fact in open_goals(self.belief) if proved else ():
+            alone = replace(self.belief, goal={fact.symbol: fact.value})
+            steps, single = replan(alone, None, self.using, limits.until(end))
+            if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
+                hopeless.append((fact.symbol, single.reason))
         if hopeless:
             self.set_aside_the_impossible(hopeless)
             self.doubt("what can't be reached is set aside")

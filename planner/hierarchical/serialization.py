@@ -99,6 +99,8 @@ class Call:
         self.vain = 0
         """Work of small worlds that came to nothing since it was last asked whether steps led astray."""
         self.restarts = 0
+        self.redone = 0
+        """How often steps were done from the beginning."""
         self.settled = False
         """Whether the first steps bring to rest what isn't in the beginning."""
         self.at_once = False
@@ -169,16 +171,17 @@ class Call:
                     mark = len(self.table.trail)
                 else:
                     sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
-            restarts = self.restarts
+            restarts, redone = self.restarts, self.redone
             if asleep and not harder(asleep, before):
                 return False
             if self.restarts > restarts:
                 return self.serialise(harder)
-            wake(mark)
+            wake(mark if self.redone == redone else 0)
         return True
 
     def redo(self, steps: Sequence[RefinedStep]) -> None:
-        """Do steps from the beginning in place of those done so far."""
+        """Do steps from the beginning in place of those done so far; marks of the trail from before are void then."""
+        self.redone += 1
         self.table.undo(0)
         for step in steps:
             self.refiner.again(step)

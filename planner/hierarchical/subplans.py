@@ -205,7 +205,9 @@ class Segments:
         now, put = self.table.now, self.table.put
         for situation, key, value in changes:
             old = now[situation].get(key)
-            if old != value and (old is not None or self.exists(situation, key)):
+            if old is None and self.exists(situation, key):
+                old = FALSE
+            if old is not None and old != value:
                 put(situation, key, value)
 
     def expand(self, level: int) -> None:
