@@ -441,8 +441,8 @@ class _Run:
         """Repair the agenda, or replan; set aside what can't be reached any more."""
         why, self.puzzled = self.puzzled, ""
         self.set_aside_the_impossible(vanished(self.belief))
-        counted = (self.events, self.happened, self.failures, self.withdrawn, self.refuted)
-        standing = (*map(len, counted), self.rounds, self.status, tuple(self.belief.goal.items()))
+        happened = len(self.events), len(self.happened), len(self.failures)
+        standing = (*happened, len(self.withdrawn), len(self.refuted), self.rounds, self.status, *self.belief.goal)
         self.pondered[standing] += 1
         if self.pondered[standing] > self.patience.rounds:
             text = f"planned {self.patience.rounds} times in the same situation, and no step could be done: {why}"
