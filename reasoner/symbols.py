@@ -61,13 +61,33 @@ State: TypeAlias = Mapping[Symbol, str]
 
 
 @dataclass(frozen=True)
+class Perceived:
+    """How the values of a situation type are read off the world.
+
+    Attributes
+    ----------
+    by : str
+        The perceiver.
+    exclusive : bool
+        Whether no two individuals can have the same value at once, special values excepted.
+    special : tuple of (str, str)
+        The special values, each behind its name: ``("valueInHand", "in_hand")``.
+    """
+
+    by: str
+    exclusive: bool = False
+    special: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class SituationType:
     """A property of an object type that is at once the class of its values.
 
     `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
     value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
     `level` on; `rest` is the value that a refinement must restore; `default` is assumed where a scene says nothing. With a
-    `quantity` the values are numbers (`reasoner.amounts`), and only those symbols exist that a scene gives one.
+    `quantity` the values are numbers (`reasoner.amounts`), and only those symbols exist that a scene gives one. `perceived` says
+    how physics reads the values, where it does.
     """
 
     name: str
@@ -78,6 +98,7 @@ class SituationType:
     default: str | None = None
     boolean: bool = False
     quantity: Quantity | None = None
+    perceived: Perceived | None = None
 
 
 # ---------------------------------------------------------------------------------------------------------- conditions

@@ -32,7 +32,7 @@ from reasoner.amounts import (
 from reasoner.derivation import circles, needed
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.language import walk
-from reasoner.names import Names
+from reasoner.names import Names, local_name
 from reasoner.reading import swrl
 from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
 from reasoner.reading.goals import check_arguments, with_task
@@ -62,6 +62,7 @@ from reasoner.symbols import (
     Comparison,
     Domain,
     Parameter,
+    Perceived,
     Problem,
     RelationCondition,
     Rule,
@@ -72,7 +73,7 @@ from reasoner.symbols import (
     ValueEffect,
     spread,
 )
-from reasoner.vocabulary import CORE, RDFS
+from reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 KINDS = (
@@ -100,6 +101,8 @@ SELECT DISTINCT ?part ?node ?property ?value WHERE {{
     BIND("pair" AS ?part) BIND(?property AS ?value) }}
   UNION {{ ?node :valueProperty/rdfs:range ?value . FILTER(?value IN (xsd:integer, xsd:decimal))
     BIND("range" AS ?part) BIND(rdfs:range AS ?property) }}
+  UNION {{ ?node <{EMBODIMENT}perceiver>/<{EMBODIMENT}exclusive> ?value .
+    BIND("exclusive" AS ?part) BIND(<{EMBODIMENT}exclusive> AS ?property) }}
   UNION {{ ?node :fromLevel ?value . BIND("level" AS ?part) BIND(:fromLevel AS ?property) }}
   UNION {{ ?node a :SituatedObjectInstance ; ?property ?value .
     FILTER NOT EXISTS {{ ?node :about ?object }} BIND("fact" AS ?part) }}
@@ -209,6 +212,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         axioms=nodes_of(parts["axiom"]),
         swrl=nodes_of(parts["swrl"]),
         ontologies=sorted(iri for iri, _, _ in parts["ontology"]),
+        exclusive=frozenset(situation for situation, _, value in parts["exclusive"] if value in ("true", "1")),
     )
 
 
@@ -496,11 +500,26 @@ def _situations(
                 default=schema.term(default[0]) if default else (FALSE if boolean else None),
                 boolean=boolean,
                 quantity=quantity,
+                perceived=_perceived(schema, iri, iri in read.exclusive),
             )
         )
         if quantity and (amount := schema.decimal(iri, "defaultAmount")) is not None:
             found[-1] = replace(found[-1], default=written(amount))
     return found, properties
+
+
+def _perceived(schema: Parts, iri: str, exclusive: bool) -> Perceived | None:
+    """Return how a situation type is perceived; None if nothing perceives it."""
+    node = schema.nodes[iri]
+    if not (perceivers := node.get(EMBODIMENT + "perceiver")):
+        return None
+    special = (
+        (local_name(prop), schema.names.short(value))
+        for prop, values in sorted(node.items())
+        if prop.startswith(EMBODIMENT + "value")
+        for value in values
+    )
+    return Perceived(local_name(perceivers[0]), exclusive, tuple(special))
 
 
 def _quantity(schema: Parts, iri: str, whole: bool) -> Quantity | None:

@@ -44,7 +44,7 @@ class Schema:
     property isn't functional; `whole` the amounts whose value property takes whole numbers only; `tuples` tells whether some
     facts are nodes of their own, and `facts` has those about nobody;
     `expressions` are the definitions of classes, `axioms` what is said of value properties, `swrl` the rules; `ontologies` the
-    IRIs of what was loaded.
+    IRIs of what was loaded; `exclusive` are the situation types whose values physics gives to one individual at a time.
     """
 
     nodes: Mapping[str, Node]
@@ -59,6 +59,7 @@ class Schema:
     axioms: Mapping[str, Node]
     swrl: Mapping[str, Node]
     ontologies: Sequence[str]
+    exclusive: frozenset[str] = frozenset()
 
     @cached_property
     def by_kind(self) -> Mapping[str, Sequence[str]]:

@@ -35,8 +35,10 @@ from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGrap
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.updates.compiling import Fault
+from reasoner.validation.case import Case
 from reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
-from reasoner.validation.rules import REMARKS, RULES, WARNINGS, Case, misread
+from reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from reasoner.validation.terms import misread
 from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:

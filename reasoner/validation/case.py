@@ -1,0 +1,44 @@
+"""What the rules of validation look at, and what they say."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
+from reasoner.reading.problem import Reading
+from reasoner.vocabulary import RDF
+
+Fault = tuple[str, str, str, str]
+"""Node, what, why, remedy."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What rules look at: the graph, and the problem read from it unless it couldn't be read."""
+
+    graph: KnowledgeGraph
+    reading: Reading | None
+
+    @cached_property
+    def triples(self) -> Sequence[ox.Triple]:
+        """Every triple of the graphs that planning starts from."""
+        names = [ox.NamedNode(BASE + name) for name in SCENE]
+        return [quad.triple for name in names for quad in self.graph.store.quads_for_pattern(None, None, None, name)]
+
+    @cached_property
+    def types(self) -> dict[str, set[str]]:
+        """The classes that each IRI is stated to have."""
+        found: dict[str, set[str]] = defaultdict(set)
+        for triple in self.triples:
+            if (
+                triple.predicate.value == RDF + "type"
+                and isinstance(triple.subject, ox.NamedNode)
+                and isinstance(triple.object, ox.NamedNode)
+            ):
+                found[triple.subject.value].add(triple.object.value)
+        return found

@@ -1,0 +1,287 @@
+"""Rules of what follows from other facts: situation types that are defined, and axioms that planning doesn't evaluate."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence, Set
+
+import pyoxigraph as ox
+
+from reasoner.derivation import needed
+from reasoner.names import local_name
+from reasoner.reading.definitions import Definitions
+from reasoner.reading.rows import Node, Schema
+from reasoner.symbols import (
+    ClassCondition,
+    Domain,
+    Parameter,
+    Rule,
+    ValueCondition,
+)
+from reasoner.validation.case import Case, Fault
+from reasoner.vocabulary import CORE, OWL, RDF, RDFS
+
+AXIOMS_OF_PROPERTIES = {
+    OWL + "TransitiveProperty": "is transitive",
+    OWL + "SymmetricProperty": "is symmetric",
+    OWL + "ReflexiveProperty": "is reflexive",
+}
+NOT_EVALUATED = {
+    OWL + "sameAs": "that two names mean one individual",
+    OWL + "hasKey": "keys",
+    OWL + "NegativePropertyAssertion": "negative assertions",
+    OWL + "disjointUnionOf": "unions of disjoint classes",
+}
+
+
+def definitions_without_effect(case: Case) -> Iterator[Fault]:
+    """Find what OWL says of situations and planning doesn't evaluate, and facts stated of what is defined."""
+    if case.reading is None:
+        return
+    schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules
+    of = {
+        prop: iri
+        for iri in schema.of_kind("SituationType")
+        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
+    }
+    changed = {
+        iri for effect in schema.of_kind("ValueEffect") for iri in schema.nodes[effect].get(CORE + "situationType", ())
+    }
+    for triple in case.triples:
+        subject, predicate, value = triple.subject, triple.predicate.value, triple.object
+        named = subject.value if isinstance(subject, ox.NamedNode) else ""
+        other = value.value if isinstance(value, ox.NamedNode) else ""
+        said = ""
+        if named in of and predicate == RDF + "type" and other in AXIOMS_OF_PROPERTIES:
+            said, prop = f"{local_name(named)} {AXIOMS_OF_PROPERTIES[other]}", named
+        elif named in of and predicate == OWL + "propertyChainAxiom":
+            said, prop = f"{local_name(named)} is a chain", named
+        elif other in of and predicate == RDFS + "subPropertyOf" and named != other:
+            said, prop = f"{local_name(named)} is below {local_name(other)}", other
+        elif named in of and other in of and predicate == OWL + "inverseOf":
+            said, prop = f"{local_name(named)} is the inverse of {local_name(other)}", named
+            if names.short(of[other]) in rules:
+                continue
+        if (
+            said
+            and names.short(of[prop]) not in rules
+            and (fault := _unevaluated(schema, of[prop], prop, changed, said))
+        ):
+            yield fault
+        if predicate in of and names.short(of[predicate]) in rules and named:
+            yield (
+                named,
+                f"{local_name(named)} states {local_name(predicate)}, which is defined",
+                "what is defined follows from other facts, in every state; what is stated of it isn't read",
+                "state what it follows from, or drop the fact",
+            )
+        beyond = predicate if predicate in NOT_EVALUATED else other if predicate == RDF + "type" else ""
+        if beyond in NOT_EVALUATED:
+            yield (
+                named or "the ontology",
+                f"{NOT_EVALUATED[beyond]} ({local_name(beyond)}) are nothing that planning evaluates",
+                "individuals are told apart by their names, and what isn't stated is false",
+                "say it in a rule or in the scene's facts, or drop it",
+            )
+
+
+def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
+    """Return why an axiom about a value property is none that planning evaluates, unless the effects are at fault."""
+    name, what = local_name(prop), f"that {said} isn't evaluated, since "
+    nodes = {**schema.axioms, **schema.expressions}
+    into = any(
+        prop in node.get(by, ())
+        for node in nodes.values()
+        for by in (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+    )
+    into = into or any(nodes.get(prop, {}).get(OWL + by) for by in ("propertyChainAxiom", "equivalentProperty"))
+    if situation in changed and not into:
+        what += f"behaviours change {local_name(situation)}"
+        why = "only what no behaviour changes is defined by axioms; planning takes no notice of this one"
+        return (
+            situation,
+            what,
+            why,
+            "let behaviours change another property, which follows into this one, or drop the axiom",
+        )
+    if situation not in schema.pairs:
+        what += f"{name} is functional"
+        why = "what is defined is true or false for each pair; a functional value property gives one value"
+        return situation, what, why, f"drop owl:FunctionalProperty of {name}, or drop the axiom"
+    if situation in changed:
+        return None  # `effect-on-definition` says it where the effect is
+    what += f"no property leads into {name}"
+    why = "planning works out what follows from what behaviours change or what is static"
+    mend = f"make a property that behaviours change, or a static one, rdfs:subPropertyOf {name}; or drop the axiom"
+    return situation, what, why, mend
+
+
+def defined(case: Case) -> Iterator[Fault]:
+    """Tell of each situation type that is defined whether it is worked out in every state, and from what, or is static."""
+    if case.reading is None:
+        return
+    domain, names = case.reading.problem.domain, case.reading.names
+    changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
+    reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in domain.rules.items()}
+    for name in domain.rules:
+        below, waiting = {name}, [name]
+        while waiting:
+            waiting += (more := reads.get(waiting.pop(), set()) - below)
+            below |= more
+        if below & changed:
+            what = f"{name} is derived: in every state it follows from {' and '.join(sorted(reads[name] - {name}))}"
+            why = "planning works it out anew after each step, as its definition says; no behaviour changes it"
+            yield names.iri(name), what, why, "nothing"
+        else:
+            what = f"{name} is static: no behaviour changes what it follows from"
+            why = "it is the same in every state"
+            yield names.iri(name), what, why, "nothing, if it is meant; else define it by what behaviours change"
+
+
+def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
+    """Find rules that conclude something of who can't have it, as where the arguments of a conclusion have changed places."""
+    if case.reading is None:
+        return
+    domain, names = case.reading.problem.domain, case.reading.names
+    for name, rules in domain.rules.items():
+        for rule in rules:
+            for parameter, wanted in zip(rule.parameters, domain.situations[name].arguments, strict=True):
+                of = next((kind for kind in _asked(rule, parameter, domain) if not _both(case, kind, wanted)), None)
+                if of is not None:
+                    said = ", ".join(p.name.removeprefix("?") for p in rule.parameters)
+                    yield (
+                        names.iri(name),
+                        f"a rule concludes {name}({said}), where {parameter.name.removeprefix('?')} has to be a "
+                        f"{wanted.replace('|', ' or ')}; its conditions make it a {of.replace('|', ' or ')}, and nothing is both",
+                        "the rule never concludes anything",
+                        "mend the rule: the arguments of its conclusion may have changed places, or a class or property in its "
+                        f"conditions may be another; or say that a {of.split('|')[0]} has {name}, too",
+                    )
+
+
+def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
+    """Yield the classes of which the conditions of a rule ask that a parameter is."""
+    yield parameter.kind
+    for condition in rule.conditions:
+        match condition:
+            case ClassCondition(term, kind, False) if term == parameter.name:
+                yield kind
+            case ValueCondition(situation, arguments, _, False):
+                for term, kind in zip(arguments, domain.situations[situation].arguments, strict=True):
+                    if term == parameter.name:
+                        yield kind
+            case _:
+                pass
+
+
+def _both(case: Case, one: str, other: str) -> bool:
+    """Whether something is in both of two classes, each of which may be any of several, or could be: a class is below both."""
+    assert case.reading is not None
+    problem = case.reading.problem
+    if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
+        return True
+    below = []
+    for kinds in (one.split("|"), other.split("|")):
+        found = {*kinds}
+        while more := {sub for sub, above in problem.parents.items() if not found.isdisjoint(above)} - found:
+            found |= more
+        below.append(found)
+    return not below[0].isdisjoint(below[1])
+
+
+WATCHED_BY_NOBODY = {
+    OWL + "InverseFunctionalProperty": "leads to no two from one",
+    OWL + "AsymmetricProperty": "never leads both ways",
+    OWL + "IrreflexiveProperty": "leads from nothing to itself",
+}
+
+
+def axioms_not_watched(case: Case) -> Iterator[Fault]:
+    """Find what OWL demands of every state, and what it concludes of a class without a definition: planning does neither."""
+    if case.reading is None:
+        return
+    known = case.reading.schema.expressions
+    of = {prop for node in case.reading.schema.nodes.values() for prop in node.get(CORE + "valueProperty", ())}
+    definitions = Definitions(known, dict.fromkeys(of, ("", True)), case.reading.names)
+    inside: dict[object, list[ox.Triple]] = defaultdict(list)
+    for triple in case.triples:
+        inside[triple.subject].append(triple)
+    why = "behaviours change it, and what comes of that isn't checked against this axiom"
+    mend = "say it as a precondition of the behaviours that could break it, or drop the axiom"
+    for triple in case.triples:
+        subject, predicate, value = triple.subject, triple.predicate.value, triple.object
+        named = subject.value if isinstance(subject, ox.NamedNode) else ""
+        other = value.value if isinstance(value, ox.NamedNode) else ""
+        if named in of and predicate == RDF + "type" and other in WATCHED_BY_NOBODY:
+            yield named, f"that {local_name(named)} {WATCHED_BY_NOBODY[other]} isn't watched in a plan", why, mend
+        if named in of and predicate == OWL + "propertyDisjointWith":
+            said = f"that {local_name(named)} and {local_name(other)} never lead to the same isn't watched in a plan"
+            yield named, said, why, mend
+        if predicate != RDFS + "subClassOf":
+            continue
+        if not other and _properties_in(value, inside) & of:
+            yield (
+                named,
+                f"what each {local_name(named)} is said to be in every state isn't watched in a plan",
+                why,
+                mend,
+            )
+        elif not named and other and _properties_in(subject, inside) & of:
+            yield (
+                other,
+                f"an expression is said to be below {local_name(other)}, which planning doesn't conclude from",
+                "a class has whom its definition has, and who is stated",
+                f"define {local_name(other)} by owl:equivalentClass, or conclude it by a SWRL rule",
+            )
+        elif named and other and definitions.changes(named) and other not in _above(case, named):
+            yield (
+                named,
+                f"each {local_name(named)} is said to be a {local_name(other)}, which planning doesn't conclude",
+                "a class has whom its definition has, and who is stated",
+                f"name {local_name(other)} in the definition of {local_name(named)}, or define it as a union with that",
+            )
+
+
+def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -> set[str]:
+    """Return the properties that a class expression speaks of."""
+    found, waiting, seen = set[str](), [node], set[object]()
+    while waiting:
+        if not isinstance(one := waiting.pop(), ox.BlankNode) or one in seen:
+            continue
+        seen.add(one)
+        for triple in inside.get(one, ()):
+            waiting.append(triple.object)
+            if triple.predicate.value == OWL + "onProperty" and isinstance(triple.object, ox.NamedNode):
+                found.add(triple.object.value)
+    return found
+
+
+def _above(case: Case, iri: str) -> set[str]:
+    """Return the classes that a definition names as its parts, with all above these."""
+    assert case.reading is not None
+    schema, found = case.reading.schema, {OWL + "Thing"}
+    waiting = [iri]
+    while waiting:
+        for node in schema.expressions.get(waiting.pop(), {}).get(OWL + "equivalentClass", ()):
+            parts = [node, *_items(schema.expressions, node)]
+            for part in (part for part in parts if ":" in part and part not in found):
+                found.add(part)
+                waiting.append(part)
+    above = list(found)
+    while above:
+        for kind in schema.supers.get(above.pop(), ()):
+            if kind not in found:
+                found.add(kind)
+                above.append(kind)
+    return found
+
+
+def _items(expressions: Mapping[str, Node], node: str) -> Iterator[str]:
+    """Yield the members of an intersection."""
+    cells, seen = list(expressions.get(node, {}).get(OWL + "intersectionOf", ())), set[str]()
+    while cells:
+        cell = cells.pop()
+        if cell in expressions and cell not in seen:
+            seen.add(cell)
+            yield from expressions[cell].get(RDF + "first", ())
+            cells += expressions[cell].get(RDF + "rest", ())

@@ -1,0 +1,242 @@
+"""The rule of exclusive values: what physics gives to one individual at a time, behaviours must not give to two.
+
+Which values these are is said in the ontology (``e:exclusive`` of a perceiver): one hand at most holds an object. A behaviour that
+gives such a value keeps it exclusive in one of three ways, on each level by itself:
+
+- *free*: its preconditions say that no individual has the value;
+- *handed over*: the individual that has the value loses it by the same behaviour;
+- *taken*: the value itself changes from a state in which no individual has it. A cup that stands at a place is in no hand, picking
+  it up takes it from the place, and each behaviour that brings a cup to a place takes it from a hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Behavior,
+    Condition,
+    EqualityCondition,
+    Problem,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+from reasoner.validation.case import Case, Fault
+
+
+def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
+    """Find behaviours that can give an exclusive value to a second individual."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    for situation in problem.domain.situations.values():
+        if situation.perceived is None or not situation.perceived.exclusive or len(situation.arguments) != 1:
+            continue
+        (kind,) = situation.arguments
+        if problem.initial and len(problem.classes.get(kind, ())) < 2:
+            continue  # no second individual
+        checked = _Exclusive(problem, situation.name, kind, frozenset(v for _, v in situation.perceived.special))
+        for level in problem.domain.levels:
+            for behavior, what, remedy in checked.broken(problem.domain.at_level(level)):
+                yield (
+                    names.iri(behavior.name),
+                    what,
+                    f"physics gives each value of {situation.name} to one {kind} at a time (e:{situation.perceived.by} is "
+                    "e:exclusive), so that such a plan fails when it is carried out",
+                    remedy,
+                )
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A state of values in which no individual has them: ``situation(value)`` is in a class, or is one value."""
+
+    situation: str
+    kind: str
+    value: str
+
+
+@dataclass(frozen=True)
+class _Exclusive:
+    """A situation type whose values one individual of `kind` at most has, but for those that are `shared`."""
+
+    problem: Problem
+    situation: str
+    kind: str
+    shared: frozenset[str]
+
+    def broken(self, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str, str]]:
+        """Yield the behaviours of a level that may give a value to a second individual, what they do, and the remedy."""
+        open_: list[tuple[Behavior, ValueEffect]] = [
+            (behavior, effect)
+            for behavior in behaviors
+            for effect in self.given(behavior)
+            if not self.free(behavior, effect.when, effect.value, effect.arguments[0])
+            and not self.handed_over(behavior, effect)
+        ]
+        for behavior, effect in open_:
+            ways = [*self.taken(behavior, effect)]
+            if any(not [*self.breaking(way, behaviors)] for way in ways):
+                continue
+            if len(ways) == 1 and behavior.name not in {other.name for other, _ in self.breaking(ways[0], behaviors)}:
+                for other, does in self.breaking(ways[0], behaviors):
+                    yield (
+                        other,
+                        f"{other.name} {does} while a {self.kind} may have that as its {self.situation}; "
+                        f"{behavior.name} then gives it to a second {self.kind}",
+                        f"let {other.name} name the {self.kind} that has it in a value condition, and change its {self.situation}",
+                    )
+                continue
+            value = effect.value.lstrip("?")
+            yield (
+                behavior,
+                f"after {behavior.name}, two individuals of {self.kind} can have the same {self.situation} ({value})",
+                f"add a precondition that no {self.kind} has it before: an :AbsenceCondition with :ofClass {self.kind}, "
+                f":situationType {self.situation} and :value {value}",
+            )
+
+    def given(self, behavior: Behavior) -> Iterator[ValueEffect]:
+        """Yield the effects that give a value which isn't shared."""
+        for effect in behavior.effects:
+            if effect.situation == self.situation and effect.value not in self.shared:
+                yield effect
+
+    def free(self, behavior: Behavior, when: Sequence[Condition], value: str, own: str = "") -> bool:
+        """Return whether conditions say that no individual has a value; `own` may be excepted."""
+        return any(self._none_has(c, value, own) for c in (*behavior.preconditions, *when))
+
+    def _none_has(self, condition: Condition, value: str, own: str) -> bool:
+        rules = self.problem.domain.rules
+        match condition:
+            case Witness(variable, kind, inner, True):
+                has = ValueCondition(self.situation, (variable,), value)
+                other = {EqualityCondition(variable, own, True), EqualityCondition(own, variable, True)}
+                return self.below(self.kind, kind) and has in inner and {*inner} <= {has, *other}
+            case ValueCondition(situation, (about,), truth, negated):
+                return (about, truth, negated) in ((value, TRUE, True), (value, FALSE, False)) and any(
+                    any(self._has(c, rule.parameters[0].name) for c in rule.conditions) and len(rule.conditions) == 1
+                    for rule in rules.get(situation, ())
+                )
+            case _:
+                return False
+
+    def _has(self, condition: Condition, value: str) -> bool:
+        match condition:
+            case ValueCondition(self.situation, (_,), of, False):
+                return of == value
+            case Witness(variable, kind, (ValueCondition(self.situation, (about,), of, False),), False):
+                return about == variable and of == value and self.below(self.kind, kind)
+            case _:
+                return False
+
+    def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
+        """Return whether the one that has the value of an effect loses it, or is the one that gets it."""
+        (own,) = effect.arguments
+        return any(
+            holder == own or self.releases(behavior, effect.when, holder, effect.value)
+            for holder in self.holders(behavior, effect.when, effect.value)
+        )
+
+    def holders(self, behavior: Behavior, when: Sequence[Condition], value: str) -> Iterator[str]:
+        """Yield the terms that have a value before."""
+        for condition in (*behavior.preconditions, *when):
+            match condition:
+                case ValueCondition(self.situation, (holder,), of, False) if of == value:
+                    yield holder
+                case _:
+                    pass
+
+    def releases(self, behavior: Behavior, when: Sequence[Condition], holder: str, value: str) -> bool:
+        """Return whether a behaviour gives one that has a value another one, wherever some conditions hold."""
+        return any(
+            (effect.situation, effect.arguments) == (self.situation, (holder,))
+            and effect.value != value
+            and {*effect.when} <= {*when}
+            for effect in behavior.effects
+        )
+
+    def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
+        """Yield the states from which the value of an effect is taken by the same behaviour."""
+        for condition in (*behavior.preconditions, *effect.when):
+            match condition:
+                case ValueCondition(situation, (about,), before, False) if about == effect.value:
+                    way = _Taken(situation, behavior.kinds.get(before, ""), before if before[:1] != "?" else "")
+                    if situation != self.situation and self.leaves(way, behavior, effect):
+                        yield way
+                case _:
+                    pass
+
+    def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
+        """Return whether the value of an effect is in some state before, and no longer after it."""
+        value = effect.value
+        before = any(
+            isinstance(c, ValueCondition)
+            and (c.situation, c.arguments, c.negated) == (way.situation, (value,), False)
+            and self.inside(way, c.value, behavior)
+            for c in (*behavior.preconditions, *effect.when)
+        )
+        return before and any(
+            (e.situation, e.arguments) == (way.situation, (value,))
+            and {*e.when} <= {*effect.when}
+            and not self.may_be_inside(way, e.value, behavior)
+            for e in behavior.effects
+        )
+
+    def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
+        """Yield the behaviours after which an individual may have a value that is in such a state, and what they do."""
+        for behavior in behaviors:
+            for effect in self.given(behavior):
+                if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):
+                    yield behavior, f"gives {self.situation} the value {effect.value.lstrip('?')}"
+            for effect in behavior.effects:
+                if effect.situation != way.situation or len(effect.arguments) != 1:
+                    continue
+                if not self.may_be_inside(way, effect.value, behavior):
+                    continue
+                (about,) = effect.arguments
+                stays = any(
+                    isinstance(c, ValueCondition)
+                    and (c.situation, c.arguments, c.negated) == (way.situation, (about,), False)
+                    and self.inside(way, c.value, behavior)
+                    for c in (*behavior.preconditions, *effect.when)
+                )
+                let_go = any(
+                    self.releases(behavior, effect.when, holder, about)
+                    for holder in self.holders(behavior, effect.when, about)
+                )
+                if not stays and not let_go and not self.free(behavior, effect.when, about):
+                    said = f"{way.situation} of {about.lstrip('?')} the value {effect.value.lstrip('?')}"
+                    yield behavior, f"gives {said}"
+
+    def inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
+        """Return whether a term surely stands for a value of a state."""
+        if term[:1] == "?":
+            return bool(way.kind) and self.below(behavior.kinds.get(term, ""), way.kind)
+        return term == way.value or term in self.problem.classes.get(way.kind, ())
+
+    def may_be_inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
+        """Return whether a term may stand for a value of a state."""
+        if term[:1] != "?":
+            return self.inside(way, term, behavior)
+        kind = behavior.kinds.get(term, "")
+        members = {*self.problem.classes.get(kind, ())}
+        if way.value:
+            return way.value in members
+        both = self.below(kind, way.kind) or self.below(way.kind, kind)
+        return both or not members.isdisjoint(self.problem.classes.get(way.kind, ()))
+
+    def below(self, kind: str, other: str) -> bool:
+        """Return whether each individual of one class, which may be a union, is in another one."""
+        above = {*other.split("|"), other}
+        for part in kind.split("|"):
+            found, waiting = {part}, [part]
+            while waiting:
+                waiting += (more := {*self.problem.parents.get(waiting.pop(), ())} - found)
+                found |= more
+            if found.isdisjoint(above):
+                return False
+        return True

@@ -1,0 +1,164 @@
+"""Rules of names: terms that aren't declared, individuals that may be one, names of files."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+from urllib.parse import unquote
+
+import pyoxigraph as ox
+
+import ontology
+from reasoner.graph.knowledge import SCENE, text
+from reasoner.names import local_name, nearest
+from reasoner.reading.swrl import SWRL
+from reasoner.validation.case import Case, Fault
+from reasoner.vocabulary import OWL, RDF, RDFS, XSD
+
+BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"))
+ATOMS = (SWRL + "argument1", SWRL + "argument2")
+OF_A_RULE = "a variable or an individual of a SWRL rule"
+OF_CLASSES = {RDF + "type", RDFS + "subClassOf", SWRL + "classPredicate"}
+OF_CLASSES |= {
+    OWL + name
+    for name in ("disjointWith", "equivalentClass", "complementOf", "someValuesFrom", "allValuesFrom", "onClass")
+}
+OF_PROPERTIES = {OWL + "onProperty", RDFS + "subPropertyOf", OWL + "inverseOf", SWRL + "propertyPredicate"}
+PROPERTIES = {OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")}
+
+
+def undeclared_terms(case: Case) -> Iterator[Fault]:
+    """Find predicates that are no property, types that are no class, and individuals without a type."""
+    seen = set()
+    for subject, iri, wanted, kinds in _undeclared(case):
+        if iri in seen:
+            continue
+        seen.add(iri)
+        name = local_name(iri)
+        known = {other: local_name(other) for other, types in case.types.items() if not kinds or kinds & types}
+        elsewhere = sorted(other for other, called in known.items() if called == name and other != iri)
+        hint = f"; did you mean <{elsewhere[0]}>?" if elsewhere else nearest(name, [*known.values()])
+        yield (
+            subject.value if isinstance(subject, ox.NamedNode) else iri,
+            f"{name} is used as {wanted}, but isn't declared as one{hint}",
+            "an unknown name is read as a new one, without a warning; what was meant by it is lost",
+            f"mend the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
+        )
+
+
+def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
+    """Yield each use of a term that isn't declared: the subject, the term, what it has to be, in words and as classes."""
+    for triple in case.triples:
+        for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
+            types = case.types.get(iri, set())
+            if not iri.startswith(BUILT_IN) and not (kinds & types if kinds else types):
+                yield triple.subject, iri, wanted, kinds
+
+
+def misread(case: Case) -> set[str]:
+    """Return what names a term that isn't declared, and what names that: other faults of these may follow from it."""
+    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)}
+    return first | {
+        triple.subject.value
+        for triple in case.triples
+        if isinstance(triple.object, ox.NamedNode)
+        and isinstance(triple.subject, ox.NamedNode)
+        and triple.object.value in first
+    }
+
+
+def _uses(triple: ox.Triple, kinds_of_predicate: set[str]) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield the IRIs of a triple with what they have to be."""
+    predicate, value = triple.predicate.value, triple.object
+    yield predicate, "a property", PROPERTIES
+    if not isinstance(value, ox.NamedNode):
+        return
+    if predicate in OF_CLASSES:
+        yield value.value, "a class", {OWL + "Class", RDFS + "Datatype"}
+    elif predicate in ATOMS:
+        yield value.value, OF_A_RULE, set()
+    elif OWL + "ObjectProperty" in kinds_of_predicate or predicate in (RDF + "first", OWL + "hasValue"):
+        yield value.value, "a term", set()
+    elif predicate in OF_PROPERTIES:
+        yield value.value, "a property", PROPERTIES
+
+
+MERGEABLE = """
+SELECT DISTINCT ?individual ?class WHERE {
+  { SELECT DISTINCT ?class WHERE {
+    { ?above a :SituationType } UNION { ?above rdfs:subClassOf :Object } UNION { VALUES ?above { :Object } }
+    UNION { ?property a owl:FunctionalProperty, owl:ObjectProperty ; rdfs:range ?above }
+    ?class rdfs:subClassOf* ?above . FILTER(isIRI(?class) && (!STRSTARTS(STR(?class), STR(:)) || ?class = :Hand))
+  } }
+  ?individual a ?class, owl:NamedIndividual . FILTER NOT EXISTS { ?individual a owl:Class }
+}"""
+
+
+def individuals_not_different(case: Case) -> Iterator[Fault]:
+    """Find things, or values of a functional property, of one class that nothing says to be different."""
+    groups = _all_different(case)
+    apart = {frozenset(pair) for pair in _pairs(case, OWL + "differentFrom")}
+    members: dict[str, set[str]] = defaultdict(set)
+    for individual, its_class in case.graph.select(MERGEABLE, ["asserted"]):
+        members[text(its_class)].add(text(individual))
+    for kind, individuals in sorted(members.items()):
+        if len(individuals) < 2 or any(individuals <= group for group in groups):
+            continue
+        if len(individuals) < 50 and all(
+            frozenset(pair) in apart or any(set(pair) <= group for group in groups)
+            for pair in combinations(sorted(individuals), 2)
+        ):
+            continue
+        missing = sorted(individuals - max(groups, key=lambda group: len(group & individuals), default=frozenset()))
+        names = ", ".join(local_name(iri) for iri in missing[:5]) + (", …" if len(missing) > 5 else "")
+        yield (
+            missing[0] if missing else min(individuals),
+            f"nothing says that {names} and the other individuals of {local_name(kind)} are different",
+            "OWL lets two names mean one individual: a reasoner would merge them where a functional property clashes",
+            "list all of them in one owl:AllDifferent (Protégé: Edit, Make all individuals different)",
+        )
+
+
+def _all_different(case: Case) -> list[frozenset[str]]:
+    rows = case.graph.select(
+        "SELECT ?group ?member WHERE { ?group owl:distinctMembers|owl:members ?list . "
+        "?group a owl:AllDifferent . ?list rdf:rest*/rdf:first ?member }",
+        SCENE,
+    )
+    groups: dict[str, set[str]] = defaultdict(set)
+    for group, member in rows:
+        groups[str(group)].add(member.value)  # type: ignore[union-attr]
+    return [frozenset(group) for group in groups.values()]
+
+
+def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
+    for triple in case.triples:
+        if triple.predicate.value == predicate and isinstance(triple.object, ox.NamedNode):
+            yield triple.subject.value, triple.object.value  # type: ignore[union-attr]
+
+
+def files_and_iris(case: Case) -> Iterator[Fault]:
+    """Find files whose name isn't the last part of their IRI, and catalogs that lead elsewhere."""
+    for iri, file in case.graph.files.items():
+        wanted = unquote(local_name(iri))
+        if file.stem != wanted:
+            yield (
+                iri,
+                f"the file is called {file.name}, its ontology {wanted}",
+                "who looks for an import finds it by its name, unless a catalog says otherwise",
+                f"call the file {wanted}{file.suffix}, or the ontology …/{file.stem}",
+            )
+        for catalog in {file.with_name(ontology.CATALOG), ontology.ROOT / ontology.CATALOG}:
+            if catalog.is_file() and (entry := ontology.catalog(catalog).get(iri)) and not _same(entry, file):
+                yield (
+                    iri,
+                    f"{catalog} says that <{iri}> lies in {entry}, not here",
+                    "Protégé would open the other file",
+                    "mend the entry of the catalog",
+                )
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
