@@ -18,6 +18,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import TypeAlias
 
 import pyoxigraph as ox
 
@@ -34,8 +35,10 @@ from reasoner.symbols import (
     TRUE,
     AmountEffect,
     AnyOf,
+    Behavior,
     Comparison,
     Condition,
+    Effect,
     RelationCondition,
     ValueCondition,
     ValueEffect,
@@ -115,12 +118,11 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 
 
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
-    """Return how to reach, from what the goal names, everything that a behaviour on it can involve.
+    """Return how to reach, from what the goal names, every individual that a step on it can involve or change.
 
-    A behaviour counts if it changes a situation type that counts, a rule if it defines one; then so do those in its conditions
-    and its other effects.
-    `looked_up` are the situation types that are followed backward, each with the constants from which it is: a behaviour
-    that gives somebody such a value counts from that value on, too.
+    A behaviour counts if it changes a situation type that counts, a rule if it defines one; the situation types in its conditions
+    and effects then count too. A situation type that is looked up from some of its terms alone is also followed from an effect
+    that gives it to these terms.
 
     Parameters
     ----------
@@ -131,53 +133,76 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """
     found = Routes(forward=set(known.properties) - known.schema.numbers, classes=_goal_classes(known.schema))
     counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
-    looked_up: dict[str, set[str]] = {}
-    spanned = set[tuple[int, int, bool]]()
+    looked_up: LookedUp = {}
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
-    doing = [*known.lifted.values(), *rules]
+    doing = [_Doing(behavior) for behavior in (*known.lifted.values(), *rules)]
     before = -1
     while before != (before := len(counting) + len(looked_up) + sum(map(len, looked_up.values()))):
-        for behavior in doing:
-            if not behavior.changes & counting:
-                continue
-            counting |= behavior.changes
-            kinds = {
-                **behavior.kinds,
-                **{e.each.name: e.each.kind for e in behavior.every_effect if e.each is not None},
-            }
-            changes = [(_values_of(e), e) for e in behavior.effects] + [
-                (terms_of(e.amount), e) for e in behavior.amounts
-            ]
-            for number, (values, effect) in enumerate(changes):
-                kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}
-                starts = {False: set(effect.arguments)}
-                if effect.situation in looked_up and any(
-                    value.startswith("?") or value in looked_up[effect.situation] for value in values
-                ):
-                    starts[True] = set(values)
-                if isinstance(effect, AmountEffect):
-                    counting |= situations_in(effect.amount)
-                scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
-                counting |= {s for scope in scopes for c in scope.conditions for s in _situations(c)}
-                own = {t for s in scopes for c in s.conditions for t in terms(c)} - {TRUE, FALSE} | {
-                    *effect.arguments,
-                    *values,
-                }
-                own &= kinds.keys()
-                for from_value, start in starts.items():
-                    if (id(behavior), number, from_value) in spanned:
-                        continue
-                    spanned.add((id(behavior), number, from_value))
-                    # What must not hold, or need not, leads to nothing that the behaviour itself is done with.
-                    _span(scopes[0], start, own, known, found, looked_up)
-                    for scope in scopes[1:]:
-                        _span(scope, start | own, set(), known, found, looked_up)
+        for one in doing:
+            if one.behavior.changes & counting:
+                one.follow(known, found, looked_up)
+                counting |= one.situations
     return found
 
 
-def _values_of(effect: ValueEffect) -> tuple[str, ...]:
-    """Return the value that an effect gives; where it makes a pair true or false, that is the second of them."""
-    return effect.arguments[1:] if effect.value in (TRUE, FALSE) and len(effect.arguments) == 2 else (effect.value,)
+LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
+"""Places among the terms of situation types from which symbols are looked up, each with the constants that may stand there."""
+
+
+class _Doing:
+    """A behaviour or rule as recognition follows it: from each effect to the whole step, and from the step to all that it changes.
+
+    Attributes
+    ----------
+    situations : set of str
+        The situation types that it asks or changes.
+    """
+
+    def __init__(self, behavior: Behavior) -> None:
+        self.behavior = behavior
+        self.asks = _scopes(behavior.preconditions, behavior.kinds)
+        self.step = {t for c in self.asks[0].conditions for t in terms(c)} & behavior.kinds.keys()
+        self.step |= {parameter.name for parameter in behavior.parameters}
+        self.effects = []
+        for effect in behavior.every_effect:
+            kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}
+            self.effects.append((effect, _scopes((*behavior.preconditions, *effect.when), kinds), _terms_in(effect)))
+        amounts = [situations_in(effect.amount) for effect in behavior.amounts]
+        scopes = [*self.asks, *(scope for _, scopes, _ in self.effects for scope in scopes)]
+        asked = (s for scope in scopes for condition in scope.conditions for s in _situations(condition))
+        self.situations = behavior.changes.union(asked, *amounts)
+        self.spanned = set[tuple[int, frozenset[str]]]()
+
+    def follow(self, known: Frame, found: Routes, looked_up: LookedUp) -> None:
+        """Add the steps to all individuals of a step that changes what is known, and to all that this step changes."""
+        if not self.spanned:
+            for scope in self.asks[1:]:  # what must not hold, or need not
+                _span(scope, self.step, set(), known, found, looked_up)
+            for _, (first, *groups), named in self.effects:
+                _span(first, self.step, named, known, found, looked_up)
+                for scope in groups:
+                    _span(scope, self.step | named, set(), known, found, looked_up)
+        for number, (effect, (first, *_), named) in enumerate(self.effects):
+            for start in (frozenset(effect.arguments), *_given(effect, looked_up)):
+                if (number, start) not in self.spanned:
+                    self.spanned.add((number, start))
+                    _span(first, set(start), self.step | named, known, found, looked_up)
+
+
+def _terms_in(effect: Effect) -> set[str]:
+    """Return the terms of an effect: what it is about, and what it gives."""
+    given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
+    return {*effect.arguments, *given} - {TRUE, FALSE}
+
+
+def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
+    """Yield each term of an effect from which what it makes true is looked up."""
+    if isinstance(effect, AmountEffect) or effect.value == FALSE:
+        return
+    for at, term in enumerate(effect.arguments if effect.value == TRUE else (*effect.arguments, effect.value)):
+        constants = looked_up.get((effect.situation, at))
+        if constants is not None and (term.startswith("?") or term in constants):
+            yield frozenset({term})
 
 
 @dataclass(frozen=True)
@@ -213,19 +238,13 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
 
 
 def _span(
-    scope: _Scope,
-    start: set[str],
-    more: set[str],
-    known: Frame,
-    found: Routes,
-    looked_up: dict[str, set[str]],
+    scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp
 ) -> None:
     """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more
-    waiting = (in_use | {t for t in start if t.startswith("?")}) - start
-    reached = set(start) | {t for t in in_use if not t.startswith("?")}
-    waiting -= reached
+    reached = start | {t for t in in_use if not t.startswith("?")}
+    waiting = in_use - reached
     while waiting:
         usable = [step for step in steps if step.source in reached and step.target in waiting]
         if not usable:
@@ -246,62 +265,59 @@ def _span(
 
 @dataclass(frozen=True)
 class _Step:
-    """One way from a term to another: the properties to follow, and what that costs."""
+    """One way from a term to another: the properties to follow, and what that costs.
+
+    `constants` may stand in the place of the source; `looks_up` is this place, unless the source alone determines the symbol.
+    """
 
     source: str
     target: str
     cost: int
-    forward: frozenset[str] = frozenset()
-    backward: frozenset[str] = frozenset()
-    constants: frozenset[str] = frozenset()
-    looks_up: str | None = None
+    forward: frozenset[str]
+    backward: frozenset[str]
+    constants: frozenset[str]
+    looks_up: tuple[str, int] | None
 
 
 def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
-    """Yield the steps that a positive condition allows."""
-    names, schema = known.names, known.schema
-    if isinstance(condition, RelationCondition) and not condition.negated:
-        iri = names.iri(condition.relation)
-        terms = condition.arguments
-        if len(terms) == 2:
-            yield _Step(terms[0], terms[1], RELATION, forward=frozenset({iri}))
-            yield _Step(terms[1], terms[0], RELATION, backward=frozenset({iri}))
-        yield from _steps_by_nodes(terms, len(terms) > 2, schema)
-    elif isinstance(condition, ValueCondition) and not condition.negated and condition.value != FALSE:
-        if condition.situation in known.domain.rules:
-            return  # nothing is stated of it; its rules are followed
-        situation = known.domain.situations[condition.situation]
-        terms = condition.arguments if condition.value == TRUE else (*condition.arguments, condition.value)
-        properties = frozenset(p for p, (name, _) in known.properties.items() if name == condition.situation)
-        if len(terms) != 2 or not properties:
-            yield from _steps_by_nodes(terms, True, schema, condition.situation)
-            return
-        subject, value = terms
-        yield _Step(subject, value, FREE)
-        kind = scope.kinds.get(value)
-        constants = frozenset({value}) if kind is None else frozenset(known.classes.get(kind, ()))
-        if situation.default in constants:
-            return  # who has the default may not say so: it can't be found by it
-        back = properties | (frozenset({CORE + "value"}) if schema.tuples else frozenset())
-        cost = FROM_CONSTANT if kind is None else BACKWARD
-        yield _Step(value, subject, cost, backward=back, constants=constants, looks_up=condition.situation)
+    """Yield the steps that a positive condition allows: between any two of its terms, by what is stated of them.
 
-
-def _steps_by_nodes(terms: Sequence[str], only: bool, schema: Schema, situation: str | None = None) -> Iterator[_Step]:
-    """Yield the steps over facts that are nodes of their own; from their first argument they are always followed."""
-    if not (only or schema.tuples):
-        return
-    for source in terms:
-        for target in terms:
-            if source != target:
-                first = source == terms[0]
-                yield _Step(
-                    source,
-                    target,
-                    RELATION if first else BACKWARD,
-                    backward=frozenset() if first else frozenset(PLACES[1:]),
-                    looks_up=None if first else situation,
-                )
+    Facts that are nodes of their own are always followed from their first argument.
+    """
+    arguments: tuple[str, ...]
+    match condition:
+        case RelationCondition(relation, arguments, False):
+            situation, properties = None, frozenset({known.names.iri(relation)})
+        case ValueCondition(name, about, value, False) if value != FALSE and name not in known.domain.rules:
+            situation, arguments = known.domain.situations[name], about if value == TRUE else (*about, value)
+            properties = frozenset(p for p, (of, _) in known.properties.items() if of == name)
+        case _:
+            return  # nothing is stated of what rules define: their conditions are followed
+    if len(arguments) != 2:
+        properties = frozenset()
+    nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
+    for at, source in enumerate(arguments):
+        kind = scope.kinds.get(source)
+        constants = frozenset({source} if kind is None else known.classes.get(kind, ()))
+        if situation is not None and at == len(situation.arguments) and situation.default in constants:
+            continue  # who has the default may not say so: it can't be found by it
+        if situation is None:
+            cost = RELATION if properties or not at else BACKWARD
+        elif not properties:
+            cost = BACKWARD if at else RELATION
+        else:
+            cost = FREE if not at else FROM_CONSTANT if kind is None else BACKWARD
+        alone = situation is None or (not at and len(situation.arguments) == 1)
+        for target in (other for other in arguments if other != source):
+            yield _Step(
+                source,
+                target,
+                cost,
+                forward=properties,
+                backward=properties | nodes if at else frozenset(),
+                constants=constants,
+                looks_up=None if alone or situation is None else (situation.name, at),
+            )
 
 
 def _situations(condition: Condition) -> Iterable[str]:
