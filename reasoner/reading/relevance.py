@@ -1,13 +1,13 @@
 """Task recognition: which individuals of a large world the task at hand can need, read by few queries.
 
-The slice is closed. Whatever a behaviour could do to a situated object of the slice, and whatever that depends on, is in the
-slice as well; so planning in it and planning in the whole world have the same answer (the proof is in
-docs/quantification.md, the test in tests/reasoner/test_recognition.py). Two steps:
+The slice is closed. Whatever a behaviour could do to a situated object of the slice, whatever that depends on, and whatever the
+behaviour changes besides is in the slice as well; so planning in it and planning in the whole world have the same answer
+(the proof is in docs/quantification.md, the tests in tests/reasoner/test_recognition.py and test_closure.py). Two steps:
 
-1. `routes` looks at the behaviours alone. For each behaviour that can change a situated object, it finds how its other
-   terms are reached from that object: forward over a value (the object is at a place), over a static relation (a hand
-   reaches the place), or backward from a value (what else is at the place). A term that nothing leads to has to be looked
-   for among all individuals of its class.
+1. `routes` looks at the behaviours alone. For each behaviour that can change a situated object, it finds how the other
+   terms of its preconditions and of all of its effects are reached from that object: forward over a value (the object is at
+   a place), over a static relation (a hand reaches the place), or backward from a value (what else is at the place). A term
+   that nothing leads to has to be looked for among all individuals of its class.
 2. `recognise` starts from what the goal names and follows the routes in the graph, a round of them per query, until nothing
    new comes: the slice widens until nothing outside can help, so a task that has no plan in it has none.
 """
@@ -237,9 +237,7 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
     return found
 
 
-def _span(
-    scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp
-) -> None:
+def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
     """Add the steps by which all terms of a conjunction, and some more, are reached from some, by the cheapest first."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more

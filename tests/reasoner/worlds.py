@@ -1,5 +1,6 @@
 """Random worlds: behaviours and situations drawn at random, written as ordinary Turtle, for property tests."""
 
+import re
 from pathlib import Path
 
 from hypothesis import strategies as st
@@ -31,6 +32,10 @@ w:fill a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual .
 w:size a owl:DatatypeProperty, owl:NamedIndividual, :Relation .
 w:near a owl:ObjectProperty, owl:NamedIndividual, :Relation .
 w:fits a owl:ObjectProperty, owl:NamedIndividual, :Relation .
+w:LENT a owl:NamedIndividual, :SituationType ; :parameter w:LENT.1, w:LENT.2, w:LENT.3 .
+w:LENT.1 a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+w:LENT.2 a owl:NamedIndividual, :Parameter ; :index 2 ; :termType w:Tool .
+w:LENT.3 a owl:NamedIndividual, :Parameter ; :index 3 ; :termType w:Spot .
 """
 KINDS = {"x": "w:Thing", "y": "w:Tool", "z": "w:Spot", "u": "w:Spot", "v": "w:Thing"}
 THINGS, SPOTS = ["x", "y", "v"], ["z", "u"]
@@ -51,7 +56,10 @@ def leaf(draw: st.DrawFn, behavior: str, name: str) -> str:
                 f":ValueCondition ; :about {thing} ; :situationType w:COLOR ; :value w:red",
                 f":ValueCondition ; :about {thing} ; :situationType w:COLOR ; :value w:blue",
                 f":ValueCondition ; :about {thing} ; :situationType w:TOUCHES ; :value {spot}",
+                f":ValueCondition ; :about {thing} ; :argument2 w:{behavior}.y ; :argument3 {spot} ; :situationType w:LENT",
+                f":ValueCondition ; :about {thing} ; :argument2 w:{behavior}.y ; :argument3 w:s0 ; :situationType w:LENT",
                 f":RelationCondition ; :about {spot} ; :relation w:near ; :value {spot2}",
+                f":RelationCondition ; :about {spot} ; :relation w:near ; :value w:s0",
                 f":RelationCondition ; :about {thing} ; :relation w:fits ; :value {spot}",
                 f":ClassCondition ; :about {thing} ; :ofClass w:Tool",
                 f":EqualityCondition ; :about {thing} ; :value {other}",
@@ -86,7 +94,10 @@ def condition(draw: st.DrawFn, behavior: str, name: str) -> str:
             st.sampled_from(
                 [
                     f":ValueCondition ; :about w:{name}w ; :situationType w:AT ; :value {spot}",
+                    f":ValueCondition ; :about w:{name}w ; :situationType w:TOUCHES ; :value {spot}",
+                    f":ValueCondition ; :about w:{name}w ; :argument2 w:{name}w ; :argument3 w:s0 ; :situationType w:LENT",
                     f":RelationCondition ; :about w:{name}w ; :relation w:fits ; :value {spot}",
+                    f":RelationCondition ; :about w:{name}w ; :relation w:fits ; :value w:s0",
                     f":ValueCondition ; :about w:{name}w ; :situationType w:COLOR ; :value w:blue",
                 ]
             )
@@ -100,6 +111,34 @@ def condition(draw: st.DrawFn, behavior: str, name: str) -> str:
 
 
 @st.composite
+def of_each(draw: st.DrawFn, name: str) -> str:
+    """Return an effect on all things or tools, sometimes only on those at a spot or of a color, or on another thing."""
+    about = draw(st.sampled_from(["w:Thing", "w:Tool", f"w:{name}.v"]))
+    what = draw(
+        st.sampled_from(
+            [
+                ':AmountEffect ; :situationType w:FILL ; :change "decrease" ; :amount 1',
+                ':AmountEffect ; :situationType w:FILL ; :change "increase" ; :amount 0.5',
+                ":ValueEffect ; :situationType w:COLOR ; :value w:blue",
+                f":ValueEffect ; :situationType w:AT ; :value w:{name}.z",
+            ]
+        )
+    )
+    when = draw(
+        st.sampled_from(
+            [
+                "",
+                f":ValueCondition ; :about {about} ; :situationType w:AT ; :value w:{name}.u",
+                f":ValueCondition ; :about {about} ; :situationType w:COLOR ; :value w:blue",
+                f":RelationCondition ; :about {about} ; :relation w:fits ; :value w:s0",
+            ]
+        )
+    )
+    said = f"w:{name}_f a owl:NamedIndividual, {what} ; :about {about}{f' ; :when w:{name}_w' if when else ''} .\n"
+    return said + (f"w:{name}_w a owl:NamedIndividual, {when} .\n" if when else "")
+
+
+@st.composite
 def behavior(draw: st.DrawFn, name: str) -> str:
     """Return a behaviour; a spot that a condition determines is sometimes a variable, every other term a parameter."""
     conditions = draw(st.integers(1, 3))
@@ -109,14 +148,18 @@ def behavior(draw: st.DrawFn, name: str) -> str:
         "AT": draw(st.sampled_from([f"w:{name}.{spot}", f"w:{name}.{spot}", "w:nowhere"])),
         "COLOR": draw(st.sampled_from(["w:red", "w:blue"])),
         "TOUCHES": f"w:{name}.{spot}",
+        "LENT": f":true ; :argument2 w:{name}.y ; :argument3 w:{name}.{spot}",
     }
-    situation = draw(st.sampled_from(["AT", "AT", "COLOR", "TOUCHES"]))
+    situation = draw(st.sampled_from(["AT", "AT", "COLOR", "TOUCHES", "LENT"]))
     negated = draw(st.sampled_from(["", " ; :negated true"])) if situation == "TOUCHES" else ""
     text += (
         f"w:{name}_e a owl:NamedIndividual, :ValueEffect ; :about w:{name}.{thing} ; "
         f":situationType w:{situation} ; :value {effects[situation]}{negated} .\n"
     )
     effects_of = [f"w:{name}_e"]
+    if draw(st.sampled_from([True, True, False])):
+        text += draw(of_each(name))
+        effects_of.append(f"w:{name}_f")
     if draw(st.booleans()):
         change = draw(st.sampled_from(["assign", "increase", "decrease", "scale"]))
         effects_of.append(f"w:{name}_a")
@@ -153,7 +196,7 @@ def worlds(draw: st.DrawFn) -> str:
     """Return a world as Turtle: two or three behaviours, a few things and spots, a goal of one or two facts."""
     text = HEAD
     spots = [f"s{i}" for i in range(draw(st.integers(1, 3)))]
-    things = [f"t{i}" for i in range(draw(st.integers(1, 3)))]
+    things = [f"t{i}" for i in range(draw(st.integers(1, 4)))]
     for spot in spots:
         text += f"w:{spot} a owl:NamedIndividual, w:Spot .\n"
         text += "".join(f"w:{spot} w:near w:{other} .\n" for other in spots if draw(st.booleans()))
@@ -161,9 +204,22 @@ def worlds(draw: st.DrawFn) -> str:
         place, kind = draw(st.sampled_from([*spots, "nowhere"])), draw(st.sampled_from(["Thing", "Tool"]))
         text += f"w:{thing} a owl:NamedIndividual, w:{kind} ; w:at w:{place} .\n"
         text += draw(st.sampled_from(["", f"w:{thing} w:color w:blue .\n"]))
-        text += draw(st.sampled_from(["", f"w:{thing} w:fill 2.5 ; w:size 1.50 .\n", f"w:{thing} w:size 0.5 .\n"]))
+        text += draw(
+            st.sampled_from(
+                [
+                    f"w:{thing} w:size 0.5 .\n",
+                    f"w:{thing} w:fill 2.5 ; w:size 1.50 .\n",
+                    f"w:{thing} w:fill 0 .\n",
+                ]
+            )
+        )
         text += "".join(f"w:{thing} w:fits w:{spot} .\n" for spot in spots if draw(st.booleans()))
         text += "".join(f"w:{thing} w:touches w:{spot} .\n" for spot in spots if draw(st.booleans()))
+    kinds = dict(re.findall(r"^w:(t\d) a owl:NamedIndividual, w:(\w+)", text, re.M))
+    for n, (thing, tool) in enumerate((a, b) for a in things for b in things if kinds[b] == "Tool"):
+        if draw(st.booleans()):
+            text += f"w:lent{n} a owl:NamedIndividual, :SituatedObjectInstance ; :situationType w:LENT ; :about w:{thing} ; "
+            text += f":argument2 w:{tool} ; :argument3 w:{draw(st.sampled_from(spots))} ; :value :true .\n"
     for i in range(draw(st.integers(2, 3))):
         text += draw(behavior(f"B{i}"))
     thing, spot = draw(st.sampled_from(things)), draw(st.sampled_from(spots))
