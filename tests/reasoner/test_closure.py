@@ -1,4 +1,4 @@
-"""The slice is closed: what a step asks, changes, or could be refused by is in it, one world for each kind of condition and effect."""
+"""The slice is closed: it has what a step asks, changes or could be refused by. One world for each kind of condition and effect."""
 
 from pathlib import Path
 
