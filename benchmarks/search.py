@@ -43,10 +43,11 @@ from planner.hierarchical import serialization as serialise
 from planner.hierarchical.planner import Compiled, compiled, plan
 from planner.hierarchical.refinement_cache import Template
 from planner.hierarchical.subplans import Ground, Segments
-from planner.plan import LimitError, Limits, Outcome, Reason, Status
+from planner.plan import Limits, Outcome, Reason, Status
 from planner.validation import validate
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import load
+from reasoner.limits import LimitError
 from reasoner.memory.experience import Experience
 from reasoner.reading.problem import read
 from reasoner.symbols import Domain, Problem

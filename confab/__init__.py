@@ -10,6 +10,7 @@
 `Memory`          what was learned from all this; `practise(…)` learns, and shows what it is worth
 `new_domain(name)`  begin a domain of your own; `validate(file)` says what is wrong with it
 `generate(…)`     a scene for trials, as large as wanted
+`within(seconds)` everything that is done in a block ends by then
 `KnowledgeError`  what was given can't be used; the message says what, where, and what to do
 ================  =========================================================================================
 
@@ -35,6 +36,7 @@ if _TYPE_CHECKING:
     from confab.scene import Scene, load, scenes
     from confab.table import Table
     from reasoner.graph.knowledge import KnowledgeError
+    from reasoner.limits import within
 
 __version__ = "0.1.0"
 __all__ = [
@@ -52,6 +54,7 @@ __all__ = [
     "practise",
     "scenes",
     "validate",
+    "within",
 ]
 
 _HOMES = {
@@ -69,6 +72,7 @@ _HOMES = {
     "practise": "confab.curve",
     "scenes": "confab.scene",
     "validate": "confab.authoring",
+    "within": "reasoner.limits",
 }
 
 

@@ -19,6 +19,7 @@ from planner.acting.symbolic_world import SymbolicWorld
 from planner.plan import Plan, Planner, Step, renumbered
 from planner.solve import DEFAULT_MODE
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import within
 from reasoner.memory.links import Links
 from reasoner.names import nearest
 from reasoner.reading.goals import parse_fact, with_goals
@@ -325,6 +326,7 @@ def carry_out(
     seed: int = 0,
     tell: Callable[[Moment], None] | None = None,
     watch: bool = False,
+    time_limit: float | None = None,
     **options: Any,
 ) -> Execution:
     """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
@@ -345,7 +347,8 @@ def carry_out(
         planner = partial(plan_with, memory=memory.advisor, mode=mode)
     number("seed", seed, "an integer")
     texts = several(interventions)
-    with spectator(watch, tell) as heard:
+    number("time_limit", time_limit, "seconds as a number, e.g. 5")
+    with within(time_limit), spectator(watch, tell) as heard:
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 
 

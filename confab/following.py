@@ -11,7 +11,7 @@ import pyoxigraph as ox
 from planner.derived_facts import Rules
 from planner.transitions import Table, Writer, key_of
 from reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
-from reasoner.limits import Deadline
+from reasoner.limits import check
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading
 from reasoner.reading.restating import said, value_properties
@@ -44,7 +44,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
         words = (local_name(one) for one in (iri, properties.get(iri, iri), *of))
         if any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", sparql) for word in words):
             classes[situation] = of
-    for count, symbol in enumerate(_following(problem, classes, graph.deadline)):
+    for count, symbol in enumerate(_following(problem, classes)):
         prop = properties.get(reading.names.iri(symbol.situation))
         triples = list(said(reading, Fact(symbol, TRUE), prop, ox.BlankNode(f"follows{count}")))
         about = ox.NamedNode(reading.names.iri(symbol.arguments[0]))
@@ -52,7 +52,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
         graph.store.extend(ox.Quad(one.subject, one.predicate, one.object, name) for one in triples)
 
 
-def _following(problem: Problem, situations: Collection[str], deadline: Deadline) -> Iterator[Symbol]:
+def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
     """Yield what follows in the initial state of some defined situation types."""
     if not situations:
         return
@@ -62,6 +62,6 @@ def _following(problem: Problem, situations: Collection[str], deadline: Deadline
         for arguments in product(
             *(problem.classes.get(kind, ()) for kind in problem.domain.situations[name].arguments)
         ):
-            deadline.check(f"working out {name} in the initial state")
+            check(f"working out {name} in the initial state")
             if table.now[name].get(key_of(arguments)) == TRUE:
                 yield Symbol(name, arguments)

@@ -16,7 +16,7 @@ from confab.accepting import sparql_of
 from confab.table import Table
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.limits import Deadline
+from reasoner.limits import within
 from reasoner.names import Names, nearest
 from reasoner.reading.goals import parse_fact
 from reasoner.reading.problem import Reading, read, read_names
@@ -288,10 +288,9 @@ class Known:
         if SITUATION in sparql:
             write_situation(self.knowledge, self.reading)
         if not self.knowledge.remote:
-            deadline = Deadline.after((limits or QueryLimits()).seconds)
             with (
                 suppress(KnowledgeError),
-                self.knowledge.until(deadline),
+                within((limits or QueryLimits()).seconds),
             ):  # what can't be planned in can be asked all the same
                 write_following(self.knowledge, lambda: self.reading, sparql)
         for fault in () if self._told else self.knowledge.faults:

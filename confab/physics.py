@@ -14,6 +14,7 @@ from confab.progress import progress
 from confab.table import Table
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import within
 from reasoner.symbols import Fact, State
 from sim.engine import Engine
 from sim.rollouts import Done, Trial, wilson
@@ -175,6 +176,7 @@ def verify(
     done: Done | None = None,
     goal: State | None = None,
     gui: bool = False,
+    time_limit: float | None = None,
 ) -> Report:
     """Carry out the primitives of a plan in PyBullet, once or with several seeds.
 
@@ -199,6 +201,8 @@ def verify(
         What shall be seen in the end; the scene's goal if left out.
     gui
         Show the first rollout on the screen, no faster than the simulated time.
+    time_limit
+        Seconds for the whole call, after which it raises `LimitError`.
 
     Raises
     ------
@@ -207,6 +211,7 @@ def verify(
     """
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
+    number("time_limit", time_limit, "seconds as a number, e.g. 5")
     if rollouts < 1:
         raise KnowledgeError(f"{rollouts} rollouts judge nothing; wanted 1 or more")
     video = None if video is None else Path(video)
@@ -224,14 +229,15 @@ def verify(
         )
         seeds = list(range(seed, seed + rollouts))
         finished: list[Rollout] = []
-        if video is not None or gui:
-            labels = labels_of(scene.knowledge, scene.names, scene.problem)
-            finished.append(_shown(trial, seeds.pop(0), video, plan, progress, gui, labels))
-        elif rollouts == 1 and str(workers) == "1":
-            finished.append(trial.run(seeds.pop(0), progress=progress))
-        if finished and done is not None:
-            done(finished[0])
-        finished += roll_out(trial, seeds, workers, done) if seeds else []
+        with within(time_limit):
+            if video is not None or gui:
+                labels = labels_of(scene.knowledge, scene.names, scene.problem)
+                finished.append(_shown(trial, seeds.pop(0), video, plan, progress, gui, labels))
+            elif rollouts == 1 and str(workers) == "1":
+                finished.append(trial.run(seeds.pop(0), progress=progress))
+            if finished and done is not None:
+                done(finished[0])
+            finished += roll_out(trial, seeds, workers, done) if seeds else []
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
     wanted = scene.problem.goal if goal is None else goal

@@ -19,7 +19,7 @@ from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collectio
 from planner.solve import DEFAULT_MODE, MODES, Request, solve
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import Deadline
+from reasoner.limits import Deadline, within
 from reasoner.memory.links import Links
 from reasoner.reading.goals import with_goals
 from reasoner.reading.problem import Reading, read
@@ -117,8 +117,7 @@ def plan(
     if optimal and time_limit is None:
         time_limit = OPTIMAL_SECONDS
     scene.knowledge.require_whole()
-    deadline = time_limit if isinstance(time_limit, Deadline) else Deadline.after(time_limit)
-    with scene.knowledge.until(deadline), paused_collection():
+    with within(time_limit) as deadline, paused_collection():
         if isinstance(memory, str | Path):
             from confab.memory import Memory
 
@@ -321,7 +320,7 @@ class Result:
         instead : int or str, optional
             In the place of which step; if left out, of the most similar one where it can be done.
         seconds : float, optional
-            Limit of each planning call.
+            Limit of the whole call.
         """
         from confab.why import find_step, why_not
 
@@ -329,14 +328,15 @@ class Result:
         labels = self.labels
 
         def ask(problem: Problem) -> Outcome:
-            return solve(Request(problem, DEFAULT_MODE, Limits(seconds=seconds)))
+            return solve(Request(problem, DEFAULT_MODE))
 
         def replan(goals: Sequence[str]) -> tuple[Problem, Outcome, Labels]:
-            other = plan(self.scene, goals, time_limit=seconds)
+            other = plan(self.scene, goals)
             return other.problem, other.outcome, other.labels
 
         place = None if instead is None else find_step(self.plan, instead, labels)
-        return why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+        with within(seconds):
+            return why_not(asked, self.problem, self.plan, labels, ask, replan, place)
 
     def explain(self) -> Account:
         """Return why each step of the plan is there; or, where there is no plan, why."""

@@ -18,7 +18,6 @@ from planner.solve import DEFAULT_MODE
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.graph.knowledge import load as load_graph
-from reasoner.limits import Deadline
 from reasoner.memory.links import Links
 from reasoner.symbols import FALSE, Fact
 
@@ -106,13 +105,14 @@ class Scene(Known):
         seed: int = 0,
         tell: Callable[[Moment], None] | None = None,
         watch: bool = False,
+        time_limit: float | None = None,
         **options: Any,
     ) -> Execution:
         """Carry the task out in a closed loop: see `confab.execution.execute`.
 
         `plan` is what to begin with: a plan, a result, or the name of a file that ``confab plan --json`` wrote. Plans from
         scratch are made with `memory`; `Memory.live` learns from what came of it. `watch` shows what happens while it
-        happens, in a notebook or a terminal; `tell` is a display of one's own.
+        happens, in a notebook or a terminal; `tell` is a display of one's own. After `time_limit` seconds the episode gives up.
 
         Examples
         --------
@@ -122,7 +122,9 @@ class Scene(Known):
         """
         from confab.execution import carry_out
 
-        return carry_out(self, plan, interventions, world, goals, memory, mode, seed, tell, watch, **options)
+        return carry_out(
+            self, plan, interventions, world, goals, memory, mode, seed, tell, watch, time_limit, **options
+        )
 
     @contextmanager
     def serve(self, port: int = 0, limits: QueryLimits | None = None) -> Iterator[str]:
@@ -182,7 +184,7 @@ class Scene(Known):
         )
 
 
-def load(source: str | Path, scene: str | None = None, deadline: Deadline | None = None) -> Scene:
+def load(source: str | Path, scene: str | None = None) -> Scene:
     """Load a scene: a shipped name, a file of RDF, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
@@ -190,16 +192,12 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
     source : str or Path
     scene : str, optional
         IRI of the scene in an endpoint that holds several.
-    deadline : Deadline, optional
-        When loading ends, done or not.
 
     Raises
     ------
     KnowledgeError
         No such scene; broken syntax; an endpoint that is down, or slow, or none. A file whose imports can't be found, or that
         declares no ontology, can be asked; planning in it says what is missing.
-    LimitError
-        The deadline came first.
 
     Examples
     --------
@@ -211,12 +209,11 @@ def load(source: str | Path, scene: str | None = None, deadline: Deadline | None
         from reasoner.graph.stores import connect
 
         return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
-    graph = load_graph(source, deadline=deadline, tolerant=True)
-    with graph.until(deadline or Deadline()):
-        try:
-            infer(graph)
-        except KnowledgeError as error:
-            graph.faults.append(str(error))
+    graph = load_graph(source, tolerant=True)
+    try:
+        infer(graph)
+    except KnowledgeError as error:
+        graph.faults.append(str(error))
     return Scene(graph, {"load": perf_counter() - begin})
 
 

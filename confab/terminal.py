@@ -95,10 +95,19 @@ def _interruptible(call: Callable[[], int | None]) -> int | None:
 
 
 @contextmanager
-def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
-    """End the process where what is done in here goes on for a tenth longer than it may: nothing interrupts a query of a store.
+def limited(seconds: float | None) -> Iterator[Deadline]:
+    """Let what a command does in here end within some seconds from now, by itself or, a tenth later, by force."""
+    from reasoner.limits import within
 
-    Nothing may be written in here.
+    with within(seconds) as deadline, ended_by(deadline, click.get_current_context().obj):
+        yield deadline
+
+
+@contextmanager
+def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
+    """End the process where what is done in here takes a tenth longer than it may: nothing interrupts a query of a store.
+
+    Files that are written in here are written as a whole or not at all (`reasoner.files.write_whole`).
     """
     if deadline.left is None or ending is None:
         yield

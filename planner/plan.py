@@ -11,6 +11,7 @@ from enum import Enum
 from time import perf_counter
 from typing import Protocol
 
+from reasoner.limits import current
 from reasoner.symbols import Condition, Fact, Problem, State
 
 
@@ -175,8 +176,12 @@ class Limits:
     work: float = math.inf
 
     def end(self, share: float = 1.0) -> float | None:
-        """Return when a share of the seconds from now on is over, as `perf_counter` counts; None: never."""
-        return None if self.seconds is None else perf_counter() + share * self.seconds
+        """Return when a share of the time from now on is over, on the clock of `perf_counter`; None: never.
+
+        The time ends with the seconds of these limits, or with the deadline that holds here (`reasoner.limits`) if that is earlier.
+        """
+        left = min((seconds for seconds in (self.seconds, current().left) if seconds is not None), default=None)
+        return None if left is None else perf_counter() + share * left
 
     def until(self, end: float | None) -> Limits:
         """Return the same limits with the seconds that are left until then, for a step of a longer call."""
@@ -200,14 +205,6 @@ class UnsolvableError(Exception):
 
 class TooLargeError(Exception):
     """What would be grounded is larger than allowed; the message says how large."""
-
-
-class LimitError(Exception):
-    """A limit of the planning call has been reached; the message says which."""
-
-
-class OutOfTimeError(LimitError):
-    """The deadline came before grounding was done."""
 
 
 @contextmanager

@@ -21,9 +21,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import OUT_OF_MEMORY, Limits, Outcome, OutOfTimeError, Reason, Status
+from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status
 from planner.plan_costs import cost_of
 from planner.validation import validate
+from reasoner.limits import OutOfTimeError
 from reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:

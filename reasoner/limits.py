@@ -1,19 +1,30 @@
-"""Limits that end what would take too long: one deadline for a whole command, and the error that says which limit came first."""
+"""The deadline of a call: set once around it, asked in every loop inside of it, and not handed down.
+
+A call that shall end in time is made inside of `within`. Whatever loops there calls `check`, or asks for `left`. Blocks nest, and
+the earliest deadline counts, so that a part of a call can be given a share of its time.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from time import monotonic
+from time import perf_counter
 
 
-class LimitError(RuntimeError):
-    """A limit came first; the message says which, at what, and how to raise it."""
+class LimitError(Exception):
+    """A limit was reached; the message says which, during which work, and how to raise it."""
+
+
+class OutOfTimeError(LimitError):
+    """The deadline has passed."""
 
 
 @dataclass(frozen=True)
 class Deadline:
-    """When a call ends, from its first step to its last.
+    """When a call ends, on the clock of `time.perf_counter`; `seconds` is the time that it was given.
 
     >>> Deadline().left
     >>> Deadline.after(60.0).left > 50.0
@@ -25,15 +36,49 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """Return the deadline so many seconds from now; None: there is none."""
-        return cls() if seconds is None else cls(monotonic() + seconds, seconds)
+        """Return the deadline that many seconds from now; None: there is none."""
+        return cls() if seconds is None else cls(perf_counter() + seconds, seconds)
 
     @property
     def left(self) -> float | None:
         """Seconds until then, not less than 0; None without a deadline."""
-        return None if math.isinf(self.at) else max(0.0, self.at - monotonic())
+        return None if math.isinf(self.at) else max(0.0, self.at - perf_counter())
 
     def check(self, doing: str) -> None:
-        """Raise `LimitError` if the time is over; `doing` says at what it was."""
-        if monotonic() > self.at:
-            raise LimitError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
+        """Raise `OutOfTimeError` if the deadline has passed; `doing` says during which work."""
+        if perf_counter() > self.at:
+            raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
+
+
+_current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # noqa: B039 - frozen
+
+
+@contextmanager
+def within(limit: Deadline | float | None) -> Iterator[Deadline]:
+    """Let everything that is done in a block end by a deadline, given as such or in seconds from now.
+
+    Yields the deadline that counts: this one, or an earlier one that holds already.
+
+    Examples
+    --------
+    >>> with within(60.0), within(90.0) as deadline:
+    ...     deadline.seconds
+    60.0
+    """
+    new = limit if isinstance(limit, Deadline) else Deadline.after(limit)
+    earliest = min(_current.get(), new, key=lambda one: one.at)
+    token = _current.set(earliest)
+    try:
+        yield earliest
+    finally:
+        _current.reset(token)
+
+
+def current() -> Deadline:
+    """Return the deadline that holds here."""
+    return _current.get()
+
+
+def check(doing: str) -> None:
+    """Raise `OutOfTimeError` if the deadline that holds here has passed."""
+    _current.get().check(doing)

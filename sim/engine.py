@@ -17,6 +17,7 @@ import numpy as np
 import pybullet
 
 from reasoner.embodiment.values import Embodiment, Shape
+from reasoner.limits import check
 from sim.base import Base
 from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
 from sim.collision import Solid, Surroundings, box, column, rim
@@ -141,6 +142,7 @@ class Engine:
         hands = [hand for hand in self.hands.values() if hand.closing]
         latching = [mechanic for mechanic in self.mechanics if mechanic.latching]
         for _ in range(steps):
+            check("simulating")
             for hand in hands:
                 hand.drive()
             for mechanic in latching:

@@ -17,6 +17,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from reasoner.embodiment.values import Embodiment
+from reasoner.limits import check, current
 from reasoner.symbols import State
 from sim.engine import Engine
 from sim.staging import Perturbation
@@ -160,7 +161,8 @@ class _Pool:
             for _ in range(min(self.size, len(self.seeds))):
                 self._start()
             while self.busy:
-                for ready in wait(list(self.busy)):
+                check("simulating")
+                for ready in wait(list(self.busy), current().left):
                     assert isinstance(ready, Connection)
                     rollout = self._receive(ready)
                     if rollout is not None:
@@ -231,7 +233,8 @@ def _on_ray(trial: Trial, seeds: Sequence[int], address: str) -> Iterator[Rollou
         shared = ray.put(trial)
         pending = [task.remote(shared, seed) for seed in seeds]
         while pending:
-            ready, pending = ray.wait(pending)
+            check("simulating")
+            ready, pending = ray.wait(pending, timeout=current().left)
             yield from ray.get(ready)
     finally:
         if begun:

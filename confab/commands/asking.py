@@ -22,7 +22,7 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.terminal import NO, YES, show_result
+from confab.terminal import NO, YES, limited, show_result
 from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
@@ -120,22 +120,23 @@ def query(
         raise KnowledgeError(
             "--update shows the behaviour that --show names; give --show BEHAVIOR, and not --applicable"
         )
-    loaded = load_scene(scene, iri).with_episodes(*episodes)
-    if show is not None and update:
-        print(loaded.update_of(show), end="")
-        return
-    if show is not None:
-        print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
-        return
-    if sparql is None and affords is None:
-        raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
-    if out is not None and out.suffix.lower() == ".ttl":
-        if sparql is None:
-            raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
-        print(f"{out}: {loaded.construct(sparql, out, limits)} triples")
-        return
-    with progress("asking"):
-        table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
+    with limited(time_limit):
+        loaded = load_scene(scene, iri).with_episodes(*episodes)
+        if show is not None and update:
+            print(loaded.update_of(show), end="")
+            return
+        if show is not None:
+            print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
+            return
+        if sparql is None and affords is None:
+            raise KnowledgeError("no query; give SPARQL text, a .rq file, --show BEHAVIOR or --affords OBJECT")
+        if out is not None and out.suffix.lower() == ".ttl":
+            if sparql is None:
+                raise KnowledgeError("-o FILE.ttl takes what a CONSTRUCT query gives; give the query, too")
+            print(f"{out}: {loaded.construct(sparql, out, limits)} triples")
+            return
+        with progress("asking"):
+            table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
     form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out is not None else "table")
     if form is None or form not in FORMS.values():
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"

@@ -15,11 +15,12 @@ from confab.commands.options import (
     QUIET,
     SCENE,
     SEED,
+    TIME_LIMIT,
     scene_names,
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.terminal import NO, YES, remark, show_result
+from confab.terminal import NO, YES, limited, remark, show_result
 
 if TYPE_CHECKING:
     pass
@@ -96,25 +97,28 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
 @click.option("--deep", is_flag=True, help="Ask HermiT for contradictions as well; needs Java.")
 @click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
 @click.option("--watch", is_flag=True, help="Check again whenever one of the files changes, until Ctrl-C.")
+@TIME_LIMIT
 @AS_JSON
 @QUIET
-def validate(files: tuple[str, ...], deep: bool, strict: bool, watch: bool, as_json: bool) -> None:
+def validate(
+    files: tuple[str, ...], deep: bool, strict: bool, watch: bool, time_limit: float | None, as_json: bool
+) -> None:
     """Check ontologies: what is wrong where, why, and what to do."""
     from confab.watching import again_and_again
 
-    code = _validated(files, deep, strict, as_json)
+    code = _validated(files, deep, strict, time_limit, as_json)
     for _ in again_and_again(files) if watch else ():
-        code = _validated(files, deep, strict, as_json)
+        code = _validated(files, deep, strict, time_limit, as_json)
     raise Exit(code)
 
 
-def _validated(files: tuple[str, ...], deep: bool, strict: bool, as_json: bool) -> int:
+def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: float | None, as_json: bool) -> int:
     """Check some files, print what was found, and return the exit code."""
     from reasoner.validation.findings import ERROR, WARNING, listing
     from reasoner.validation.validate import STAGES
     from reasoner.validation.validate import validate as check
 
-    with progress("validating", len(files) * STAGES) as advance:
+    with limited(time_limit), progress("validating", len(files) * STAGES) as advance:
         findings = check(files, deep=deep, done=lambda what: advance(what, 1))
     errors, warnings = (sum(finding.severity == kind for finding in findings) for kind in (ERROR, WARNING))
     if as_json:
@@ -185,12 +189,14 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 @click.option(
     "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
 )
-def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
+@TIME_LIMIT
+def import_(domain: Path, problem: Path, out: Path, level: int, time_limit: float | None) -> None:
     """Turn a PDDL problem into a scene."""
     from confab.authoring import turtle_path
     from confab.pddl_commands import import_pddl
 
-    imported = import_pddl(domain, problem, turtle_path(out), level)
+    with limited(time_limit):
+        imported = import_pddl(domain, problem, turtle_path(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
     print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
@@ -199,10 +205,13 @@ def import_(domain: Path, problem: Path, out: Path, level: int) -> None:
 @SCENE
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
 @click.option("--level", type=int, help="Level to export; the lowest if not given.")
-def export(scene: str, out: Path, level: int | None) -> None:
+@TIME_LIMIT
+def export(scene: str, out: Path, level: int | None, time_limit: float | None) -> None:
     """Write one level of a scene as PDDL, for other planners."""
     from confab.pddl_commands import export_pddl
     from confab.scene import load
 
-    for path in export_pddl(load(scene).problem, level, out):
+    with limited(time_limit):
+        paths = export_pddl(load(scene).problem, level, out)
+    for path in paths:
         print(path)

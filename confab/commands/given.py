@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from reasoner.limits import Deadline
 
 
-def load_scene(source: str, iri: str | None = None, deadline: Deadline | None = None) -> Scene:
+def load_scene(source: str, iri: str | None = None) -> Scene:
     """Load a scene, with what its hands reach if it has a body."""
     from confab.reaching import with_current_reach
     from confab.scene import load
 
     with progress(f"reading {source}"):
-        scene = load(source, iri, deadline)
+        scene = load(source, iri)
     return with_current_reach(scene, remark)
 
 
@@ -33,11 +33,11 @@ def doubt(scene: Scene, deadline: Deadline) -> None:
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT):
         return
-    from reasoner.limits import LimitError
+    from reasoner.limits import LimitError, within
     from reasoner.validation.validate import quick_errors
 
     errors = []
-    with suppress(LimitError), scene.knowledge.until(deadline):
+    with suppress(LimitError), within(deadline):
         errors = quick_errors(scene.knowledge)
     if errors:
         more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""

@@ -13,11 +13,12 @@ from confab.commands.options import (
     AS_JSON,
     PATH,
     QUIET,
+    TIME_LIMIT,
     scene_names,
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.terminal import EXIT, YES, remark, show_result
+from confab.terminal import EXIT, YES, limited, remark, show_result
 
 if TYPE_CHECKING:
     from confab.memory import Memory
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="How often all scenes are gone through.",
 )
+@TIME_LIMIT
 @AS_JSON
 @QUIET
 def learn(
@@ -49,6 +51,7 @@ def learn(
     demonstration: Path | None,
     plot: Path | None,
     rounds: int | None,
+    time_limit: float | None,
     as_json: bool,
 ) -> None:
     """Learn how scenes are best solved, or from a demonstration."""
@@ -61,7 +64,7 @@ def learn(
     if plot is not None:
         require_drawable(plot)
     scenes *= rounds or (6 if plot is not None and len(scenes) == 1 else 1)
-    with undisturbed(memory), progress("learning", 2 * len(scenes)) as advance:
+    with undisturbed(memory), limited(time_limit), progress("learning", 2 * len(scenes)) as advance:
         for name in scenes:
             advance(f"planning in {name}", 0)
             loaded = load_scene(name)

@@ -70,7 +70,7 @@ TIME_LIMIT = click.option(
     "--time-limit",
     type=Seconds(min=0.0),
     metavar="S",
-    help="Seconds from the start on after which it gives up (exit 3).",
+    help="Seconds after which it gives up (exit 3).",
 )
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of everything that is random.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")

@@ -29,7 +29,7 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
-from confab.terminal import EXIT, GAVE_UP, NO, YES, Ending, ended_by, remark, show_result
+from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result
 from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
@@ -67,9 +67,7 @@ if TYPE_CHECKING:
 @SCENE_IRI
 @AS_JSON
 @QUIET
-@click.pass_obj
 def plan(
-    ending: Ending | None,
     scene: str,
     goal: tuple[str, ...],
     memory: Path | None,
@@ -89,26 +87,25 @@ def plan(
 ) -> None:
     """Plan in a scene: a tree of behaviours down to primitives."""
     from confab.show import summary
-    from reasoner.limits import Deadline
 
-    deadline = Deadline.after(time_limit)
     if out is not None:
         json_file(out)
-    loaded = load_scene(scene, iri, deadline)
-    if diff is not None:
-        from confab.authoring import difference
-
-        changed = difference(load_scene(diff), loaded, mode)
-        show_result(changed.json() if as_json else str(changed))
-        raise Exit(YES)
-    remembered = memory_for(memory, no_memory, loaded)
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
-    limit = None if time_limit is None else deadline
-    with progress("planning"), ended_by(deadline, ending):
-        result = loaded.plan(
-            goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
-        )
+    with limited(time_limit) as deadline:
+        loaded = load_scene(scene, iri)
+        if diff is not None:
+            from confab.authoring import difference
+
+            changed = difference(load_scene(diff), loaded, mode)
+            show_result(changed.json() if as_json else str(changed))
+            raise Exit(YES)
+        remembered = memory_for(memory, no_memory, loaded)
+        limit = None if time_limit is None else deadline
+        with progress("planning"):
+            result = loaded.plan(
+                goal or (), remembered, mode, limit, optimal, observed, engine, level, leave_levels=levels == "free"
+            )
     if report is not None:
         result.report(report)
     if out is not None:
@@ -136,12 +133,23 @@ def plan(
 @OUT
 @click.option("--no-video", is_flag=True, help="Don't film: faster.")
 @GUI
+@TIME_LIMIT
 @QUIET
-def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_video: bool, gui: bool) -> None:
+def run(
+    scene: str,
+    memory: Path | None,
+    mode: str,
+    seed: int,
+    out: Path,
+    no_video: bool,
+    gui: bool,
+    time_limit: float | None,
+) -> None:
     """Validate, plan, verify in physics, learn and report."""
     from confab.running import run as run_all
 
-    raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
+    with limited(time_limit):
+        raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
 
 
 @click.command(epilog=examples("verify"))
@@ -156,6 +164,7 @@ def run(scene: str, memory: Path | None, mode: str, seed: int, out: Path, no_vid
 @click.option("--video", type=PATH, metavar="OUT.mp4", help="Film the first rollout.")
 @GUI
 @click.option("-o", "--output", "out", type=PATH, metavar="VERDICTS.json", help="Write the verdicts into this file.")
+@TIME_LIMIT
 @AS_JSON
 @QUIET
 def verify(
@@ -168,6 +177,7 @@ def verify(
     video: Path | None,
     gui: bool,
     out: Path | None,
+    time_limit: float | None,
     as_json: bool,
 ) -> None:
     """Carry a plan out in physics and check every primitive."""
@@ -176,8 +186,8 @@ def verify(
 
     if out is not None:
         json_file(out)
-    loaded = load_scene(scene)
-    with counted(rollouts) as done:
+    with limited(time_limit), counted(rollouts) as done:
+        loaded = load_scene(scene)
         report = loaded.verify(
             plan_in(plan, loaded), rollouts, seed, perturb=perturb, video=video, workers=workers, done=done, gui=gui
         )
@@ -218,6 +228,7 @@ def verify(
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
 @click.option("--learn", is_flag=True, help="Learn the episode, failures too, into --memory.")
+@TIME_LIMIT
 @click.option(
     "--serve",
     "serve_at",
@@ -243,6 +254,7 @@ def execute(
     perturb: bool,
     both_hands: bool,
     learn: bool,
+    time_limit: float | None,
     serve_at: int | None,
     as_json: bool,
 ) -> None:
@@ -255,11 +267,14 @@ def execute(
         raise KnowledgeError(
             "one file for two purposes: the scene, --memory, --plan, --save and --report each want one of their own"
         )
-    loaded = load_scene(scene, iri)
-    remembered = memory_for(memory, no_memory, loaded)
-    if learn and (memory is None or remembered is None):
-        raise KnowledgeError("--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)")
     with ExitStack() as stack:
+        stack.enter_context(limited(time_limit))
+        loaded = load_scene(scene, iri)
+        remembered = memory_for(memory, no_memory, loaded)
+        if learn and (memory is None or remembered is None):
+            raise KnowledgeError(
+                "--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)"
+            )
         tell = stack.enter_context(spectator())
         if serve_at is not None:
             from confab.serving import serving
@@ -315,6 +330,7 @@ def execute(
 @click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
 @click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
 @click.option("--plot", type=PATH, metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
+@TIME_LIMIT
 @AS_JSON
 @QUIET
 def explain(
@@ -327,31 +343,46 @@ def explain(
     level: int,
     against: str | None,
     plot: Path | None,
+    time_limit: float | None,
     as_json: bool,
 ) -> None:
     """Say why each step is there, why not another one, or why no plan."""
+    with limited(time_limit):
+        told = _explained(scene, which, instead, goal, memory, step, level, against, plot)
+    show_result(told.json() if as_json else told)
+    if isinstance(told, Result):
+        raise Exit(EXIT[told.outcome.status.value])
+
+
+def _explained(
+    scene: str,
+    which: str | None,
+    instead: str | None,
+    goal: tuple[str, ...],
+    memory: Path | None,
+    step: int,
+    level: int,
+    against: str | None,
+    plot: Path | None,
+) -> Any:
+    """Return the reasons that were asked for; the result of planning where there is no plan."""
     loaded = load_scene(scene)
     remembered = memory_for(memory, False, loaded)
     with progress("planning"):
         result = loaded.plan(goal or (), remembered)
     if not result.solved:
-        show_result(result.json() if as_json else result)
-        raise Exit(EXIT[result.outcome.status.value])
+        return result
     if level not in result.problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
     if which is None and (step, level) != (0, 1):
         which = f"L{level}#{step}"
     if instead is not None:
-        told: Any = result.why_not(instead, which)
-    elif remembered is not None:
-        told = _by_memory(result, remembered, which or "L1#0", against, plot)
-    else:
-        if against is not None or plot is not None:
-            raise KnowledgeError(
-                "--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT"
-            )
-        told = result.explain() if which is None else result.why(which)
-    show_result(told.json() if as_json else told)
+        return result.why_not(instead, which)
+    if remembered is not None:
+        return _by_memory(result, remembered, which or "L1#0", against, plot)
+    if against is not None or plot is not None:
+        raise KnowledgeError("--against and --plot ask memory, so they need --memory FILE; without it, ask --not WHAT")
+    return result.explain() if which is None else result.why(which)
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:

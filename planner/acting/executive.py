@@ -37,8 +37,9 @@ from planner.acting.repair import difference, mend, replan, vanished
 from planner.acting.symbolic_world import with_individual
 from planner.hierarchical.planner import compiled
 from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import LimitError, Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
+from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from planner.validation import open_goals, successor
+from reasoner.limits import LimitError, check
 from reasoner.refutations import Refutation, with_refuted
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
@@ -50,8 +51,8 @@ class Patience:
     """When to stop: attempts at one primitive, failures in all, primitives begun per primitive planned, and planning limits.
 
     `rounds` is how often everything that failed is tried anew once no other way is left: the situation has changed by then, and
-    a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `seconds` is the time
-    for the whole episode; `planning` limits each planning call within it.
+    a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `planning` limits each
+    planning call; the whole episode ends by the deadline that holds (`reasoner.limits.within`).
     """
 
     attempts: int = 2
@@ -59,7 +60,6 @@ class Patience:
     rounds: int = 3
     primitives: int = 20
     planning: Limits = Limits(seconds=20.0)  # noqa: RUF009 - frozen
-    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -114,12 +114,12 @@ def act(
     """
     run = _Run(problem, Guarded(world), list(interventions), planner, patience, tell, mending)
     if caution is not None and plan is None:
-        run.believe(caution.applied(problem, planner or fast_plan, run.limits))
+        run.believe(caution.applied(problem, planner or fast_plan, patience.planning))
     try:
         run.look(dict(run.belief.initial))
         run.start(plan)
         while run.going:
-            run.check_time()
+            check("acting")
             run.intervene()
             if run.puzzled:
                 run.reconsider()
@@ -225,24 +225,11 @@ class _Run:
     first: Plan = Plan(())  # noqa: RUF009 - frozen
 
     def __post_init__(self) -> None:
-        self.end = Limits(seconds=self.patience.seconds).end()
         self.believe(self.belief)
 
     def believe(self, problem: Problem) -> None:
         """Begin with a situation, a goal and static facts."""
         self.belief, self.believed, self.initial = problem, problem, dict(problem.initial)
-
-    @property
-    def limits(self) -> Limits:
-        """The limits of a planning call that begins now: its own, and what is left of the episode's time."""
-        planning = self.patience.planning
-        left = Limits().until(self.end).seconds
-        return replace(planning, seconds=min((s for s in (planning.seconds, left) if s is not None), default=None))
-
-    def check_time(self) -> None:
-        """Raise `LimitError` if the time of the episode is over."""
-        if self.end is not None and perf_counter() > self.end:
-            raise LimitError(f"gave up after {self.patience.seconds:g} s; give more time (--time-limit)")
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -254,7 +241,7 @@ class _Run:
         if plan is None:
             self.set_aside_the_impossible(vanished(self.belief))
             begin = perf_counter()
-            steps, outcome = replan(self.belief, self.planner, self.using, self.limits)
+            steps, outcome = replan(self.belief, self.planner, self.using, self.patience.planning)
             self.seconds["planning"] += perf_counter() - begin
             if steps is None:
                 self.going = False
@@ -450,7 +437,7 @@ class _Run:
             return
         assert self.planned_for is not None
         begin = perf_counter()
-        limits, old = self.limits, self.agenda
+        limits, old = self.patience.planning, self.agenda
         end = limits.end()
         if self.mending:
             expected = {s: v for s, v in {**self.belief.initial, **self.missed}.items() if v is not None}

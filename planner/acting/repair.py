@@ -24,11 +24,12 @@ from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.settling import settle
 from planner.hierarchical.unsolvability import refuted
-from planner.plan import LimitError, Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
+from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from planner.plan_costs import cost_of, costs_of_steps
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
 from reasoner.amounts import meets
+from reasoner.limits import LimitError
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1

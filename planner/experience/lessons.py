@@ -23,8 +23,9 @@ from planner.hierarchical.refinement_cache import Refiner, Roles, Template
 from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.hierarchical.subplans import Keep
 from planner.paper.learning import LearningError
-from planner.plan import LimitError, Limits, Plan, Step
+from planner.plan import Limits, Plan, Step
 from planner.transitions import Cell, Change, arguments_of
+from reasoner.limits import LimitError
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
 from reasoner.symbols import Problem, Symbol
 

@@ -39,7 +39,8 @@ from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, 
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
 from planner.grounded.unreachable import blocked
-from planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, TooLargeError
+from reasoner.limits import OutOfTimeError
 from reasoner.symbols import Problem, State
 
 BOOST = 1000

@@ -18,8 +18,8 @@ from planner.grounded.formulas import Formulas
 from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
 from planner.grounded.separation import in_parts
-from planner.plan import OutOfTimeError
 from reasoner.language import mentions
+from reasoner.limits import OutOfTimeError
 from reasoner.symbols import (
     FALSE,
     TRUE,

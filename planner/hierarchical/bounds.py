@@ -25,9 +25,10 @@ from planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.regrouping import under_the_levels_above
 from planner.hierarchical.unsolvability import closed, refusal
-from planner.plan import LimitError, Limits, Outcome, OutOfTimeError, Plan, Reason, Status, TooLargeError
+from planner.plan import Limits, Outcome, Plan, Reason, Status, TooLargeError
 from planner.plan_costs import cost_of
 from planner.validation import validate
+from reasoner.limits import LimitError, OutOfTimeError
 from reasoner.symbols import Problem
 
 

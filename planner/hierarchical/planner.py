@@ -35,9 +35,10 @@ from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.hierarchical.subproblem import BITS
 from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
-from planner.plan import LimitError, Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
+from planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from planner.transitions import arguments_of
 from reasoner.amounts import meets
+from reasoner.limits import LimitError
 from reasoner.symbols import FALSE, Problem, Symbol
 
 __all__ = ["Call", "Compiled", "compiled", "plan"]

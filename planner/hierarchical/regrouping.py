@@ -8,8 +8,9 @@ from itertools import pairwise
 
 from planner.grounded.grounding import ground
 from planner.grounded.task import Task
-from planner.plan import OutOfTimeError, Plan, Step, TooLargeError, renumbered
+from planner.plan import Plan, Step, TooLargeError, renumbered
 from planner.validation import successor
+from reasoner.limits import OutOfTimeError
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 LONGEST = 60

@@ -23,9 +23,10 @@ from typing import TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Want, Wants
-from planner.plan import Counts, LimitError
+from planner.plan import Counts
 from planner.transitions import Cell, Change, Key, Table, arguments_of
 from reasoner.amounts import meets
+from reasoner.limits import LimitError
 from reasoner.symbols import FALSE, TRUE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"

@@ -21,10 +21,11 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from planner.hierarchical.subplans import Ground, Keep, Segments
-from planner.plan import Counts, Limits, OutOfTimeError, Reason, Status, TooLargeError
+from planner.plan import Counts, Limits, Reason, Status, TooLargeError
 from planner.transitions import Cell, arguments_of, key_of
 from reasoner.amounts import meets
 from reasoner.language import walk
+from reasoner.limits import OutOfTimeError
 from reasoner.symbols import (
     FALSE,
     Parameter,

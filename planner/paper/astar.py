@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from planner.paper.transitions import Applied, Values
-from planner.plan import Counts, Limits, OutOfTimeError, Status
+from planner.plan import Counts, Limits, Status
 from reasoner.amounts import meets
+from reasoner.limits import OutOfTimeError
 
 Goal = Mapping[int, str]
 """Wanted values by position in the state."""

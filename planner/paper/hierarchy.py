@@ -17,18 +17,8 @@ from typing import TypeAlias
 from planner.paper.astar import Found, Goal, a_star, mismatches
 from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from planner.paper.transitions import Applied, Model, Values, ground
-from planner.plan import (
-    Counts,
-    Limits,
-    Outcome,
-    OutOfTimeError,
-    Plan,
-    Reason,
-    Status,
-    Step,
-    UnsolvableError,
-    renumbered,
-)
+from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
+from reasoner.limits import OutOfTimeError
 from reasoner.memory.links import Links
 from reasoner.symbols import Fact, GroundBehavior, Problem
 

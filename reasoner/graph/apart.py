@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 import pyoxigraph as ox
 
 from reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
-from reasoner.limits import LimitError
+from reasoner.limits import LimitError, current
 from reasoner.names import nearest
 from reasoner.vocabulary import CORE
 
@@ -138,7 +138,8 @@ class Apart:
             late = True
             process.kill()
 
-        timer = Timer(self.limits.seconds, end)
+        left = current().left
+        timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), end)
         timer.start()
         try:
             self._send(pickle.dumps((query, list(graphs))))

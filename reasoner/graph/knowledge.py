@@ -22,7 +22,7 @@ import pyoxigraph as ox
 
 import ontology
 from reasoner.graph.documents import DocumentError, document
-from reasoner.limits import Deadline
+from reasoner.limits import check
 from reasoner.names import nearest
 from reasoner.vocabulary import CORE, PREFIXES, TYPE
 
@@ -98,8 +98,6 @@ class KnowledgeGraph:
         The store that answers instead of `store`; it is only read.
     round_trips : int
         How many queries were asked so far.
-    deadline : Deadline
-        When reading and asking end with a `LimitError`.
     """
 
     scene: str
@@ -111,7 +109,6 @@ class KnowledgeGraph:
     written: dict[str, Place] = field(default_factory=dict)
     remote: Remote | None = None
     round_trips: int = 0
-    deadline: Deadline = field(default_factory=Deadline)
 
     @property
     def spoken(self) -> dict[str, str]:
@@ -122,15 +119,6 @@ class KnowledgeGraph:
         """Raise `KnowledgeError` if something is missing that planning would need."""
         if self.faults:
             raise KnowledgeError(self.faults[0])
-
-    @contextmanager
-    def until(self, deadline: Deadline) -> Iterator[None]:
-        """Let reading and asking end with a `LimitError` if the deadline comes first, as long as this lasts."""
-        before, self.deadline = self.deadline, deadline
-        try:
-            yield
-        finally:
-            self.deadline = before
 
     def select(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> list[Row]:
         """Return the rows of a SELECT query on the union of some graphs; `bindings` put IRIs in for selected variables.
@@ -144,7 +132,7 @@ class KnowledgeGraph:
         for row in self.solutions(query, graphs, **bindings):
             rows.append(tuple(row))
             if not len(rows) % 4096:
-                self.deadline.check("asking the knowledge graph")
+                check("asking the knowledge graph")
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
@@ -170,7 +158,7 @@ class KnowledgeGraph:
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
         """Return what any SPARQL 1.1 query answers on the union of some graphs; a remote store decides itself on which."""
-        self.deadline.check("asking the knowledge graph")
+        check("asking the knowledge graph")
         self.round_trips += 1
         if self.remote:
             return self.remote.query(query, self.prefixes, bindings)
@@ -187,7 +175,7 @@ class KnowledgeGraph:
     def confirm(self) -> None:
         """Raise `KnowledgeError` if a remote store says something else now than when it was read."""
         if self.remote:
-            self.deadline.check("asking the knowledge graph again")
+            check("asking the knowledge graph again")
             self.remote.confirm()
 
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:
@@ -212,7 +200,6 @@ class KnowledgeGraph:
 def load(
     source: str | Path,
     store: ox.Store | None = None,
-    deadline: Deadline | None = None,
     tolerant: bool = False,
     faults: list[Fault] | None = None,
 ) -> KnowledgeGraph:
@@ -224,8 +211,6 @@ def load(
         Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads.
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
-    deadline : Deadline, optional
-        When loading ends, done or not.
     tolerant : bool
         Load any file of RDF, and note in `faults` what keeps it from being a scene: imports that aren't found, no ontology.
     faults : list of Fault, optional
@@ -238,9 +223,8 @@ def load(
     """
     path = scene_file(source)
     graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
-    with graph.until(deadline or Deadline()):
-        _load(graph, path, tolerant)
-        found = write_out(graph)
+    _load(graph, path, tolerant)
+    found = write_out(graph)
     if faults is not None:
         faults += found
     elif found and tolerant:
@@ -348,10 +332,10 @@ def scene_file(source: str | Path) -> Path:
 
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     """Read one file into a named graph of the store, and its prefixes into the graph's."""
-    graph.deadline.check(f"reading {file}")
+    check(f"reading {file}")
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
-        timed = _Timed(content, graph.deadline, f"reading {file}")
+        timed = _Timed(content, f"reading {file}")
         if form.supports_datasets:  # whatever graphs it has, it is one file
             quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
             graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
@@ -365,13 +349,13 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
 class _Timed(BytesIO):
     """What a parser reads piece by piece, so that it can be stopped at a deadline."""
 
-    def __init__(self, content: bytes, deadline: Deadline, doing: str) -> None:
+    def __init__(self, content: bytes, doing: str) -> None:
         super().__init__(content)
-        self.deadline, self.doing = deadline, doing
+        self.doing = doing
 
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes, or raise `LimitError`."""
-        self.deadline.check(self.doing)
+        check(self.doing)
         return super().read(size)
 
 

@@ -32,6 +32,7 @@ from reasoner.amounts import (
 from reasoner.derivation import circles, needed
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.language import walk
+from reasoner.limits import check
 from reasoner.names import Names, local_name
 from reasoner.reading import swrl
 from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
@@ -168,7 +169,7 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
     facts = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
     tuples = nodes_of(core_triple(row) for row in graph.select(TUPLES, SCENE))
     known = frame(schema, members)
-    graph.deadline.check("reading the scene")
+    check("reading the scene")
     return reading_of(graph.scene, known, facts, tuples)
 
 

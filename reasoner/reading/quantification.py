@@ -10,6 +10,7 @@ from __future__ import annotations
 import pyoxigraph as ox
 
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from reasoner.limits import check
 from reasoner.names import nearest
 from reasoner.reading.problem import Reading
 from reasoner.reading.rows import FIRST_INDEX_OF_NONE
@@ -36,7 +37,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
         kinds = [parameter.kind for parameter in behavior.parameters]
         for count, row in enumerate(graph.solutions(query_for(reading, behavior), SCENE)):
             if not count % 4096:
-                graph.deadline.check(f"quantifying {behavior.name} ({len(found):,} so far)")
+                check(f"quantifying {behavior.name} ({len(found):,} so far)")
             arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(kinds)])
             for argument, kind in zip(arguments, kinds, strict=True):
                 if argument not in problem.members(kind):

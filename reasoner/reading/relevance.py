@@ -25,6 +25,7 @@ import pyoxigraph as ox
 from reasoner.amounts import situations_in, terms_of
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.language import terms
+from reasoner.limits import check
 from reasoner.names import local_name
 from reasoner.reading.goals import BOUNDS, with_goals
 from reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
@@ -104,7 +105,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
             f"a condition, an effect or a goal leads to something without a name (_:{nameless[0]}), where an individual belongs"
         )
     fresh = search.visit(seeds | constants)
-    graph.deadline.check("recognising what the task needs")
+    check("recognising what the task needs")
     lifted = frame(schema, [member for member in search.members() if member[0] in constants])
     bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])
     search.close(fresh, constants, bounds)

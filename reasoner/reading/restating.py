@@ -14,7 +14,6 @@ import pyoxigraph as ox
 from reasoner.amounts import bounds, written
 from reasoner.files import as_iri_part
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.limits import Deadline
 from reasoner.reading.problem import Reading
 from reasoner.refutations import Refutation
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
@@ -203,6 +202,4 @@ def _copied(graph: KnowledgeGraph) -> KnowledgeGraph:
         raise KnowledgeError(f"{graph.scene}: a remote store is only read; change it with its own tools")
     store = ox.Store()
     store.bulk_load(input=graph.store.dump(format=ox.RdfFormat.N_QUADS), format=ox.RdfFormat.N_QUADS)
-    return replace(
-        graph, store=store, files=dict(graph.files), prefixes=dict(graph.prefixes), round_trips=0, deadline=Deadline()
-    )
+    return replace(graph, store=store, files=dict(graph.files), prefixes=dict(graph.prefixes), round_trips=0)

@@ -9,6 +9,7 @@ import confab
 from planner.acting import executive
 from planner.acting.symbolic_world import SymbolicWorld
 from planner.plan import Outcome, Plan, Status
+from reasoner.limits import within
 
 CASES = Path(__file__).parent / "cases"
 
@@ -40,6 +41,7 @@ def test_an_episode_in_which_planning_changes_nothing_gives_up(monkeypatch: pyte
 def test_an_episode_ends_within_its_time() -> None:
     problem = confab.load(CASES / "execute-without-end" / "isles-mid.ttl").problem
     begin = process_time()
-    episode = executive.act(problem, SymbolicWorld(problem), patience=executive.Patience(seconds=0.0))
+    with within(0.0):
+        episode = executive.act(problem, SymbolicWorld(problem))
     assert episode.status.value == "gave-up"
     assert process_time() - begin < 1.0
