@@ -1,0 +1,218 @@
+"""Small random worlds of everything at once, in every mode, held against a search of all their states.
+
+    python -m benchmarks.mixed                                    the next worlds: COUNT of them from FIRST on
+    python -m benchmarks.mixed --from 5000000 --count 100000 --workers 2 --into FOLDER
+    python -m benchmarks.mixed --seed 5000123                     one of them, with everything that is asked of it, and its scene
+
+A run goes on where it was interrupted, if it is given the same folder: there it notes what came of each stretch of worlds, and
+writes the smallest world for each thing that is wrong. The exit code is 1 if something is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from worlds.judging import Complaint, Judge, Judged
+from worlds.mixed import World, mixed
+from worlds.scenes import scene
+from worlds.shrinking import shrunk
+
+FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
+SHRUNK = 2
+"""So many worlds are made small for each thing that is wrong, by each process."""
+SHOWN = 6
+
+
+def signature(one: Complaint) -> str:
+    """Return what tells different faults apart, as far as that can be told."""
+    detail = one.text.split(":")[0] if one.kind == "crash" else ""
+    mode = one.mode.split(" ")[0] if one.mode.startswith("export") else one.mode
+    return " | ".join(part for part in (one.kind, mode, detail) if part)
+
+
+def judged(seed: int, folder: Path, every: bool = False) -> Judged:
+    """Return what came of the world of a seed."""
+    return Judge(mixed(seed), folder, every).judged()
+
+
+def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
+    """Judge some worlds, make small those in which something is wrong, and return what came of them."""
+    begin = time.process_time()
+    found: dict[str, Any] = {
+        "first": first, "count": count, "wrong": {}, "remarks": {}, "truth": Counter(), "lengths": Counter(),
+        "levels": Counter(), "status": Counter(), "seconds": Counter(),
+    }  # fmt: skip
+    with TemporaryDirectory() as folder:
+        for seed in range(first, first + count):
+            world = mixed(seed)
+            its = Judge(world, Path(folder)).judged()
+            note(found, seed, world, its)
+            for one in its.complaints:
+                said = signature(one)
+                if into is not None and known.get(said, 0) < SHRUNK:
+                    known[said] = known.get(said, 0) + 1
+                    write(world, one, into, Path(folder))
+    found["cpu"] = time.process_time() - begin
+    return found
+
+
+def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
+    """Add what came of a world."""
+    for kind, ones in (("wrong", its.complaints), ("remarks", its.remarks)):
+        for said in dict.fromkeys(map(signature, ones)):
+            found[kind].setdefault(said, []).append(seed)
+    found["truth"]["unknown" if not its.known else "none" if its.least is None else "some"] += 1
+    found["lengths"][str(its.length)] += 1
+    found["levels"][str(len(world.problem.domain.levels))] += 1
+    for mode, status in its.status.items():
+        found["status"][f"{mode}: {status}"] += 1
+    for mode, seconds in its.seconds.items():
+        found["seconds"][mode] += seconds
+
+
+def write(world: World, one: Complaint, into: Path, folder: Path) -> Path:
+    """Make a world small in which something is wrong, and write its scene."""
+    said = signature(one)
+    every = one.mode.startswith(("export", "execute", "leading", "learn"))
+
+    def still(smaller: World) -> bool:
+        try:
+            complaints = Judge(smaller, folder, every).judged().complaints
+        except Exception:  # it is none that can be judged any more
+            return False
+        return any(signature(other) == said for other in complaints)
+
+    small = shrunk(world, still, 20.0 if one.kind != "endless" else 60.0) if still(world) else world
+    again = Judge(small, folder, every).judged()
+    words = next((other for other in again.complaints if signature(other) == said), one)
+    name = "".join(c if c.isalnum() else "-" for c in said)[:80]
+    file = into / name / f"{world.seed}.ttl"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    head = f"# seed {world.seed}: {words.kind} ({words.mode}) {words.text}\n# least cost by exhaustive search: {again.least}\n"
+    file.write_text(head + scene(small), encoding="utf-8")
+    return file
+
+
+def _stretch(job: tuple[int, int, Path | None, dict[str, int]]) -> dict[str, Any]:
+    return stretch(*job)
+
+
+def run(first: int, count: int, workers: int, into: Path | None) -> dict[str, Any]:
+    """Judge worlds in stretches, going on where a run into the same folder ended."""
+    done: dict[int, dict[str, Any]] = {}
+    record = None
+    if into is not None:
+        into.mkdir(parents=True, exist_ok=True)
+        record = into / "stretches.jsonl"
+        for line in record.read_text("utf-8").splitlines() if record.is_file() else ():
+            one = json.loads(line)
+            done[one["first"]] = one
+    every = [(at, min(STRETCH, first + count - at)) for at in range(first, first + count, STRETCH)]
+    known: dict[str, int] = {}
+    for one in done.values():
+        for said in one["wrong"]:
+            known[said] = SHRUNK
+    jobs = [(at, many, into, known) for at, many in every if done.get(at, {}).get("count") != many]
+    total: dict[str, Any] = {}
+    for at, many in every:
+        if done.get(at, {}).get("count") == many:
+            add(total, done[at])
+
+    def came(one: dict[str, Any]) -> None:
+        add(total, one)
+        known.update(dict.fromkeys(one["wrong"], SHRUNK))
+        if record is not None:
+            with record.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(one) + "\n")
+        print(
+            f"{one['first']} + {one['count']}: {one['cpu']:.0f} s, wrong: {_short(one['wrong'])}",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    if workers < 2:
+        for job in jobs:
+            came(stretch(*job))
+    else:
+        with get_context("spawn").Pool(workers, maxtasksperchild=8) as pool:
+            for one in pool.imap_unordered(_stretch, jobs):
+                came(one)
+    return total
+
+
+def _short(wrong: dict[str, list[int]]) -> str:
+    return ", ".join(f"{said} {len(seeds)}" for said, seeds in sorted(wrong.items())) or "nothing"
+
+
+def add(total: dict[str, Any], one: dict[str, Any]) -> None:
+    """Add what came of a stretch."""
+    for key in ("wrong", "remarks"):
+        for said, seeds in one[key].items():
+            total.setdefault(key, {}).setdefault(said, []).extend(seeds)
+    for key in ("truth", "lengths", "levels", "status", "seconds"):
+        total.setdefault(key, Counter()).update(one[key])
+    for key in ("count", "cpu"):
+        total[key] = total.get(key, 0) + one[key]
+
+
+def table(total: dict[str, Any]) -> None:
+    """Print what came of all worlds."""
+    count = total["count"]
+    truth, lengths = total["truth"], total["lengths"]
+    print(
+        f"{count} worlds; {truth['some']} can be solved, {truth['none']} can't, {truth['unknown']} are too large to tell. ",
+        end="",
+    )
+    print(f"CPU: {1e3 * total['cpu'] / count:.0f} ms a world.\n")
+    print("| steps of the longest plan | " + " | ".join(sorted(lengths, key=int)) + " |")
+    print("|---" * (len(lengths) + 1) + "|")
+    print("| worlds | " + " | ".join(str(lengths[n]) for n in sorted(lengths, key=int)) + " |\n")
+    print("| mode | " + " | ".join(STATUS) + " | CPU ms each |\n|---" + "|---" * (len(STATUS) + 1) + "|")
+    for mode in dict.fromkeys(key.split(": ")[0] for key in sorted(total["status"])):
+        row = [total["status"].get(f"{mode}: {status}", 0) for status in STATUS]
+        print(
+            f"| {mode} | {' | '.join(map(str, row))} | {1e3 * total['seconds'].get(mode, 0) / max(sum(row), 1):.1f} |"
+        )
+    for key, title in (("wrong", "What is wrong"), ("remarks", "Not wrong")):
+        print(f"\n| {title} | worlds | per 1,000 | seeds |\n|---|---|---|---|")
+        for said, seeds in sorted(total.get(key, {}).items(), key=lambda pair: -len(pair[1])):
+            shown = ", ".join(map(str, sorted(seeds)[:SHOWN]))
+            print(f"| {said.replace(' | ', ', ')} | {len(seeds)} | {1e3 * len(seeds) / count:.2f} | {shown} |")
+
+
+STATUS = ("solved", "unsolvable", "gave-up", "refused", "crash", "endless", "reached", "impossible")
+
+
+def main(arguments: Sequence[str] = ()) -> int:
+    """Judge the worlds that are asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.mixed")
+    parser.add_argument("--from", dest="first", type=int, default=FIRST)
+    parser.add_argument("--count", type=int, default=COUNT)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--into", type=Path)
+    parser.add_argument("--seed", type=int)
+    asked = parser.parse_args(arguments)
+    if asked.seed is not None:
+        with TemporaryDirectory() as folder:
+            its = judged(asked.seed, Path(folder), every=True)
+        print(scene(mixed(asked.seed)))
+        print(f"# least {its.least}, states {its.states}, {its.status}")
+        for one in (*its.complaints, *its.remarks):
+            print(f"# {one.kind} ({one.mode}): {one.text}")
+        return int(bool(its.complaints))
+    total = run(asked.first, asked.count, asked.workers, asked.into)
+    table(total)
+    return int(bool(total.get("wrong")))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,63 @@
+"""The generator of small worlds of everything at once, and the plain interpreter that judges what is planned in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from confab.scene import load
+from planner.plan import Plan, Step
+from reasoner.reading.problem import read
+from tests.planner.naive import complete, results
+from worlds.interpreter import Interpreter
+from worlds.mixed import mixed
+from worlds.scenes import scene
+from worlds.walking import faults
+
+SEEDS = range(40)
+
+
+def test_a_seed_is_one_world() -> None:
+    assert all(scene(mixed(seed)) == scene(mixed(seed)) for seed in SEEDS)
+
+
+def test_the_interpreter_agrees_with_the_naive_reading() -> None:
+    for seed in SEEDS:
+        problem = mixed(seed).problem
+        if any(effect.each for one in problem.domain.behaviors.values() for effect in one.every_effect):
+            continue
+        meant, state = Interpreter(problem), complete(problem)
+        for level in problem.domain.levels:
+            for one in problem.domain.at_level(level):
+                naive = {(one.name, arguments) for arguments, _ in results(problem, one, state)}
+                own = {
+                    (action.behavior.name, action.arguments)
+                    for action in meant.actions(level)
+                    if action.behavior is one and any(outcome(meant.initial) for outcome in action.outcomes)
+                }
+                assert naive == own, (seed, one.name)
+
+
+def test_a_scene_says_what_was_meant(tmp_path: Path) -> None:
+    """What is read from the file can be done and reached as in the world that was drawn."""
+    for seed in SEEDS:
+        world = mixed(seed)
+        file = tmp_path / "w.ttl"
+        file.write_text(scene(world), encoding="utf-8")
+        known = load(file)
+        assert not known.knowledge.faults
+        problem = read(known.knowledge).problem
+        assert problem.goal == world.problem.goal
+        level = world.problem.domain.levels[-1]
+        said, meant = Interpreter(problem).explored(level, 5_000), Interpreter(world.problem).explored(level, 5_000)
+        assert (said.least, len(said.costs)) == (meant.least, len(meant.costs)), seed
+
+
+def test_a_step_that_is_left_out_is_noticed() -> None:
+    world = next(
+        w
+        for w in map(mixed, range(100, 200))
+        if Interpreter(w.problem).explored(w.problem.domain.levels[-1], 5_000).least
+    )
+    assert faults(Interpreter(world.problem), Plan(())) == ["the goal isn't reached"]
+    nonsense = Plan((Step((0,), 0, world.problem.domain.levels[0], "NOTHING", ()),))
+    assert faults(Interpreter(world.problem), nonsense)

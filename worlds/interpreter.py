@@ -1,0 +1,411 @@
+"""A plain interpreter of problems: what each quantified behaviour does in a state, and which states can be reached.
+
+It shares no code with a search, a proof or the checker of plans, so that all of these can be held against it. Conditions are
+grounded by trying every binding, and written out as Python expressions over a tuple of values.
+
+slot     the position of a symbol's value in a state; symbols that nothing changes have none
+state    a tuple: a text per symbol, a number per amount; what is defined comes last
+node     a state, with the symbols that have been changed and aren't at rest
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from heapq import heappop, heappush
+from itertools import product
+from typing import Any
+
+from reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
+from reasoner.derivation import strata
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+Terms = Mapping[str, str]
+State = tuple[Any, ...]
+Node = tuple[State, frozenset[int]]
+NOTHING = math.nan
+"""The number that isn't there: it compares with nothing, and all that is calculated from it isn't there either."""
+
+
+class TooManyStatesError(Exception):
+    """More states than allowed can be reached."""
+
+
+def divided(one: Any, other: Any) -> Any:
+    """Return a quotient; nothing where the divisor is zero or isn't there."""
+    if other == 0 or other != other or one != one:
+        return NOTHING
+    result = Fraction(one) / Fraction(other)
+    return result.numerator if result.denominator == 1 else result
+
+
+def number(text: str | Fraction) -> Any:
+    """Return a number as an integer where it is one."""
+    value = Fraction(text)
+    return value.numerator if value.denominator == 1 else value
+
+
+def variables(condition: Condition) -> set[str]:
+    """Return the variables that a condition has to have bound: those inside `AnyOf` and `Witness` are their own."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            terms = {*arguments, value}
+        case RelationCondition(_, arguments):
+            terms = set(arguments)
+        case ClassCondition(term):
+            terms = {term}
+        case EqualityCondition(left, right):
+            terms = {left, right}
+        case Comparison(left, _, right):
+            terms = {*terms_of(left), *terms_of(right)}
+        case _:
+            terms = set()
+    return {term for term in terms if term.startswith("?")}
+
+
+@dataclass(frozen=True)
+class Action:
+    """A quantified behaviour: `outcomes` has a function from a state to the next one (or None) per binding of its variables."""
+
+    behavior: Behavior
+    arguments: tuple[str, ...]
+    outcomes: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """All that can be reached on a level: each node with its least cost, and the least cost of a node that is wanted."""
+
+    costs: Mapping[Node, Any]
+    least: Any | None
+
+
+class Interpreter:
+    """One problem, interpreted."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        domain = problem.domain
+        self.kinds = domain.situations
+        changed = {effect.situation for one in domain.behaviors.values() for effect in one.every_effect}
+        self.slots: dict[Symbol, int] = {}
+        self.constants: dict[Symbol, Any] = {}
+        initial: list[Any] = []
+        for name, kind in self.kinds.items():
+            if name in domain.rules:
+                continue
+            for arguments in product(*(problem.classes.get(of, ()) for of in kind.arguments)):
+                symbol = Symbol(name, arguments)
+                value: Any = problem.initial.get(symbol, FALSE if kind.boolean else None)
+                if value is None:
+                    continue
+                value = value if kind.quantity is None else number(value)
+                if name in changed:
+                    self.slots[symbol] = len(initial)
+                    initial.append(value)
+                else:
+                    self.constants[symbol] = value
+        self.stated = len(initial)
+        for name in domain.rules:
+            for arguments in product(*(problem.classes.get(of, ()) for of in self.kinds[name].arguments)):
+                self.slots[Symbol(name, arguments)] = len(initial)
+                initial.append(FALSE)
+        self.symbols = list(self.slots)
+        self.rules = [self.derivations(group) for group in strata(domain.rules)]
+        self.initial = self.closed(initial)
+        self.rests = {
+            i: rest
+            for symbol, i in self.slots.items()
+            if (rest := self.kinds[symbol.situation].rest) is not None and symbol not in problem.goal
+        }
+        self._actions: dict[int, list[Action]] = {}
+        self._named: dict[tuple[str, tuple[str, ...]], Action] = {}
+
+    # ------------------------------------------------------------------------------------------------------ conditions
+
+    def bindings(self, conditions: Iterable[Condition], kinds: Terms, terms: Terms) -> Iterator[Terms]:
+        """Yield the ways to bind what a conjunction mentions and isn't bound yet."""
+        free = sorted(set().union(*map(variables, conditions)) - terms.keys())
+        for values in product(*(self.problem.classes.get(kinds[name], ()) for name in free)):
+            yield {**terms, **dict(zip(free, values, strict=True))}
+
+    def all_of(self, conditions: Iterable[Condition], terms: Terms, kinds: Terms) -> str:
+        """Return a conjunction as an expression."""
+        return _joined([self.condition(one, terms, kinds) for one in conditions], "and", "True", "False")
+
+    def some(self, conditions: Sequence[Condition], terms: Terms, kinds: Terms) -> str:
+        """Return that a conjunction holds for some binding of what only it mentions."""
+        ways = [self.all_of(conditions, trial, kinds) for trial in self.bindings(conditions, kinds, terms)]
+        return _joined(ways, "or", "False", "True")
+
+    def condition(self, condition: Condition, terms: Terms, kinds: Terms) -> str:
+        """Return a condition as an expression over the state ``s``."""
+
+        def get(name: str) -> str:
+            return terms.get(name, name)
+
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                symbol = Symbol(situation, tuple(map(get, arguments)))
+                if symbol in self.slots:
+                    return f"s[{self.slots[symbol]}] {'!=' if negated else '=='} {get(value)!r}"
+                return str((self.constants.get(symbol) == get(value)) is not negated)
+            case RelationCondition(relation, arguments, negated):
+                rows = self.problem.relations.get(relation, frozenset())
+                return str((tuple(map(get, arguments)) in rows) is not negated)
+            case ClassCondition(term, kind, negated):
+                return str((get(term) in self.problem.classes.get(kind, ())) is not negated)
+            case EqualityCondition(left, right, negated):
+                return str((get(left) == get(right)) is not negated)
+            case Witness(variable, kind, inner, negated):
+                members = self.problem.classes.get(kind, ())
+                ways = [self.some(inner, {**terms, variable: one}, {**kinds, variable: kind}) for one in members]
+                return _negated(_joined(ways, "or", "False", "True"), negated)
+            case AnyOf(alternatives, negated):
+                ways = [self.some(group, terms, kinds) for group in alternatives]
+                return _negated(_joined(ways, "or", "False", "True"), negated)
+            case Comparison(left, sign, right, negated):
+                python = "==" if sign == "=" else sign
+                return _negated(f"({self.worth(left, terms)} {python} {self.worth(right, terms)})", negated)
+
+    def worth(self, expression: Expression, terms: Terms) -> str:
+        """Return a calculation as an expression over the state ``s``."""
+        match expression:
+            case Amount(situation, arguments):
+                symbol = Symbol(situation, tuple(terms.get(a, a) for a in arguments))
+                if symbol in self.slots:
+                    return f"s[{self.slots[symbol]}]"
+                return repr(self.constants[symbol]) if symbol in self.constants else "nan"
+            case Measure(relation, arguments):
+                key = tuple(terms.get(a, a) for a in arguments)
+                rows = [row for row in self.problem.relations.get(relation, ()) if row[:-1] == key]
+                return repr(number(rows[0][-1])) if rows else "nan"
+            case Calculation("/", left, right):
+                return f"divided({self.worth(left, terms)}, {self.worth(right, terms)})"
+            case Calculation(sign, left, right):
+                return f"({self.worth(left, terms)} {sign} {self.worth(right, terms)})"
+            case Fraction():
+                return repr(number(expression))
+
+    def holds(self, conditions: Sequence[Condition], state: State) -> bool:
+        """Return whether a conjunction without variables holds."""
+        return bool(eval(self.some(conditions, {}, {}), {**NAMES, "s": state}))
+
+    # ------------------------------------------------------------------------------------------------------- behaviours
+
+    def derivations(self, names: Iterable[str]) -> list[tuple[int, Any]]:
+        """Return the symbols of a group of rules that need each other, each with when it is true."""
+        ways: dict[int, list[str]] = {}
+        for rule in (rule for name in names for rule in self.problem.domain.rules[name]):
+            kinds = {one.name: one.kind for one in (*rule.parameters, *rule.variables)}
+            for values in product(*(self.problem.classes.get(one.kind, ()) for one in rule.parameters)):
+                symbol = Symbol(rule.situation, values)
+                terms = dict(zip((one.name for one in rule.parameters), values, strict=True))
+                if symbol in self.slots and (said := self.some(rule.conditions, terms, kinds)) != "False":
+                    ways.setdefault(self.slots[symbol], []).append(said)
+        return [(slot, eval(f"lambda s: {_joined(said, 'or', 'False', 'True')}", NAMES)) for slot, said in ways.items()]
+
+    def closed(self, values: list[Any]) -> State:
+        """Return a state with all that follows from it: group by group, from nothing upwards."""
+        for slot in range(self.stated, len(values)):
+            values[slot] = FALSE
+        for group in self.rules:
+            more = True
+            while more:
+                found = [slot for slot, test in group if values[slot] == FALSE and test(values)]
+                for slot in found:
+                    values[slot] = TRUE
+                more = bool(found)
+        return tuple(values)
+
+    def actions(self, level: int) -> list[Action]:
+        """Return the quantified behaviours of a level that some state may allow."""
+        if level not in self._actions:
+            found = []
+            for one in self.problem.domain.at_level(level):
+                for arguments in product(*(self.problem.classes.get(p.kind, ()) for p in one.parameters)):
+                    action = self.action(one, arguments)
+                    self._named[one.name, arguments] = action
+                    if action.outcomes:
+                        found.append(action)
+            self._actions[level] = found
+        return self._actions[level]
+
+    def action(self, one: Behavior, arguments: tuple[str, ...]) -> Action:
+        """Return a behaviour with these arguments."""
+        kinds = {term.name: term.kind for term in (*one.parameters, *one.variables)}
+        terms = dict(zip((p.name for p in one.parameters), arguments, strict=True))
+        outcomes = []
+        for trial in self.bindings(one.preconditions, kinds, terms):
+            asked = self.all_of(one.preconditions, trial, kinds)
+            if asked != "False":
+                outcomes.append(self.outcome(one, asked, trial, kinds))
+        return Action(one, arguments, tuple(outcomes))
+
+    def outcome(self, one: Behavior, asked: str, terms: Terms, kinds: Terms) -> Any:
+        """Return a function from a state to the next one with its cost, or None where the behaviour can't be done."""
+        lines = ["def outcome(s):", f" if not ({asked}): return None", " t = list(s)"]
+        for effect in sorted(one.effects, key=lambda effect: effect.value != FALSE):
+            for when, symbol, value in self.instances(effect, terms, kinds):
+                lines.append(f"{when} t[{self.slots[symbol]}] = {value!r}")
+        limits: dict[int, str] = {}
+        for operations in (("assign",), ("scale",), ("increase", "decrease")):
+            for change in (change for change in one.amounts if change.operation in operations):
+                for when, symbol, by in self.instances(change, terms, kinds):
+                    slot = self.slots[symbol]
+                    sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(change.operation)
+                    new = by if sign is None else f"t[{slot}] {sign} {by}"
+                    lines.append(f"{when} t[{slot}] = {new} if t[{slot}] == t[{slot}] and {by} == {by} else nan")
+                    limits[slot] = self.limit(symbol, f"t[{slot}]")
+        lines += [f" if not ({limit}): return None" for limit in limits.values()]
+        price = repr(one.cost) if one.price is None else self.worth(one.price, terms)
+        lines.append(f" return {price}, closed(t)")
+        names: dict[str, Any] = {**NAMES, "closed": self.closed}
+        exec("\n".join(lines), names)
+        return names["outcome"]
+
+    def instances(
+        self, effect: ValueEffect | AmountEffect, terms: Terms, kinds: Terms
+    ) -> Iterator[tuple[str, Symbol, str]]:
+        """Yield for each symbol that an effect changes when it does so, as the beginning of a line, and to or by what."""
+        each = effect.each or Parameter("?each", "")
+        for one in self.problem.classes.get(each.kind, ()) if effect.each else ("",):
+            for trial in self.bindings(effect.when, {**kinds, each.name: each.kind}, {**terms, each.name: one}):
+                symbol = Symbol(effect.situation, tuple(trial.get(a, a) for a in effect.arguments))
+                when = self.all_of(effect.when, trial, kinds)
+                if symbol in self.slots and when != "False":
+                    if isinstance(effect, ValueEffect):
+                        said = trial.get(effect.value, effect.value)
+                    else:
+                        said = self.worth(effect.amount, trial)
+                    yield "" if when == "True" else f" if {when}:", symbol, said
+
+    def limit(self, symbol: Symbol, amount: str) -> str:
+        """Return that an amount is one of those that it may be."""
+        quantity = self.kinds[symbol.situation].quantity
+        assert quantity is not None
+        said = [f"{amount} == {amount}", f"abs({amount}) <= {LARGEST}", f"Fraction({amount}).denominator <= {LARGEST}"]
+        said += [f"{amount} >= {number(quantity.least)!r}"] if quantity.least is not None else []
+        said += [f"{amount} <= {number(quantity.most)!r}"] if quantity.most is not None else []
+        said += [f"{amount} == int({amount})"] if quantity.whole else []
+        return " and ".join(said)
+
+    def done(self, name: str, arguments: tuple[str, ...], state: State) -> Iterator[tuple[Any, State]]:
+        """Yield what comes of a behaviour in a state, with what it costs."""
+        behavior = self.problem.domain.behaviors.get(name)
+        if behavior is None:
+            return
+        self.actions(behavior.level)
+        action = self._named.get((name, arguments))
+        for outcome in action.outcomes if action else ():
+            if (made := outcome(state)) is not None:
+                yield made
+
+    # ------------------------------------------------------------------------------------------------------------ search
+
+    def wanted(self, state: State) -> bool:
+        """Return whether the goal holds in a state."""
+        return all(self.meets(state, symbol, value) for symbol, value in self.problem.goal.items())
+
+    def meets(self, state: State, symbol: Symbol, value: str) -> bool:
+        """Return whether a symbol is as wanted."""
+        got = self.value(state, symbol)
+        if got is None or self.kinds[symbol.situation].quantity is None:
+            return (FALSE if got is None else got) == value
+        for part in value.split(","):
+            sign = next((sign for sign in ("<=", ">=", "<", ">", "=") if part.startswith(sign)), "")
+            limit = number(part[len(sign) :])
+            if not {"<=": got <= limit, ">=": got >= limit, "<": got < limit, ">": got > limit}.get(sign, got == limit):
+                return False
+        return True
+
+    def value(self, state: State, symbol: Symbol) -> Any:
+        """Return the value of a symbol in a state; None if there is no such symbol."""
+        return state[self.slots[symbol]] if symbol in self.slots else self.constants.get(symbol)
+
+    def explored(self, level: int, most: int, rests: bool = True) -> Truth:
+        """Return what behaviours of a level can reach; what was changed has to be at rest in the end, unless told otherwise.
+
+        Raises
+        ------
+        TooManyStatesError
+            More than `most` nodes can be reached, and none of the first is wanted.
+        """
+        actions = [(outcome, action) for action in self.actions(level) for outcome in action.outcomes]
+        watched = dict(self.rests) if rests else {}
+        start: Node = (self.initial, frozenset())
+        costs: dict[Node, Any] = {start: 0}
+        done: set[Node] = set()
+        waiting: list[tuple[Any, int, Node]] = [(0, 0, start)]
+        count, least = 0, None
+        while waiting:
+            cost, _, node = heappop(waiting)
+            if node in done:
+                continue
+            done.add(node)
+            state, restless = node
+            if least is None and not restless and self.wanted(state):
+                least = cost
+            for outcome, _ in actions:
+                made = outcome(state)
+                if made is None:
+                    continue
+                price, after = made
+                if not price >= 0:
+                    continue
+                still = restless
+                if watched:
+                    still = frozenset(
+                        slot
+                        for slot, rest in watched.items()
+                        if after[slot] != rest and (slot in restless or after[slot] != state[slot])
+                    )
+                follower = after, still
+                if follower not in done and cost + price < costs.get(follower, math.inf):
+                    if len(costs) >= most:
+                        if least is not None:
+                            return Truth(costs, least)
+                        raise TooManyStatesError
+                    costs[follower] = cost + price
+                    count += 1
+                    heappush(waiting, (cost + price, count, follower))
+        return Truth(costs, least)
+
+
+def _joined(parts: Sequence[str], word: str, empty: str, decisive: str) -> str:
+    """Return expressions joined by `and` or `or`, without those that decide nothing."""
+    if decisive in parts:
+        return decisive
+    left = [part for part in dict.fromkeys(parts) if part != empty]
+    if not left:
+        return empty
+    return left[0] if len(left) == 1 else "(" + f" {word} ".join(f"({part})" for part in left) + ")"
+
+
+def _negated(said: str, negated: bool) -> str:
+    if not negated:
+        return said
+    return {"True": "False", "False": "True"}.get(said, f"not ({said})")
+
+
+NAMES: dict[str, Any] = {"nan": NOTHING, "divided": divided, "Fraction": Fraction}
+"""What the expressions may name beside the state."""

@@ -1,0 +1,336 @@
+"""A small world in every mode, held against all that can happen in it.
+
+What can happen is found by `worlds.interpreter`, in the problem as it is meant; the program gets a scene's file. Each call has a
+limit of its own CPU time.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from random import Random
+from time import process_time
+from types import FrameType
+from typing import Any, TypeVar
+
+from confab.planning import NO_ENGINE, plan
+from confab.scene import Scene, load
+from planner.acting.episode import End
+from planner.plan import LimitError, Outcome, Plan, Status
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.language import DomainError
+from reasoner.symbols import Symbol
+from worlds.interpreter import Interpreter, TooManyStatesError
+from worlds.mixed import World
+from worlds.scenes import scene
+from worlds.walking import cost, faults
+
+SECONDS, CPU = 3.0, 4.0
+"""The time limit of a call, and the CPU time after which it is taken for one that doesn't return."""
+MOST = 5_000
+"""So many nodes are searched for the truth."""
+EXPORTS, EXECUTIONS, LESSONS, READERS = 4, 4, 8, 40
+"""One of so many worlds is exported and imported, carried out, planned in with a memory, and read by unified-planning."""
+T = TypeVar("T")
+
+
+class EndlessError(BaseException):
+    """A call has used up its CPU time; no part of the program catches it."""
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """What is wrong: a kind, in which mode, and the particulars."""
+
+    kind: str
+    mode: str
+    text: str
+
+
+@dataclass
+class Judged:
+    """What came of a world."""
+
+    complaints: list[Complaint] = field(default_factory=list)
+    remarks: list[Complaint] = field(default_factory=list)
+    status: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    least: float | None = None
+    known: bool = True
+    length: int = 0
+    states: int = 0
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raise `EndlessError` after so much CPU time."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise EndlessError
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds, 0.2)  # again: a callback of a library may swallow the first
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+class Judge:
+    """Judges one world."""
+
+    def __init__(self, world: World, folder: Path, every: bool = False) -> None:
+        self.world, self.folder, self.every = world, folder, every
+        self.found = Judged()
+        self.meant = Interpreter(world.problem)
+        self.rng = Random(f"judge {world.seed}")
+
+    def complain(self, kind: str, mode: str, text: object = "") -> None:
+        """Note that something is wrong."""
+        self.found.complaints.append(Complaint(kind, mode, str(text)[:400]))
+
+    def sampled(self, one_of: int, what: str) -> bool:
+        """Return whether a world is among those of which something costly is asked."""
+        return self.every or zlib.crc32(f"{what} {self.world.seed}".encode()) % one_of == 0
+
+    def judged(self) -> Judged:
+        """Return what came of the world."""
+        self.truth()
+        file = self.folder / f"w{self.world.seed}.ttl"
+        file.write_text(scene(self.world), encoding="utf-8")
+        try:
+            self.modes(file)
+        finally:
+            file.unlink()
+        return self.found
+
+    def truth(self) -> None:
+        """Work out what the goal costs at least; `self.surely` is less where it is open what counts as touched."""
+        level, found = self.world.problem.domain.levels[-1], self.found
+        begin = process_time()
+        try:
+            truth = self.meant.explored(level, MOST)
+            found.least, found.states = truth.least, len(truth.costs)
+        except TooManyStatesError:
+            found.known, found.states = False, MOST
+        self.surely = found.least
+        unsettled = [i for i, rest in self.meant.rests.items() if self.meant.initial[i] != rest]
+        if unsettled and found.known:
+            try:
+                self.surely = self.meant.explored(level, MOST, rests=False).least
+            except TooManyStatesError:
+                found.known = False
+        found.seconds["truth"] = process_time() - begin
+
+    def call(self, mode: str, made: Callable[[], T]) -> T | None:
+        """Return what a call returns; note it if it doesn't, or raises what nobody expects."""
+        begin = process_time()
+        try:
+            with limited(CPU):
+                return made()
+        except EndlessError:
+            self.found.status[mode] = "endless"
+            self.complain("endless", mode)
+        except (KnowledgeError, DomainError) as error:
+            self.found.status[mode] = "refused"
+            self.found.remarks.append(Complaint("refused", mode, str(error)))
+        except LimitError as error:
+            self.found.status[mode] = "gave-up"
+            self.found.remarks.append(Complaint("gave-up", mode, str(error)))
+        except Exception as error:
+            self.found.status[mode] = "crash"
+            where = error.__traceback__
+            while where is not None and where.tb_next is not None:
+                where = where.tb_next
+            at = f"{Path(where.tb_frame.f_code.co_filename).name}:{where.tb_frame.f_code.co_name}" if where else ""
+            self.complain("crash", mode, f"{type(error).__name__} in {at}: {error}")
+        finally:
+            self.found.seconds[mode] = process_time() - begin
+        return None
+
+    def modes(self, file: Path) -> None:
+        """Ask for plans in every mode, and for what follows from one."""
+        read = self.call("load", lambda: load(file))
+        if read is None:
+            return
+        modes: dict[str, dict[str, Any]] = {"guarded": {}, "optimal": {"mode": "optimal"}, "paper": {"mode": "paper"}}
+        if len(self.world.problem.domain.levels) > 1:
+            modes["strict levels"] = {"leave_levels": False}
+        results = {mode: self.outcome(read, mode, **options) for mode, options in modes.items()}
+        first = results["guarded"]
+        if first is not None and first.plan is not None and self.sampled(LESSONS, "lesson"):
+            self.with_a_lesson(read, first.plan)
+        refused = {mode for mode, status in self.found.status.items() if status == "refused" and mode in modes}
+        if refused and len(refused) < sum(mode in self.found.status for mode in modes):
+            self.complain("refused by some modes only", "/".join(sorted(refused)), self.found.remarks[-1].text)
+        if refused:
+            return
+        if self.sampled(EXPORTS, "export"):
+            for level in self.world.problem.domain.levels:
+                self.call(f"export {level}", lambda level=level: self.export(read, level))  # type: ignore[misc]
+        if self.sampled(EXECUTIONS, "execute"):
+            self.execution(read, first)
+
+    def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
+        """Plan, and judge what comes of it."""
+        result = self.call(name, lambda: plan(read, engine=NO_ENGINE, time_limit=SECONDS, **options))
+        if result is None:
+            return None
+        outcome = result.outcome
+        self.found.status[name] = outcome.status.value
+        self.judge(name, outcome, result.problem)
+        return outcome
+
+    def judge(self, mode: str, outcome: Outcome, problem: Any = None) -> None:
+        """Hold an outcome against the truth."""
+        least, surely, known = self.found.least, self.surely, self.found.known
+        if outcome.plan is not None:
+            wrong = faults(self.meant, outcome.plan)
+            for fault in wrong[:1]:
+                self.complain("invalid plan", mode, fault)
+            if known and surely is None and not wrong:
+                self.complain("a plan where there is none", mode)
+            if mode == "strict levels" and any(
+                step.level != self.world.problem.domain.levels[0] for step in outcome.plan.steps
+            ):
+                self.complain("a level left", mode)
+            self.found.length = max(self.found.length, len(outcome.plan.primitives))
+        if outcome.status is Status.UNSOLVABLE:
+            if known and least is not None and mode != "strict levels":
+                self.complain("false unsolvable", mode, outcome.reason.text if outcome.reason else "")
+            self.certificate(mode, outcome, problem)
+        if outcome.status is Status.GAVE_UP:
+            text = outcome.reason.text if outcome.reason else ""
+            self.found.remarks.append(Complaint("gave-up", mode, text))
+        if outcome.bound is not None and known and outcome.plan is not None:
+            own = cost(self.meant, outcome.plan)
+            if outcome.bound > (math.inf if least is None else float(least)) + 1e-9:
+                self.complain("wrong bound", mode, f"at least {outcome.bound} is claimed, {least} suffices")
+            elif outcome.bound > own + 1e-9:
+                self.complain("wrong bound", mode, f"at least {outcome.bound} is claimed, its own plan costs {own}")
+            elif mode == "optimal" and outcome.bound < own - 1e-9:
+                self.found.remarks.append(Complaint("unproved", mode, f"{outcome.bound} … {own}"))
+
+    def certificate(self, mode: str, outcome: Outcome, problem: Any) -> None:
+        """Ask for what proves that there is no plan, and have it checked."""
+        if not hasattr(outcome, "certificate"):
+            return
+        if outcome.certificate is None:
+            self.complain("uncertified", mode, outcome.reason.text if outcome.reason else "")
+
+    def with_a_lesson(self, read: Scene, first: Plan) -> None:
+        """Plan with a memory that has learned one plan."""
+        from confab.memory import Memory
+
+        def remembered() -> Memory:
+            memory = Memory.of(read)
+            memory.learn(read, first)
+            return memory
+
+        memory = self.call("learn", remembered)
+        if memory is not None:
+            self.outcome(read, "leading", mode="leading", memory=memory)
+
+    # ------------------------------------------------------------------------------------------------------------- PDDL
+
+    def export(self, read: Scene, level: int) -> None:
+        """Export a level and import it; as a problem of its own it has to be solvable where the level is."""
+        from reasoner.pddl.exporting import to_pddl
+        from reasoner.pddl.importing import imported
+        from reasoner.pddl.syntax import PddlError, parse
+
+        exported = to_pddl(read.problem, level)
+        mode = f"export {level}"
+        try:
+            again = Interpreter(imported(parse(exported.domain, exported.problem)).problem)
+        except PddlError as error:
+            self.complain("export isn't read", mode, error)
+            return
+        rested = {
+            symbol: str(self.world.problem.domain.situations[symbol.situation].rest)
+            for symbol, slot in self.meant.slots.items()
+            if self.world.problem.domain.situations[symbol.situation].rest == self.meant.initial[slot]
+            and self.world.problem.first_level(symbol) <= level
+        }
+        flat = Interpreter(replace(self.world.problem, goal={**rested, **self.world.problem.goal}))
+        try:
+            wanted = flat.explored(level, MOST, rests=False).least
+            got = again.explored(again.problem.domain.levels[-1], 4 * MOST, rests=False).least
+        except TooManyStatesError:
+            return
+        if (wanted is None) != (got is None):
+            self.complain("export means something else", mode, f"least {wanted}, exported {got}")
+        if self.sampled(READERS, "reader"):
+            self.read_by_unified_planning(mode, exported.domain, exported.problem)
+
+    def read_by_unified_planning(self, mode: str, domain: str, problem: str) -> None:
+        """Complain if unified-planning can't read what was exported."""
+        from unified_planning.io import PDDLReader
+
+        try:
+            PDDLReader().parse_problem_string(domain, problem)
+        except Exception as error:
+            self.complain("unified-planning can't read the export", mode, f"{type(error).__name__}: {error}")
+
+    # -------------------------------------------------------------------------------------------------------- execution
+
+    def execution(self, read: Scene, first: Outcome | None) -> None:
+        """Carry the task out, now and then with a fact that changes on the way."""
+        texts: list[str] = []
+        if first is not None and first.plan is not None and self.rng.random() < 0.7:
+            steps = [step for step in first.plan.primitives if len(step.path) > 1]
+            after = ".".join(map(str, self.rng.choice(steps).path)) if steps else str(first.plan.primitives[0].id)
+            if fact := self.fact():
+                texts = [f"after={after} {fact}"]
+        mode = "execute"
+        run = self.call(mode, lambda: read.execute(interventions=texts))
+        if run is None:
+            return
+        episode = run.episode
+        self.found.status[mode] = episode.status.value
+        state = list(self.meant.initial)
+        events: list[tuple[float, int, Any]] = [(one.end, 0, one.step) for one in episode.events if one.ok]
+        events += [(at, 1, one) for one, at in episode.interventions]
+        for _, kind, one in sorted(events, key=lambda event: event[:2]):
+            if kind:
+                for fact in one.facts:
+                    if fact.symbol in self.meant.slots:
+                        slot = self.meant.slots[fact.symbol]
+                        amount = self.meant.kinds[fact.symbol.situation].quantity
+                        state[slot] = fact.value if amount is None else type(state[slot])(fact.value)
+                state = list(self.meant.closed(state))
+                continue
+            made = list(self.meant.done(one.behavior, one.arguments, tuple(state)))
+            if not made:
+                self.complain("a step that can't be done is done", mode, f"{one}; {texts}")
+                return
+            state = list(made[0][1])
+        reached = self.meant.wanted(tuple(state))
+        if (episode.status is End.REACHED) and not reached:
+            self.complain("said to be reached, and isn't", mode, texts)
+        if episode.status is End.IMPOSSIBLE:
+            self.meant.initial = tuple(state)
+            try:
+                if self.meant.explored(self.world.problem.domain.levels[-1], MOST).least is not None:
+                    self.complain("said to be impossible, and isn't", mode, texts)
+            except TooManyStatesError:
+                pass
+        if episode.status is End.GAVE_UP:
+            self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
+
+    def fact(self) -> str:
+        """Return a fact that may come to hold, or nothing."""
+        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated]
+        symbol: Symbol = self.rng.choice(symbols)
+        kind = self.meant.kinds[symbol.situation]
+        if kind.quantity is not None:
+            values: tuple[str, ...] = ("0", "1", "2")
+        else:
+            values = ("true", "false") if kind.boolean else self.world.problem.classes[kind.range]
+        return " ".join((symbol.arguments[0], symbol.situation, *symbol.arguments[1:], self.rng.choice(values)))

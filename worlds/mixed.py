@@ -1,0 +1,415 @@
+"""Small random worlds in which everything that a domain can say meets everything else.
+
+Situation types with one value per object, with many, of several arguments, with numbers, and defined by rules or by property
+axioms; behaviours on one to three levels, with effects on all of a class, on individuals that they name, and under conditions;
+rest values, values and situation types of lower levels; classes without individuals, and individuals that nothing mentions.
+What is wanted is drawn from states that can be reached, mixed from several of them, or drawn at random.
+
+Each world is small enough to be searched to the end by `worlds.interpreter`, or nearly so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import product
+from random import Random
+
+from reasoner.amounts import Quantity, written
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    Behavior,
+    Condition,
+    Domain,
+    Parameter,
+    Problem,
+    RelationCondition,
+    Rule,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+)
+from worlds.interpreter import Interpreter, State, TooManyStatesError
+from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
+
+MOST = 600
+"""So many nodes of the lowest level may be reachable in most worlds."""
+UNBOUNDED = 0.03
+"""The share of worlds that may be larger: there the truth may stay unknown."""
+EXCLUDED = 0.4
+"""In this share of worlds it is tried to want what no state has."""
+TRIES = 6
+
+
+@dataclass(frozen=True)
+class World:
+    """A problem as it is meant, and how a scene says it.
+
+    `pairs` are the situation types whose property takes several values, `owners` the classes that have a situation type; `axioms`
+    has for a situation type that is defined by property axioms what stands in place of its rules; `updates` are the behaviours
+    that are written as SPARQL updates.
+    """
+
+    seed: int
+    problem: Problem
+    parents: Mapping[str, tuple[str, ...]]
+    owners: Mapping[str, tuple[str, ...]]
+    pairs: frozenset[str] = frozenset()
+    axioms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    updates: frozenset[str] = frozenset()
+
+
+def mixed(seed: int) -> World:
+    """Return a random world; the same for the same seed."""
+    rng = Random(f"mixed {seed}")
+    while True:
+        world = _Draft(rng, seed).world()
+        most = MOST if rng.random() > UNBOUNDED else 50
+        interpreter = Interpreter(world.problem)
+        try:
+            states = [node[0] for node in interpreter.explored(world.problem.domain.levels[-1], most, False).costs]
+        except TooManyStatesError:
+            if most == MOST:
+                continue
+            states = [interpreter.initial]
+        goal = _Wishes(rng, interpreter, states).goal(rng.random() < EXCLUDED)
+        if goal:
+            return replace(world, problem=replace(world.problem, goal=goal))
+
+
+class _Wishes:
+    """Draws what is wanted."""
+
+    def __init__(self, rng: Random, interpreter: Interpreter, states: Sequence[State]) -> None:
+        self.rng, self.of, self.states = rng, interpreter, states
+
+    def goal(self, excluded: bool) -> dict[Symbol, str]:
+        """Return a goal that doesn't hold at first, one that no state has if that is asked for and found; or nothing."""
+        for _ in range(TRIES):
+            goal = self.drawn("random" if self.rng.random() < 0.3 else "two" if excluded else "one")
+            states = self.states if excluded else self.states[:1]
+            if goal and not any(all(self.of.meets(state, s, v) for s, v in goal.items()) for state in states):
+                return goal
+            excluded = excluded and self.rng.random() < 0.9
+        return {}
+
+    def drawn(self, kind: str) -> dict[Symbol, str]:
+        """Return what some states have: one, two mixed, or any values at all."""
+        rng = self.rng
+        sources = [rng.choice(self.states[-1 - len(self.states) // 4 :])]
+        sources += [rng.choice(self.states)] if kind == "two" else []
+        found: dict[Symbol, str] = {}
+        for _ in range(rng.choice((1, 1, 2, 2, 3, 4)) + (kind == "two")):
+            source = rng.choice(sources)
+            changed = [s for s, i in self.of.slots.items() if source[i] != self.of.initial[i]]
+            if kind == "random" or not changed or rng.random() < 0.15:
+                changed = self.of.symbols
+            if not changed:
+                return {}
+            symbol = rng.choice(changed)
+            value = self.random(symbol) if kind == "random" else self.of.value(source, symbol)
+            found.setdefault(symbol, self.said(symbol, value))
+        return dict(sorted(found.items()))
+
+    def random(self, symbol: Symbol) -> object:
+        kind = self.of.kinds[symbol.situation]
+        if kind.quantity is not None:
+            return self.rng.randint(0, 4)
+        return self.rng.choice((FALSE, TRUE) if kind.boolean else self.of.problem.classes[kind.range])
+
+    def said(self, symbol: Symbol, value: object) -> str:
+        if self.of.kinds[symbol.situation].quantity is None:
+            return str(value)
+        sign = self.rng.choice(("=", ">=", "<=", "<", ">"))
+        number = Fraction(str(value))
+        number = number if number.denominator in (1, 2, 4) and abs(number) < 100 else Fraction(1)
+        number += {"<": 1, ">": -1}.get(sign, 0)
+        return written(number) if sign == "=" else f"{sign}{written(number)}"
+
+
+class _Draft(Vocabulary):
+    """One draw of a world without what is wanted."""
+
+    def __init__(self, rng: Random, seed: int) -> None:
+        super().__init__(rng)
+        self.seed = seed
+        self.levels = rng.choice((1, 1, 1, 2, 2, 3))
+        self.owners: dict[str, tuple[str, ...]] = {}
+        self.pairs: set[str] = set()
+        self.axioms: dict[str, tuple[str, ...]] = {}
+        self.initial: dict[Symbol, str] = {}
+
+    def chance(self, p: float) -> bool:
+        return self.rng.random() < p
+
+    def world(self) -> World:
+        self.individuals()
+        for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
+            self.situation(number)
+        self.static()
+        for number in range(self.rng.choice((0, 0, 1, 1, 2))):
+            self.defined(number)
+        behaviors = self.behaviors()
+        used = {b.level for b in behaviors}
+        self.levels = max(used)
+        domain = Domain(self.situations, {b.name: b for b in behaviors}, rules=self.rules)
+        problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
+        updates = frozenset(b.name for b in behaviors) if self.chance(0.25) else frozenset()
+        return World(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
+
+    def individuals(self) -> None:
+        rng, number = self.rng, 0
+
+        def some(kind: str, many: int) -> tuple[str, ...]:
+            nonlocal number
+            number += many
+            return tuple(f"{kind.lower()[0]}{i}" for i in range(number - many + 1, number + 1))
+
+        own, sub = some("A", rng.choice((1, 1, 2, 2, 3))), some("A", rng.choice((0, 0, 1, 1, 2)))
+        b = some("B", rng.choice((0, 1, 1, 2, 2, 3)))
+        self.classes = {"Truth": (FALSE, TRUE), "A": (*own, *sub), "A1": sub, "B": b}
+        self.objects = (*own, *sub, *b)
+
+    # --------------------------------------------------------------------------------------------------- situation types
+
+    def situation(self, number: int) -> None:
+        """Draw a situation type with what holds of it at first."""
+        rng = self.rng
+        kind = rng.choice("FFFPPRRQGNNM")
+        name = f"{kind}{number}"
+        level = rng.choice(range(1, self.levels + 1)) if number else 1
+        owner = rng.choice(("A", "A", "B", "A1", "A|B"))
+        owners = tuple(owner.split("|"))
+        if len(owners) > 1:
+            self.classes[owner] = tuple(dict.fromkeys(one for of in owners for one in self.classes[of]))
+        arguments: tuple[str, ...] = (owner,)
+        if kind in "QGM":
+            owners = ()
+            arguments = tuple(rng.choice(("A", "B", "A1")) for _ in range(3 if kind == "Q" and self.chance(0.1) else 2))
+        self.owners[name] = owners
+        rest: str | None = None
+        if kind in "FG":
+            self.with_values(name, arguments, level)
+            return
+        if kind in "NM":
+            self.amount(name, arguments, level)
+            return
+        if kind == "R":
+            target = rng.choice(("A", "B", "B"))
+            self.pairs.add(name)
+            self.parents[target] = (*self.parents[target], name)
+            self.classes[name] = self.classes[target]
+            arguments = (*arguments, name)
+        if level > 1 and self.chance(0.5):
+            rest = FALSE
+        elif level > 1 and self.chance(0.1):
+            rest = TRUE
+        rest = None if kind == "R" and rest == TRUE else rest
+        self.situations[name] = SituationType(name, arguments, "Truth", level, rest, FALSE, boolean=True)
+        if rest == TRUE:
+            self.situations[name] = SituationType(name, arguments, "Truth", level, TRUE, TRUE, boolean=True)
+        for row in product(*(self.classes[of] for of in arguments)):
+            if rest == TRUE or self.chance(0.05 if rest == FALSE else 0.3):
+                self.initial[Symbol(name, row)] = TRUE
+
+    def with_values(self, name: str, arguments: tuple[str, ...], level: int) -> None:
+        """Draw a situation type with one value per object."""
+        rng = self.rng
+        members = tuple(f"{name}v{i}" for i in range(rng.choice((2, 2, 3))))
+        target = rng.choice(("", "", "", "A", "B"))
+        if target:
+            members = members[: rng.choice((0, 1, 1, 2))]
+            if len({*members, *self.classes[target]}) < 2:
+                members = (f"{name}v0", f"{name}v1")
+            self.parents[target] = (*self.parents[target], name)
+        self.classes[name] = (*members, *(self.classes[target] if target else ()))
+        first = self.classes[name]
+        if members and self.levels > level and self.chance(0.2):
+            lower = rng.choice(members)
+            self.values[lower] = rng.choice(range(level + 1, self.levels + 1))
+            first = tuple(value for value in first if value != lower) or first
+        start = {row: rng.choice(first) for row in product(*(self.classes[of] for of in arguments))}
+        rest = None
+        if level > 1 and self.chance(0.5):
+            rest = rng.choice(first)
+            start = {row: value if self.chance(0.05) else rest for row, value in start.items()}
+        default = rest if rest is not None else rng.choice(first) if len(arguments) > 1 or self.chance(0.2) else None
+        self.situations[name] = SituationType(name, arguments, name, level, rest, default)
+        self.initial |= {Symbol(name, row): value for row, value in start.items()}
+
+    def amount(self, name: str, arguments: tuple[str, ...], level: int) -> None:
+        """Draw a situation type with a number per object."""
+        rng = self.rng
+        least = rng.choice((Fraction(0), Fraction(0), Fraction(-1), None))
+        most = rng.choice((Fraction(2), Fraction(3), Fraction(4), None))
+        if least is None and most is None and not self.chance(0.1):
+            most, least = Fraction(3), Fraction(0)
+        whole = self.chance(0.6)
+        default = "1" if len(arguments) > 1 or self.chance(0.2) else None
+        self.situations[name] = SituationType(
+            name, arguments, name, level, None, default, quantity=Quantity("", whole, least, most)
+        )
+        for row in product(*(self.classes[of] for of in arguments)):
+            if len(arguments) == 1 or self.chance(0.5) or default:
+                self.initial[Symbol(name, row)] = str(rng.randint(0, 2))
+
+    def static(self) -> None:
+        """Draw what no behaviour changes: relations between individuals, and numbers of individuals."""
+        if self.chance(0.4):
+            ends = (self.rng.choice(("A", "B", "A1")), self.rng.choice(("A", "B")))
+            rows = frozenset(row for row in product(*(self.classes[of] for of in ends)) if self.chance(0.5))
+            self.relations["near"], self.ends["near"] = rows, ends
+        if self.chance(0.3) and any(s.quantity for s in self.situations.values()):
+            self.relations["size"] = frozenset(
+                (one, str(self.rng.randint(0, 2))) for one in self.classes["A"] if self.chance(0.9)
+            )
+            self.ends["size"] = ("A",)
+
+    def defined(self, number: int) -> None:
+        """Draw a situation type that follows from others."""
+        rng, name = self.rng, f"D{number}"
+        properties = [one for one in sorted(self.pairs) if one not in self.rules]
+        if properties and self.chance(0.35):
+            self.along(name, rng.choice(properties))
+            return
+        kind = rng.choice(("A", "B", "A1"))
+        arguments: tuple[str, ...] = (kind,) if self.chance(0.75) else (kind, rng.choice(("A", "B")))
+        self.owners[name] = (kind,) if len(arguments) == 1 else ()
+        rules = []
+        for _ in range(rng.choice((1, 1, 2))):
+            writer = Phrases(self, HIGHEST)
+            parameters = [writer.fresh(of) for of in arguments]
+            if self.chance(0.35):  # a single negated condition
+                conditions = [contrary(writer.value(parameters))]
+            else:
+                conditions = writer.conditions(parameters, rng.choice((1, 2)), 1)
+            terms = writer.terms()
+            rules.append(Rule(name, terms[: len(parameters)], terms[len(parameters) :], tuple(conditions)))
+        level = max((self.situations[s].level for rule in rules for s in named(rule.conditions)), default=1)
+        self.situations[name] = SituationType(name, arguments, "Truth", level, boolean=True, default=FALSE)
+        self.rules[name] = tuple(rules)
+
+    def along(self, name: str, base: str) -> None:
+        """Draw a situation type that follows along a property: a transitive one above it, or a chain with a relation."""
+        situation = self.situations[base]
+        owner, target = situation.arguments
+        base_property, own_property = base.lower(), name.lower()
+        x, y, z = "?x", "?y", "?z"
+        one = ValueCondition(base, (x, z), TRUE)
+        near = self.ends.get("near", ("", ""))
+        kinds = tuple(owner.split("|"))
+        if near[0] and self.chance(0.5):
+            last = f"{name}"
+            chain = (ValueCondition(base, (x, y), TRUE), RelationCondition("near", (y, z)))
+            rules = [Rule(name, (Parameter(x, owner), Parameter(z, last)), (Parameter(y, target),), chain)]
+            self.classes[name], self.axioms[name] = self.classes[near[1]], (
+                f":{own_property} owl:propertyChainAxiom ( :{base_property} :near ) .",
+            )  # fmt: skip
+            self.parents[near[1]] = (*self.parents[near[1]], name)
+        else:
+            source = next(kind for kind in ("A", "B") if base in self.parents[kind])
+            self.parents[source] = (*self.parents[source], name)
+            self.classes[name] = self.classes[target]
+            further = (ValueCondition(name, (x, y), TRUE), ValueCondition(name, (y, z), TRUE))
+            ends = Parameter(x, owner), Parameter(z, name)
+            rules = [Rule(name, ends, (), (one,)), Rule(name, ends, (Parameter(y, name),), further)]
+            self.axioms[name] = (
+                f":{own_property} a owl:TransitiveProperty .",
+                f":{base_property} rdfs:subPropertyOf :{own_property} .",
+            )
+        self.owners[name] = kinds
+        self.pairs.add(name)
+        self.situations[name] = SituationType(
+            name, (owner, name), "Truth", situation.level, boolean=True, default=FALSE
+        )
+        self.rules[name] = tuple(rules)
+
+    # -------------------------------------------------------------------------------------------------------- behaviours
+
+    def behaviors(self) -> list[Behavior]:
+        """Return behaviours: those of a lower level mostly do what one of the level above does, and something besides."""
+        rng, found = self.rng, list[Behavior]()
+        above: list[Behavior] = []
+        for level in range(1, self.levels + 1):
+            made: list[Behavior] = []
+            for upper in above:
+                if self.chance(0.85):
+                    made += self.refining(upper, level, len(made))
+            for _ in range(rng.choice((1, 2, 2, 3)) if level == 1 else rng.choice((0, 1, 1, 2))):
+                made.append(self.behavior(f"L{level}_{len(made)}", level))
+            above = [one for one in made if one.effects or one.amounts]
+            found += above
+        return found or [self.behavior("L1_0", 1, True)]
+
+    def behavior(self, name: str, level: int, sure: bool = False) -> Behavior:
+        """Return a behaviour of its own."""
+        rng, writer = self.rng, Phrases(self, level)
+        parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2)))]
+        bound = list(parameters)
+        conditions = writer.conditions(bound, rng.choice((0, 0, 1, 1, 2)), 1)
+        return self.with_effects(name, level, writer, parameters, bound, conditions, rng.choice((1, 1, 2, 3)))
+
+    def with_effects(
+        self,
+        name: str,
+        level: int,
+        writer: Phrases,
+        parameters: Sequence[str],
+        bound: list[str],
+        conditions: Sequence[Condition],
+        many: int,
+        effects: Sequence[ValueEffect] = (),
+        amounts: Sequence[AmountEffect] = (),
+    ) -> Behavior:
+        values, numbers = list(effects), list(amounts)
+        for _ in range(many):
+            writer.effect(bound, values, numbers)
+        terms = writer.terms()
+        cost = self.rng.choice((1.0, 1.0, 1.0, 2.0, 0.5)) if self.chance(0.5) else 1.0
+        return Behavior(
+            name, level, tuple(t for t in terms if t.name in parameters), tuple(t for t in terms if t.name not in parameters),
+            tuple(conditions), tuple(values), cost, tuple(numbers),
+        )  # fmt: skip
+
+    def refining(self, upper: Behavior, level: int, count: int) -> list[Behavior]:
+        """Return behaviours of the next level that can do together what an upper one does, or nearly so."""
+        writer = Phrases(self, level)
+        writer.kinds = {**upper.kinds}
+        parameters = [p.name for p in upper.parameters]
+        bound = list(writer.kinds)
+        more = writer.conditions(bound, self.rng.choice((0, 0, 1)), 1)
+        lower = [s for s in self.situations.values() if s.level == level and s.name not in self.rules]
+        switches = [
+            s for s in lower if s.boolean and s.arguments in (("A",), ("B",), ("A1",)) and self.classes[s.arguments[0]]
+        ]
+        name = f"L{level}_{count}"
+        if switches and self.chance(0.4):  # something has to be so first, and another behaviour makes it so, or back
+            switch = self.rng.choice(switches)
+            first = Phrases(self, level)
+            on = first.fresh(switch.arguments[0])
+            fitting = [
+                t for t in parameters if set(self.classes[writer.kinds[t]]) <= set(self.classes[switch.arguments[0]])
+            ]
+            about = self.rng.choice([*fitting, self.rng.choice(self.classes[switch.arguments[0]])])
+            asked = ValueCondition(switch.name, (about,), FALSE if switch.rest == TRUE else TRUE)
+            begun = ValueEffect(switch.name, (on,), asked.value)
+            ended = ValueEffect(switch.name, (on,), FALSE if asked.value == TRUE else TRUE)
+            made = [
+                self.with_effects(name, level, writer, parameters, bound, [*upper.preconditions, asked, *more], 0,
+                                  upper.effects, upper.amounts),
+                self.with_effects(f"L{level}_{count + 1}", level, first, [on], [on], [], 0, [begun]),
+            ]  # fmt: skip
+            if switch.rest is not None or self.chance(0.5):
+                last = Phrases(self, level)
+                last.kinds = {**first.kinds}
+                made.append(self.with_effects(f"L{level}_{count + 2}", level, last, [on], [on], [], 0, [ended]))
+            return made
+        extra = self.rng.choice((0, 0, 1, 1))
+        conditions = [*upper.preconditions, *more]
+        return [
+            self.with_effects(name, level, writer, parameters, bound, conditions, extra, upper.effects, upper.amounts)
+        ]

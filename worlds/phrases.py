@@ -1,0 +1,312 @@
+"""Random conditions and effects over what a world has, nested in one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from random import Random
+
+from reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Parameter,
+    RelationCondition,
+    Rule,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+EACH, ANYONE = "?each", "?anyone"
+"""The variables of conditions that a scene says by a class in the place of an individual, and by an absence."""
+
+
+CONDITIONS = (
+    *("value", "value", "value", "binding", "near", "class", "equal", "witness", "absence", "every", "any"),
+    *("amount", "amount"),
+)
+
+
+class Vocabulary:
+    """What conditions and effects may speak of; `values` has the values of lower levels, `ends` the classes of relations."""
+
+    def __init__(self, rng: Random) -> None:
+        self.rng = rng
+        self.classes: dict[str, tuple[str, ...]] = {}
+        self.parents: dict[str, tuple[str, ...]] = {"A": (), "B": (), "A1": ("A",)}
+        self.situations: dict[str, SituationType] = {}
+        self.values: dict[str, int] = {}
+        self.relations: dict[str, frozenset[tuple[str, ...]]] = {}
+        self.ends: dict[str, tuple[str, ...]] = {}
+        self.rules: dict[str, tuple[Rule, ...]] = {}
+        self.objects: tuple[str, ...] = ()
+
+
+HIGHEST = 9
+"""A level that sees everything."""
+
+
+class Phrases:
+    """Draws conditions and effects of one behaviour or rule."""
+
+    def __init__(self, draft: Vocabulary, level: int) -> None:
+        self.draft, self.rng, self.level = draft, draft.rng, level
+        self.kinds: dict[str, str] = {}
+        self.witnesses = 0
+        self.inner: dict[str, str] = {}  # the classes of the variables of witnesses
+
+    def terms(self) -> tuple[Parameter, ...]:
+        """Return the parameters and variables."""
+        return tuple(Parameter(name, kind) for name, kind in self.kinds.items())
+
+    def fresh(self, kind: str) -> str:
+        """Return a new parameter or variable of a class."""
+        term = f"?p{len(self.kinds)}"
+        self.kinds[term] = kind
+        return term
+
+    def seen(self, quantity: bool = False, changeable: bool = False) -> list[SituationType]:
+        """Return the situation types that a behaviour of this level may speak of."""
+        return [
+            one
+            for one in self.draft.situations.values()
+            if one.level <= self.level and (one.quantity is not None) is quantity
+            and not (changeable and one.name in self.draft.rules)
+        ]  # fmt: skip
+
+    def term(self, bound: Sequence[str], kind: str) -> str | None:
+        """Return a term for an argument of a class: mostly one that fits, sometimes one of another class."""
+        members = self.draft.classes[kind]
+        fitting = [t for t in bound if set(self.kinds_of(t)) & set(members)]
+        if fitting and self.rng.random() < 0.75:
+            return self.rng.choice(fitting)
+        if members:
+            return self.rng.choice(members)
+        return self.rng.choice(bound) if bound else None
+
+    def kinds_of(self, term: str) -> tuple[str, ...]:
+        """Return the individuals that a term can stand for."""
+        return self.draft.classes.get(self.inner.get(term) or self.kinds.get(term, ""), ())
+
+    def conditions(self, bound: list[str], most: int, depth: int) -> list[Condition]:
+        """Return a conjunction; `bound` grows by what it determines."""
+        return [self.condition(bound, depth) for _ in range(most)]
+
+    def visible(self, values: Sequence[str]) -> list[str]:
+        """Return the values that exist on this level."""
+        return [value for value in values if self.draft.values.get(value, 1) <= self.level]
+
+    def value(self, bound: Sequence[str], about: str | None = None) -> Condition:
+        """Return a condition on the value of something; `about` has to be among its arguments, where it can."""
+        rng = self.rng
+        seen = self.seen()
+        if not seen:
+            return self.same(bound)
+        if about is not None:
+            mine = set(self.kinds_of(about))
+            seen = [s for s in seen if any(mine & set(self.draft.classes[of]) for of in s.arguments)] or seen
+        one = rng.choice(seen)
+        arguments = [self.term(bound, kind) for kind in one.arguments]
+        if about is not None:
+            mine = set(self.kinds_of(about))
+            places = [i for i, of in enumerate(one.arguments) if mine & set(self.draft.classes[of])]
+            arguments[rng.choice(places or [0])] = about
+        if None in arguments:
+            return self.same(bound)
+        terms = tuple(str(a) for a in arguments)
+        if one.boolean:
+            return ValueCondition(one.name, terms, TRUE, negated=rng.random() < 0.4)
+        values = self.visible(self.draft.classes[one.range])
+        fitting = [t for t in bound if t not in terms and set(self.kinds_of(t)) & set(values)]
+        value = rng.choice(fitting) if fitting and rng.random() < 0.4 else rng.choice(values or [FALSE])
+        return ValueCondition(one.name, terms, value, negated=rng.random() < 0.4)
+
+    def same(self, bound: Sequence[str]) -> Condition:
+        """Return that something is itself, where there is nothing better to say."""
+        one = self.rng.choice([*bound, *self.draft.objects])
+        return EqualityCondition(one, one)
+
+    def condition(self, bound: list[str], depth: int) -> Condition:
+        """Return a condition; `bound` grows by the variable that it determines, if any."""
+        rng, draft = self.rng, self.draft
+        negated = rng.random() < 0.35
+        kind = rng.choice(CONDITIONS)
+        if kind == "binding":
+            functional = [s for s in self.seen() if not s.boolean]
+            if functional and self.level != HIGHEST and depth:
+                one = rng.choice(functional)
+                arguments = tuple(self.term(bound, of) for of in one.arguments)
+                if None not in arguments:
+                    bound.append(self.fresh(one.range))
+                    return ValueCondition(one.name, tuple(map(str, arguments)), bound[-1])
+        if kind == "near" and "near" in draft.relations:
+            terms = tuple(self.term(bound, of) for of in draft.ends["near"])
+            if None not in terms:
+                return RelationCondition("near", tuple(map(str, terms)), negated)
+        if kind == "class" and bound:
+            return ClassCondition(rng.choice(bound), rng.choice(("A1", "A1", "B")), negated)
+        if kind == "equal" and (bound or draft.objects):
+            return EqualityCondition(
+                rng.choice([*bound, *draft.objects]), rng.choice([*bound, *draft.objects]), rng.random() < 0.6
+            )
+        if kind == "amount" and (compared := self.comparison(bound, negated)):
+            return compared
+        if kind == "witness" and depth:
+            self.witnesses += 1
+            variable, of = f"?w{self.witnesses}_{len(self.kinds)}", rng.choice(("A", "B", "A1"))
+            self.inner[variable] = of
+            inner = [self.value([*bound, variable], variable)]
+            if rng.random() < 0.5:
+                more = (EqualityCondition(variable, rng.choice(bound), True) if bound and rng.random() < 0.5
+                        else self.value([*bound, variable], variable))  # fmt: skip
+                inner.append(more)
+            return Witness(variable, of, tuple(inner), negated)
+        if kind == "absence":
+            found = [s for s in self.seen() if len(s.arguments) == 1]
+            if found:
+                one = rng.choice(found)
+                of = rng.choice([one.arguments[0] if one.arguments[0] in draft.parents else "A", "A"])
+                if one.boolean:
+                    inside = ValueCondition(one.name, (ANYONE,), TRUE)
+                else:
+                    value = self.term(bound, one.range) if rng.random() < 0.5 else None
+                    visible = self.visible(draft.classes[one.range])
+                    if value is None or (not value.startswith("?") and value not in visible):
+                        value = rng.choice(visible or [FALSE])
+                    inside = ValueCondition(one.name, (ANYONE,), value)
+                return Witness(ANYONE, of, (inside,), rng.random() < 0.7)
+        if kind == "every":
+            of = rng.choice(("A", "B", "A1"))
+            self.inner[EACH] = of
+            one_of = self.value([*bound, EACH], EACH)
+            if isinstance(one_of, ValueCondition) and one_of.arguments.count(EACH) == 1 and one_of.value != EACH:
+                return Witness(EACH, of, (contrary(one_of),), negated=True)
+        if kind == "any" and depth:
+            groups = tuple(
+                tuple(self.conditions(list(bound), rng.choice((1, 1, 2)), 0)) for _ in range(rng.choice((2, 2, 3)))
+            )
+            return AnyOf(groups, rng.random() < 0.2)
+        return self.value(bound)
+
+    def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
+        """Return a comparison of numbers; nothing if there are none."""
+        left = self.number(bound, 1)
+        if not isinstance(left, Amount | Calculation):
+            return None
+        right: Expression = Fraction(self.rng.randint(0, 3))
+        if self.rng.random() < 0.3:
+            right = self.number(bound, 0) or right
+        return Comparison(
+            left, self.rng.choice(("<", "<=", "=", ">=", ">")), right, negated and self.rng.random() < 0.5
+        )
+
+    def number(self, bound: Sequence[str], depth: int) -> Expression | None:
+        """Return a calculation; nothing if there are no numbers."""
+        rng, seen = self.rng, self.seen(quantity=True)
+        if not seen:
+            return None
+        if depth and rng.random() < 0.2:
+            left, sign = self.number(bound, 0), rng.choice("+-*//")
+            right: Expression | None = Fraction(rng.choice((0, 1, 2, 2)))
+            if rng.random() < 0.4:
+                right = self.number(bound, 0)
+            if (
+                sign in "*/" and isinstance(right, Amount) and rng.random() < 0.98
+            ):  # nothing multiplies what both change
+                right = Fraction(2)
+            return Calculation(sign, left, right) if left is not None and right is not None else None
+        if "size" in self.draft.relations and rng.random() < 0.2:
+            one = self.term(bound, "A")
+            return None if one is None else Measure("size", (one,))
+        situation = rng.choice(seen)
+        terms = [self.term(bound, of) for of in situation.arguments]
+        return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
+
+    # ----------------------------------------------------------------------------------------------------------- effects
+
+    def effect(self, bound: Sequence[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
+        """Draw an effect, unless it would contradict one that is there already."""
+        rng, draft = self.rng, self.draft
+        of_numbers = self.seen(quantity=True)
+        one = rng.choice([*self.seen(changeable=True), *of_numbers] or [None])
+        if one is None:
+            return
+        each, terms = None, list[str | None]()
+        for kind in one.arguments:
+            if each is None and kind in ("A", "B", "A1") and rng.random() < 0.25:
+                each = Parameter(EACH, rng.choice((kind, kind, "A1")))
+                self.inner[EACH] = each.kind
+                terms.append(EACH)
+            else:
+                terms.append(self.term(bound, kind))
+        if None in terms:
+            return
+        arguments, when = tuple(map(str, terms)), tuple[Condition, ...]()
+        if rng.random() < 0.3:
+            inner = [*bound, EACH] if each else list(bound)
+            when = (self.value(inner, EACH if each else None),)
+            if each and _mentions_twice(when[0]):
+                when = ()
+        if one.quantity is not None:
+            if any(change.situation == one.name for change in numbers):
+                return
+            by: Expression = Fraction(rng.choice((1, 1, 1, 2)))
+            operation = rng.choice(("increase", "increase", "decrease", "decrease", "assign", "scale"))
+            if operation == "scale":
+                by = rng.choice((Fraction(2), Fraction(0), Fraction(1, 2)))
+            elif rng.random() < 0.2:
+                by = self.number(bound, 1) or by
+            numbers.append(AmountEffect(one.name, arguments, operation, by, when, each))
+            return
+        if one.boolean:
+            value = rng.choice((TRUE, TRUE, FALSE))
+        else:
+            if any(effect.situation == one.name for effect in values):
+                return
+            visible = self.visible(draft.classes[one.range])
+            fitting = [t for t in bound if set(self.kinds_of(t)) and set(self.kinds_of(t)) <= set(visible)]
+            if not visible and not fitting:
+                return
+            value = rng.choice(fitting) if fitting and rng.random() < 0.5 else rng.choice(visible or fitting)
+        values.append(ValueEffect(one.name, arguments, value, when, each))
+
+
+def _mentions_twice(condition: Condition) -> bool:
+    """Return whether a condition names each of a class more than once, which a class in its place can't say."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            return (*arguments, value).count(EACH) > 1 or value == EACH
+        case _:
+            return True
+
+
+def contrary(condition: Condition) -> Condition:
+    """Return the negation of a condition."""
+    return replace(condition, negated=not condition.negated)
+
+
+def named(conditions: Sequence[Condition]) -> set[str]:
+    """Return the situation types that conditions speak of."""
+    found: set[str] = set()
+    for one in conditions:
+        match one:
+            case ValueCondition(situation):
+                found.add(situation)
+            case Witness(_, _, inner):
+                found |= named(inner)
+            case AnyOf(alternatives):
+                found |= {name for group in alternatives for name in named(group)}
+            case Comparison(left, _, right):
+                found |= situations_in(left) | situations_in(right)
+            case _:
+                pass
+    return found

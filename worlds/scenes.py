@@ -1,0 +1,349 @@
+"""A random world as one Turtle file: domain, scene and task, in all the ways in which a scene may say a thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    RelationCondition,
+    Rule,
+    SituationType,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+from reasoner.updates.writing import Situations, update
+from reasoner.vocabulary import ARGUMENTS
+from worlds.mixed import World
+from worlds.phrases import ANYONE, EACH
+
+HEADER = """\
+@prefix :        <https://example.org/w#> .
+@prefix c:       <https://w3id.org/confab/core#> .
+@prefix owl:     <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs:    <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix skos:    <http://www.w3.org/2004/02/skos/core#> .
+@prefix xsd:     <http://www.w3.org/2001/XMLSchema#> .
+@prefix dcterms: <http://purl.org/dc/terms/> .
+<https://example.org/w> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true ;
+  dcterms:title "w"@en ; dcterms:description "w"@en .
+"""
+
+
+def scene(world: World) -> str:
+    """Return a world as Turtle."""
+    return HEADER + "\n".join(_Scene(world).lines()) + "\n"
+
+
+def _iri(name: str) -> str:
+    return f"c:{name}" if name in (TRUE, FALSE) else f":{name}"
+
+
+def _decimal(number: Fraction) -> str:
+    said = written(number)
+    return said if "." in said else f"{said}.0"
+
+
+class _Scene:
+    """Writes one world."""
+
+    def __init__(self, world: World) -> None:
+        self.world, self.problem = world, world.problem
+        self.situations = world.problem.domain.situations
+        self.nodes: list[str] = []
+        self.terms: dict[str, str] = {}
+        self.where, self.count = "", 0
+
+    def lines(self) -> Iterator[str]:
+        yield from self.classes()
+        for one in self.situations.values():
+            yield from self.situation(one)
+        for relation, kind in (("near", "owl:ObjectProperty"), ("size", "owl:DatatypeProperty")):
+            if relation in self.problem.relations:
+                yield self.node(relation, f"{kind}, owl:NamedIndividual, c:Relation")
+        for name, rules in self.problem.domain.rules.items():
+            yield from self.world.axioms.get(name, ())
+            for number, rule in enumerate(() if name in self.world.axioms else rules):
+                yield from self.rule(f"{name}.r{number}", rule)
+        for index, behavior in enumerate(self.problem.domain.behaviors.values(), start=1):
+            yield from self.behavior(index, behavior)
+        yield from self.individuals()
+        yield from self.facts()
+        yield from self.task()
+
+    def node(self, name: str, kinds: str, *said: str) -> str:
+        """Return an individual with its label and definition."""
+        parts = [f"{_iri(name)} a {kinds}", *said, f'rdfs:label "{name}"@en', f'skos:definition "{name}."@en']
+        return " ; ".join(parts) + " ."
+
+    def part(self, kind: str, *said: str) -> str:
+        """Write a part of a behaviour, and return its IRI."""
+        self.count += 1
+        iri = f":{self.where}.c{self.count:03}"
+        self.nodes.append(" ; ".join([f"{iri} a owl:NamedIndividual, c:{kind}", *said, 'rdfs:label "c"@en']) + " .")
+        return iri
+
+    # ------------------------------------------------------------------------------------------------------------ domain
+
+    def classes(self) -> Iterator[str]:
+        for name, parents in self.world.parents.items():
+            above = [] if any(p in self.world.parents for p in parents) else ["c:Object"]
+            owned = [_iri(s) for s, owners in self.world.owners.items() if name in owners]
+            said = [f"rdfs:subClassOf {', '.join([*above, *map(_iri, dict.fromkeys(parents))])}"]
+            said += [f"c:hasSituationType {', '.join(owned)}"] if owned else []
+            yield self.node(name, "owl:Class, owl:NamedIndividual", *said)
+
+    def situation(self, one: SituationType) -> Iterator[str]:
+        name, owners = one.name, self.world.owners[one.name]
+        said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in self.problem.domain.rules else []
+        said += [f"c:restValue {_iri(one.rest)}"] if one.rest is not None else []
+        quantity = one.quantity
+        if quantity is None and one.default not in (None, FALSE, one.rest):
+            said.append(f"c:defaultValue {_iri(str(one.default))}")
+        if quantity is not None:
+            said += [f"c:leastAmount {_decimal(quantity.least)}"] if quantity.least is not None else []
+            said += [f"c:mostAmount {_decimal(quantity.most)}"] if quantity.most is not None else []
+            said += [f"c:defaultAmount {one.default}.0"] if one.default is not None else []
+            said += ["c:wholeNumbers true"] if quantity.whole and not owners else []
+        has_property = bool(owners) and (name in self.world.pairs or not one.boolean)
+        said += [f"c:valueProperty :{name.lower()}"] if has_property else []
+        if not owners:
+            said.append("c:parameter " + ", ".join(f":{name}.{i}" for i in range(1, len(one.arguments) + 1)))
+        kinds = (
+            "owl:NamedIndividual, c:SituationType, c:Amount"
+            if quantity
+            else "owl:Class, owl:NamedIndividual, c:SituationType"
+        )
+        yield self.node(name, kinds, *said)
+        for i, kind in enumerate(() if owners else one.arguments, start=1):
+            yield f":{name}.{i} a owl:NamedIndividual, c:Parameter ; c:index {i} ; c:termType :{kind} ."
+        if has_property:
+            kinds = "owl:DatatypeProperty" if quantity else "owl:ObjectProperty"
+            kinds += "" if name in self.world.pairs else ", owl:FunctionalProperty"
+            ends = [f"rdfs:domain :{owners[0]}"] if len(owners) == 1 and name not in self.world.axioms else []
+            if quantity:
+                ends.append(f"rdfs:range xsd:{'integer' if quantity.whole else 'decimal'}")
+            elif name not in self.world.axioms:
+                ends.append(f"rdfs:range :{name}")
+            yield self.node(name.lower(), f"{kinds}, owl:NamedIndividual", *ends)
+        for value in self.problem.classes.get(name, ()):
+            if value.startswith(name):
+                level = self.problem.value_levels.get(value, 1)
+                yield self.node(
+                    value, f"owl:NamedIndividual, :{name}", *([f"c:fromLevel {level}"] if level != 1 else [])
+                )
+
+    def rule(self, name: str, rule: Rule) -> Iterator[str]:
+        self.begin(name, [p.name for p in (*rule.parameters, *rule.variables)])
+        conditions = [self.condition(one) for one in rule.conditions]
+        head = self.said(rule.situation, [p.name for p in rule.parameters], TRUE)
+        said = [f"c:condition {', '.join(conditions)}"] if conditions else []
+        yield self.node(name, "owl:NamedIndividual, c:Rule", *head, *said)
+        yield from self.declared(rule.behavior)
+        yield from self.nodes
+
+    def begin(self, name: str, terms: Sequence[str]) -> None:
+        self.where, self.nodes, self.count = name, [], 0
+        self.terms = {term: f":{name}.{term[1:]}" for term in terms}
+
+    def declared(self, one: Behavior) -> Iterator[str]:
+        for i, parameter in enumerate(one.parameters, start=1):
+            said = f"c:Parameter ; c:index {i} ; c:termType {_iri(parameter.kind)}"
+            yield f"{self.terms[parameter.name]} a owl:NamedIndividual, {said} ."
+        for variable in one.variables:
+            said = f"c:Variable ; c:termType {_iri(variable.kind)}"
+            yield f"{self.terms[variable.name]} a owl:NamedIndividual, {said} ."
+
+    def behavior(self, index: int, one: Behavior) -> Iterator[str]:
+        head = [f"c:level {one.level}", f"c:index {index}"]
+        head += [f"c:cost {one.cost}"] if one.cost != 1 else []
+        if one.name in self.world.updates and (text := self.as_update(one)) is not None:
+            yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, f'c:update """{text}"""')
+            return
+        self.begin(one.name, [p.name for p in (*one.parameters, *one.variables)])
+        head += [f"c:parameter {', '.join(self.terms[p.name] for p in one.parameters)}"] if one.parameters else []
+        asked = [self.condition(condition) for condition in one.preconditions]
+        head += [f"c:precondition {', '.join(asked)}"] if asked else []
+        effects = []
+        for effect in one.every_effect:
+            if effect.each is not None:
+                self.terms[EACH] = f":{effect.each.kind}"
+            when = [self.condition(condition) for condition in effect.when]
+            tail = [f"c:when {', '.join(when)}"] if when else []
+            if isinstance(effect, ValueEffect):
+                made = self.part("ValueEffect", *self.said(effect.situation, effect.arguments, effect.value), *tail)
+            else:
+                made = self.part(
+                    "AmountEffect", f"c:situationType :{effect.situation}", *self.arguments(effect.arguments),
+                    f'c:change "{effect.operation}"', self.side("right", effect.amount), *tail,
+                )  # fmt: skip
+            effects.append(made)
+        yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, f"c:postcondition {', '.join(effects)}")
+        yield from self.declared(one)
+        yield from self.nodes
+
+    def as_update(self, one: Behavior) -> str | None:
+        """Return a behaviour as a SPARQL update; None if updates can't say it."""
+        properties = {
+            name: name.lower()
+            for name, its in self.situations.items()
+            if self.world.owners[name] and (name in self.world.pairs or not its.boolean)
+        }
+        try:
+            return update(one, Situations(properties, self.world.pairs), _iri)
+        except ValueError:
+            return None
+
+    # -------------------------------------------------------------------------------------------------------- conditions
+
+    def put(self, term: str) -> str:
+        return self.terms.get(term) or _iri(term)
+
+    def arguments(self, terms: Sequence[str]) -> list[str]:
+        return [f"c:{name} {self.put(term)}" for name, term in zip(ARGUMENTS, terms, strict=False)]
+
+    def said(self, situation: str, arguments: Sequence[str], value: str) -> list[str]:
+        """Return what says a value, and whether it is false."""
+        first = f"c:situationType :{situation}"
+        if situation in self.world.pairs:
+            subject, target = arguments
+            said = [first, f"c:about {self.put(subject)}", f"c:value {self.put(target)}"]
+            return [*said, "c:negated true"] if value == FALSE else said
+        said = [first, *self.arguments(arguments)]
+        if self.situations[situation].boolean and value == FALSE and len(situation) % 2:
+            return [*said, "c:negated true"]
+        return said if value == TRUE else [*said, f"c:value {self.put(value)}"]
+
+    def condition(self, one: Condition) -> str:
+        """Write a condition with what is inside it, and return its IRI."""
+        no = ["c:negated true"] if one.negated else []
+        match one:
+            case ValueCondition(situation, arguments, value):
+                return self.part("ValueCondition", *self.said(situation, arguments, value), *no)
+            case RelationCondition(relation, arguments):
+                subject, target = arguments
+                said = [f"c:relation :{relation}", f"c:about {self.put(subject)}", f"c:value {self.put(target)}"]
+                return self.part("RelationCondition", *said, *no)
+            case ClassCondition(term, kind):
+                return self.part("ClassCondition", f"c:about {self.put(term)}", f"c:ofClass :{kind}", *no)
+            case EqualityCondition(left, right):
+                return self.part("EqualityCondition", f"c:about {self.put(left)}", f"c:value {self.put(right)}", *no)
+            case Comparison(left, sign, right):
+                said = [f'c:sign "{sign}"', self.side("left", left), self.side("right", right)]
+                return self.part("Comparison", *said, *no)
+            case AnyOf(alternatives):
+                groups = [self.group(group) for group in alternatives]
+                return self.part("AnyOf", f"c:alternative {', '.join(groups)}", *no)
+            case Witness(variable, kind, (ValueCondition(situation, _, value),)) if variable == ANYONE:
+                said = [f"c:situationType :{situation}", f"c:ofClass :{kind}"]
+                said += [] if value == TRUE else [f"c:value {self.put(value)}"]
+                return self.part("AbsenceCondition", *said, *([] if one.negated else ["c:negated true"]))
+            case Witness(variable, kind, (ValueCondition() as inner,), True) if variable == EACH:
+                before = self.terms.get(EACH)
+                self.terms[EACH] = f":{kind}"
+                no = [] if inner.negated else ["c:negated true"]
+                found = self.part("ValueCondition", *self.said(inner.situation, inner.arguments, inner.value), *no)
+                if before is not None:
+                    self.terms[EACH] = before
+                return found
+            case Witness(variable, kind, conditions):
+                self.count += 1
+                before = self.terms.get(variable)
+                self.terms[variable] = f":{self.where}.w{self.count:03}"
+                self.nodes.append(
+                    f"{self.terms[variable]} a owl:NamedIndividual, c:Variable ; c:termType {_iri(kind)} ."
+                )
+                inside = [self.condition(each) for each in conditions]
+                sought = f"c:witness {self.terms[variable]}"
+                if before is not None:
+                    self.terms[variable] = before
+                return self.part("Witness", sought, f"c:condition {', '.join(inside)}", *no)
+
+    def group(self, conditions: Sequence[Condition]) -> str:
+        inside = [self.condition(one) for one in conditions]
+        return inside[0] if len(inside) == 1 else self.part("AllOf", f"c:condition {', '.join(inside)}")
+
+    def side(self, name: str, one: Expression) -> str:
+        """Return what leads to a number."""
+        if name == "right" and isinstance(one, Fraction):
+            return f"c:amount {_decimal(one)}"
+        return f"c:{name} {self.calculation(one)}"
+
+    def calculation(self, one: Expression) -> str:
+        match one:
+            case Calculation(sign, left, right):
+                return self.part("Calculation", f'c:sign "{sign}"', self.side("left", left), self.side("right", right))
+            case Amount(situation, arguments):
+                return self.part("Calculation", f"c:situationType :{situation}", *self.arguments(arguments))
+            case Measure(relation, arguments):
+                return self.part("Calculation", f"c:relation :{relation}", *self.arguments(arguments))
+            case Fraction():
+                return self.part("Calculation", f"c:amount {_decimal(one)}")
+
+    # ------------------------------------------------------------------------------------------------------------- scene
+
+    def individuals(self) -> Iterator[str]:
+        classes = self.problem.classes
+        everyone = [*classes["A"], *classes["B"]]
+        for index, name in enumerate(everyone, start=1):
+            kind = "A1" if name in classes["A1"] else "A" if name in classes["A"] else "B"
+            said = [f"c:index {index}"]
+            for symbol, value in self.problem.initial.items():
+                situation = self.situations[symbol.situation]
+                if symbol.arguments[0] != name or not self.world.owners[symbol.situation]:
+                    continue
+                if symbol.situation in self.world.pairs:
+                    said.append(f":{symbol.situation.lower()} {_iri(symbol.arguments[1])}")
+                elif not situation.boolean and value != (situation.default or situation.rest):
+                    said.append(f":{symbol.situation.lower()} {value if situation.quantity else _iri(value)}")
+            said += [
+                f":near {_iri(row[1])}" for row in sorted(self.problem.relations.get("near", ())) if row[0] == name
+            ]
+            said += [f":size {row[1]}.0" for row in sorted(self.problem.relations.get("size", ())) if row[0] == name]
+            yield self.node(name, f"owl:NamedIndividual, :{kind}", *said)
+        own = [v for name in self.situations for v in classes.get(name, ()) if v.startswith(name)]
+        if len(everyone) + len(own) > 1:
+            yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {' '.join(sorted(map(_iri, [*everyone, *own])))} ) ] ."
+
+    def facts(self) -> Iterator[str]:
+        """Yield what no property of an individual says."""
+        number = 0
+        for symbol, value in self.problem.initial.items():
+            situation = self.situations[symbol.situation]
+            if self.world.owners[symbol.situation] and (not situation.boolean or symbol.situation in self.world.pairs):
+                continue
+            if value == situation.default and not (situation.boolean and value == TRUE):
+                continue
+            number += 1
+            if situation.quantity is not None:
+                said = [
+                    f"c:situationType :{symbol.situation}",
+                    *self.arguments(symbol.arguments),
+                    f"c:amount {value}.0",
+                ]
+            else:
+                said = self.said(symbol.situation, symbol.arguments, value)
+            yield self.node(f"fact{number}", "owl:NamedIndividual, c:SituatedObjectInstance", *said)
+
+    def task(self) -> Iterator[str]:
+        self.begin("task", ())
+        goals = []
+        for symbol, value in self.problem.goal.items():
+            if self.situations[symbol.situation].quantity is None:
+                goals.append(self.part("ValueCondition", *self.said(symbol.situation, symbol.arguments, value)))
+                continue
+            for sign, limit in bounds(value):
+                said = [f"c:situationType :{symbol.situation}", *self.arguments(symbol.arguments)]
+                goals.append(self.part("Comparison", *said, f'c:sign "{sign}"', f"c:amount {_decimal(limit)}"))
+        yield self.node("task", "owl:NamedIndividual, c:Task", f"c:goal {', '.join(goals)}")
+        yield from self.nodes

@@ -1,0 +1,99 @@
+"""Whether a tree of steps is a plan by docs/levels.md, by the plain interpreter alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from planner.plan import Plan, Step
+from worlds.interpreter import NOTHING, Interpreter, State
+
+
+def faults(of: Interpreter, plan: Plan) -> list[str]:
+    """Return what is wrong with a plan by docs/levels.md; nothing if it is one."""
+    walk = _Walk(of)
+    end = walk.sequence(plan.steps, 0, of.initial, False)
+    if end is not None and not of.wanted(end):
+        walk.faults.append("the goal isn't reached")
+    return walk.faults
+
+
+def cost(of: Interpreter, plan: Plan) -> Any:
+    """Return what the steps of the lowest level of a plan cost, done one after the other."""
+    state, total = of.initial, 0
+    for step in plan.at_level(of.problem.domain.levels[-1]):
+        made = next(of.done(step.behavior, step.arguments, state), None)
+        if made is None:
+            return NOTHING
+        total, state = total + made[0], made[1]
+    return total
+
+
+class _Walk:
+    """A plan carried out step by step."""
+
+    def __init__(self, interpreter: Interpreter) -> None:
+        self.of, self.problem = interpreter, interpreter.problem
+        self.levels, self.faults = self.problem.domain.levels, list[str]()
+        kinds = self.problem.domain.situations
+        self.rests = [slot for slot, symbol in enumerate(self.of.symbols) if kinds[symbol.situation].rest is not None]
+
+    def sequence(self, steps: Sequence[Step], above: int, state: State, inside: bool) -> State | None:
+        """Carry out the steps that refine one of level `above` (0: the task); return the state in which they end."""
+        level = next((level for level in self.levels if level > above), None)
+        if level is None:
+            if steps:
+                self.faults.append("steps below the lowest level")
+                return None
+            return state
+        touched: set[int] = set()
+        position = 0
+        while position < len(steps):
+            before, last = state, position + 1
+            if steps[position].level == level:
+                after = self.step(steps[position], state)
+            elif steps[position].level > level:
+                while last < len(steps) and steps[last].level > level:
+                    last += 1
+                after = self.sequence(steps[position:last], level, state, inside)
+            else:
+                self.faults.append("a step of a level above stands below it")
+                return None
+            if after is None:
+                return None
+            position, state = last, after
+            touched |= {slot for slot in self.rests if before[slot] != state[slot]}
+        for slot in touched:
+            symbol = self.of.symbols[slot]
+            at_rest = state[slot] == self.problem.domain.situations[symbol.situation].rest
+            own = above < self.problem.first_level(symbol) <= level
+            if own and not at_rest and (inside or symbol not in self.problem.goal):
+                self.faults.append(f"{symbol} is left {state[slot]}, not at rest")
+        return state
+
+    def step(self, step: Step, state: State) -> State | None:
+        """Carry out a step with its refinement; return the state in which it ends."""
+        made = list(self.of.done(step.behavior, step.arguments, state))
+        if not made:
+            self.faults.append(f"{step} can't be done")
+            return None
+        if step.level == self.levels[-1]:
+            if step.steps:
+                self.faults.append(f"{step} is of the lowest level, and refined")
+            return made[0][1]
+        end = self.sequence(step.steps, step.level, state, True)
+        if end is None:
+            return None
+        if not any(self.as_said(step.level, state, said, end) for _, said in made):
+            self.faults.append(f"{step} is refined to something else than it says")
+        return end
+
+    def as_said(self, level: int, before: State, said: State, end: State) -> bool:
+        """Return whether a refinement leaves what a level sees as the step says."""
+        for slot in range(self.of.stated):
+            symbol = self.of.symbols[slot]
+            seen = self.problem.first_level(symbol) <= level
+            hidden = said[slot] == before[slot] and self.problem.value_levels.get(str(before[slot]), 1) > level
+            if seen and not hidden and end[slot] != said[slot]:
+                return False
+        return True
