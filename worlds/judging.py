@@ -21,9 +21,10 @@ from typing import Any, TypeVar
 from confab.planning import NO_ENGINE, plan
 from confab.scene import Scene, load
 from planner.acting.episode import End
-from planner.plan import LimitError, Outcome, Plan, Status
+from planner.plan import Outcome, Plan, Status
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.language import DomainError
+from reasoner.limits import LimitError
 from reasoner.symbols import Symbol
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import World
