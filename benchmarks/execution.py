@@ -32,7 +32,6 @@ from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Plan, Step
 from planner.plan_costs import cost_of
 from planner.validation import successor
-from reasoner.files import write_whole
 from reasoner.generate import write_scene
 from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
@@ -200,7 +199,8 @@ def physical() -> None:
             "cpu seconds": round(process_time() - begin, 1),
         }
         lines.append(json.dumps(row) + "\n")
-        write_whole(OUT / "physical.jsonl", "".join(lines))
+        OUT.mkdir(parents=True, exist_ok=True)
+        (OUT / "physical.jsonl").write_text("".join(lines), encoding="utf-8")
     _table(ends)
     print(f"\n{wrong} with a claim that isn't so; primitives failed: {dict(failures)}")
 

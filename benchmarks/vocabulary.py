@@ -9,7 +9,6 @@ import rdflib
 from rdflib import DCTERMS, OWL, RDF, RDFS, SKOS, XSD, URIRef
 
 import ontology
-from reasoner.files import write_whole
 from reasoner.names import local_name
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "vocabulary.md"
@@ -99,5 +98,5 @@ def _names(graph: rdflib.Graph, term: URIRef, end: URIRef) -> str:
 
 
 if __name__ == "__main__":
-    write_whole(PAGE, page())
+    PAGE.write_text(page(), encoding="utf-8")
     print(PAGE)

@@ -12,8 +12,9 @@ from planner.grounded.plan_windows import regrouped, shortened
 from planner.grounded.task import Task
 from planner.paper.transitions import Model, Values
 from planner.plan import Plan, Step
-from reasoner.files import write_whole
+from reasoner.files import check_replaceable, write_whole
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from reasoner.pddl.exporting import plan_of, to_pddl
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import PddlError, parse_files
@@ -44,7 +45,7 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         raise KnowledgeError(str(error)) from error
     title = f"{pddl.problem} ({pddl.domain})"
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
-    write_whole(out, text, check=_check_turtle)
+    write_whole(out, stamped(IMPORTED, [text]), check=_check_turtle)
     return found.problem
 
 
@@ -71,8 +72,11 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}")
     exported = to_pddl(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"
-    for path, text in zip(paths, (exported.domain, exported.problem), strict=True):
-        write_whole(path, text)
+    files = tuple(zip(paths, (DOMAIN, PROBLEM), (exported.domain, exported.problem), strict=True))
+    for path, kind, _ in files:
+        check_replaceable(path, kind)
+    for path, kind, text in files:
+        write_whole(path, stamped(kind, [text], ";"))
     return paths
 
 

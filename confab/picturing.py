@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from reasoner.embodiment.reach import reach_relation
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import KnowledgeError, text
+from reasoner.kinds import MAKER
 from reasoner.names import local_name
 from reasoner.reading.quantification import behavior_named
 
@@ -82,7 +83,8 @@ def words_as_they_are() -> AbstractContextManager[None]:
 def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
     """Write a figure in the form that the path's ending names, whole or not at all; return the path."""
     drawn = BytesIO()
-    figure.savefig(drawn, dpi=dpi, format=path.suffix[1:].lower())
+    form = path.suffix[1:].lower()
+    figure.savefig(drawn, dpi=dpi, format=form, metadata={"Software" if form == "png" else "Creator": MAKER})
     write_whole(path, drawn.getvalue())
     return path
 
@@ -222,6 +224,7 @@ def _top(world: World, name: str) -> Array:
 def _table(scene: Known, path: Path) -> Path:
     """Take a picture of the world as it begins, with objects, places, and who reaches those that not every hand does."""
     from PIL import Image, ImageDraw, ImageFont
+    from PIL.PngImagePlugin import PngInfo
 
     from confab.reaching import with_reach
     from sim.picture import hide_vessels, picture, view_of
@@ -260,6 +263,8 @@ def _table(scene: Known, path: Path) -> Path:
     pen.rectangle((0, 0, pen.textlength(VIEWPOINT, font=font) + 12, 18), fill=(250, 251, 253))
     pen.text((6, 2), VIEWPOINT, font=font, fill=(30, 36, 46))
     drawn = BytesIO()
-    image.save(drawn, "png", optimize=True)
+    made = PngInfo()
+    made.add_text("Software", MAKER)
+    image.save(drawn, "png", optimize=True, pnginfo=made)
     write_whole(path, drawn.getvalue())
     return path

@@ -16,7 +16,8 @@ from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene, load
 from confab.show import show
 from planner.plan import Status
-from reasoner.files import write_whole
+from reasoner.files import check_replaceable, has_content, write_whole
+from reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, VERDICTS
 from reasoner.reading.observed import assert_observed, save_observed
 from reasoner.validation.findings import listing
 from reasoner.validation.validate import validate
@@ -44,6 +45,17 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     KnowledgeError
         The scene, or the memory, can't be read.
     """
+    kinds = {
+        "plan.json": PLAN,
+        "report.html": REPORT,
+        "verify.json": VERDICTS,
+        "observed.ttl": OBSERVED,
+        "run.mp4": FILM,
+    }
+    for file, kind in kinds.items():
+        check_replaceable(out / file, kind)
+    if memory is not None:
+        check_replaceable(memory, MEMORY)
     tell("validating")
     with progress("validating") as advance:
         findings = validate([name], done=lambda what: advance(what, 0))
@@ -57,7 +69,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     scene = with_reach(scene) if bodies else scene
     tell("planning")
     with progress("planning"):
-        remembered = Memory.load(memory, scene) if memory and memory.exists() else Memory.of(scene)
+        remembered = Memory.load(memory, scene) if memory and has_content(memory) else Memory.of(scene)
         result = scene.plan(memory=remembered, mode=mode)
     if result.outcome.plan is None:
         show(result)
@@ -74,7 +86,7 @@ def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: b
     show(result if report is None else report)
     if memory and (report is None or report.verified):
         with undisturbed(memory):
-            if memory.exists():  # others may have learned meanwhile
+            if has_content(memory):  # others may have learned meanwhile
                 remembered = Memory.load(memory, scene)
             remembered.learn(scene, result)
             remembered.save(memory)

@@ -15,6 +15,7 @@ from time import monotonic, sleep
 from urllib.parse import quote
 from uuid import uuid4
 
+from reasoner.kinds import Kind, kind_of
 from reasoner.limits import LimitError
 
 log = logging.getLogger(__name__)
@@ -25,10 +26,7 @@ PATIENCE = 600.0
 def write_whole(
     path: Path, content: str | bytes | Iterable[str], check: Callable[[Path], object] | None = None
 ) -> None:
-    """Write a file so that a reader, or a crash, sees the old content or the new: temporary file, fsync, replace.
-
-    A link is followed: what it leads to is replaced. Permissions stay as they were. What is read-only, or no ordinary file,
-    isn't touched.
+    """Write a file so that a reader, or a crash, sees the old content or the new; parameters and errors as of `written_whole`.
 
     Parameters
     ----------
@@ -36,32 +34,44 @@ def write_whole(
     content : str, bytes or iterable of str
     check : callable, optional
         Reads what was written; raises what is wrong with it, and nothing is replaced then.
+    """
+    pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
+    with written_whole(path) as part:
+        with part.open("xb") as file:
+            for piece in pieces:
+                file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
+        if check is not None:
+            check(part)
+
+
+@contextmanager
+def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
+    """Yield the name of a temporary file to write, which replaces a file at the end of the block: all of it, or nothing.
+
+    A link is followed: its target is replaced. Permissions stay as they were. A folder, a device, a file that is read-only and
+    a file whose content is of another kind than what was written (`reasoner.kinds`) are never replaced.
+
+    Parameters
+    ----------
+    path : Path
+    suffix : str
+        The ending of the temporary file's name, for libraries that look at it.
 
     Raises
     ------
     OSError
-        The file can't be written; it names the file.
+        The file can't be written, or must not be replaced; it names the file.
     """
-    pieces: Iterable[str | bytes] = [content] if isinstance(content, str | bytes) else content
     target = _behind(path)
-    part = target.parent / f".confab-{uuid4().hex}.part"
+    part = target.parent / f".confab-{uuid4().hex}.part{suffix}"
     try:
-        if target.is_symlink():
-            raise OSError(errno.ELOOP, "is a link that leads back to itself; give the name of a file")
-        old = target.stat() if target.exists() else None
-        if old is not None and not stat.S_ISREG(old.st_mode):
-            what = "a folder" if stat.S_ISDIR(old.st_mode) else "no ordinary file"
-            raise OSError(errno.EISDIR, f"is {what}; wanted the name of a file")
-        if old is not None and not (old.st_mode & 0o222 and os.access(target, os.W_OK)):
-            raise OSError(errno.EACCES, "is read-only; make it writable, or give another name")
+        old = _replaceable(target)
         target.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("xb") as file:
-            for piece in pieces:
-                file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
-            file.flush()
+        yield part
+        if old is not None:
+            _same_kind(target, kind_of(part, target.suffix))
+        with part.open("rb") as file:
             os.fsync(file.fileno())
-        if check is not None:
-            check(part)
         if old is not None:
             part.chmod(stat.S_IMODE(old.st_mode))
             with suppress(PermissionError):  # only root can give a file away
@@ -77,6 +87,49 @@ def write_whole(
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def check_replaceable(path: Path, kind: str) -> None:
+    """Raise what `written_whole` would raise for content of a kind, before anything is computed.
+
+    Raises
+    ------
+    OSError
+        The file must not be replaced.
+    """
+    target = _behind(path)
+    try:
+        if _replaceable(target) is not None:
+            _same_kind(target, Kind(kind))
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def has_content(path: Path) -> bool:
+    """Return whether there is a file that isn't empty."""
+    return path.is_file() and path.stat().st_size > 0
+
+
+def _replaceable(target: Path) -> os.stat_result | None:
+    """Return the state of the ordinary, writable file that is there; None if there is none."""
+    if target.is_symlink():
+        raise OSError(errno.ELOOP, "is a link that leads back to itself; give the name of a file")
+    old = target.stat() if target.exists() else None
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        what = "a folder" if stat.S_ISDIR(old.st_mode) else "no ordinary file"
+        raise OSError(errno.EISDIR, f"is {what}; wanted the name of a file")
+    if old is not None and not (old.st_mode & 0o222 and os.access(target, os.W_OK)):
+        raise OSError(errno.EACCES, "is read-only; make it writable, or give another name")
+    return old
+
+
+def _same_kind(target: Path, new: Kind | None) -> None:
+    """Raise `FileExistsError` unless content of a kind may replace a file."""
+    old = kind_of(target)
+    if old is not None and (new is None or not new.replaces(old)):
+        what = "this output" if new is None or new.name == old.name else new.name
+        said = f"is {old}, which {what} doesn't replace; give another name, or remove the file first"
+        raise FileExistsError(errno.EEXIST, said)
 
 
 @contextmanager

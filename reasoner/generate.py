@@ -32,6 +32,7 @@ from urllib.parse import quote
 import ontology
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.kinds import GENERATED, stamped
 from reasoner.names import nearest
 
 FOLDER = ontology.ROOT / "families"
@@ -85,7 +86,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
     """Write a scene, called like its file, whole or not at all and piece by piece; parameters as in `generate`."""
-    write_whole(path, pieces(family, objects, hands, clutter, seed, path.stem))
+    write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
 
 def families() -> tuple[str, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,10 @@ from typing import TYPE_CHECKING, Any
 import imageio.v2 as imageio
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
+from PIL.PngImagePlugin import PngInfo
 
+from reasoner.files import write_whole, written_whole
+from reasoner.kinds import MAKER
 from sim.bodies import outline
 from sim.engine import Engine
 from sim.picture import Camera, hide_vessels, picture, view_of
@@ -75,7 +80,8 @@ class Film:
         self.camera, self.frames, self.speed = camera, frames, speed
         self.width, self.height, self.names = width, height, names or {}
         self.stills = None if stills is None else Path(stills)
-        self._part = self.path.with_name(f".{self.path.stem}.part{self.path.suffix}")
+        self._part = self.path
+        self._file = ExitStack()
         self._writer: Any = None
         self._number = -1
         self._latest: Array | None = None
@@ -88,8 +94,10 @@ class Film:
     ) -> None:
         if kind is None:
             self.close()
-        else:
-            self._end(keep=False)
+        elif self._writer is not None:
+            writer, self._writer = self._writer, None
+            writer.close()
+            self._file.__exit__(kind, error, trace)  # which removes what was filmed
 
     def __call__(self, world: Engine) -> None:
         """Take a frame if it is time for one; what that costs is rendering, by the world's clock."""
@@ -115,33 +123,33 @@ class Film:
     def close(self) -> None:
         """Finish the file, which has its name only from now on."""
         self._keep()
-        self._end(keep=True)
-
-    def _end(self, keep: bool) -> None:
-        """Keep what was filmed, or throw it away: half a film must not look like a whole one."""
         if self._writer is None:
             return
         self._writer.close()
         self._writer = None
-        if keep:
-            self._part.replace(self.path)
-        else:
-            self._part.unlink(missing_ok=True)
+        if self.path.suffix == ".gif":
+            film, maker = self._part.read_bytes(), MAKER.encode()
+            self._part.write_bytes(b"%b!\xfe%c%b\0;" % (film[:-1], len(maker), maker))  # a comment before the trailer
+        self._file.close()
 
     def _keep(self) -> None:
         """Keep the latest frame as the still of the primitive that has ended."""
         if self.stills is None or self._latest is None or not 0 <= self._number < len(self.steps):
             return
-        self.stills.mkdir(parents=True, exist_ok=True)
         step = self.steps[self._number]
         name = "-".join((f"{self._number + 1:02d}", step.behavior, *step.arguments))
-        Image.fromarray(self._latest).save(self.stills / f"{name}.png")
+        drawn, made = BytesIO(), PngInfo()
+        made.add_text("Software", MAKER)
+        Image.fromarray(self._latest).save(drawn, "png", pnginfo=made)
+        write_whole(self.stills / f"{name}.png", drawn.getvalue())
 
     def _write(self, image: Array) -> None:
         if self._writer is None:
             options: dict[str, Any] = {"duration": 1000 / self.frames, "loop": 0}
             if self.path.suffix != ".gif":
                 options = {"fps": self.frames, "codec": "libx264", "quality": 8, "macro_block_size": 16}
+                options["output_params"] = ["-metadata", f"comment={MAKER}"]
+            self._part = self._file.enter_context(written_whole(self.path, self.path.suffix))
             self._writer = imageio.get_writer(self._part, **options)
         self._writer.append_data(image)
 

@@ -19,6 +19,8 @@ from confab.commands.options import (
     QUIET,
     SCENE,
     SCENE_IRI,
+    Output,
+    command,
 )
 from confab.examples import examples
 from confab.progress import progress
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
     from confab.table import Table
 
 
-@click.command(epilog=examples("serve"))
+@command(epilog=examples("serve"))
 @SCENE
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=7879, metavar="N", help="On 127.0.0.1; 0 is any free one."
@@ -61,7 +63,7 @@ FORMS = {
 }
 
 
-@click.command(epilog=examples("query"))
+@command(epilog=examples("query"))
 @SCENE
 @click.argument(
     "sparql", required=False, metavar="[QUERY]", help="SPARQL text, a .rq file, or a ready query: where-was-it."
@@ -79,7 +81,7 @@ FORMS = {
     "-o",
     "--output",
     "out",
-    type=PATH,
+    type=Output(),
     metavar="FILE",
     help="Into a file; FILE.ttl takes what CONSTRUCT gives, as an ontology.",
 )
@@ -165,6 +167,7 @@ def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -
         print(text, end="")
         return
     from reasoner.files import write_whole
+    from reasoner.kinds import TRIPLES, stamped
 
-    write_whole(out, text)
+    write_whole(out, stamped(TRIPLES, [text]) if form == "turtle" else text)
     print(f"{out}: {len(table)} rows")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from click.exceptions import Exit
@@ -16,17 +15,17 @@ from confab.commands.options import (
     SCENE,
     SEED,
     TIME_LIMIT,
+    Output,
+    command,
     scene_names,
 )
 from confab.examples import examples
 from confab.progress import progress
 from confab.terminal import NO, YES, limited, remark, show_result
-
-if TYPE_CHECKING:
-    pass
+from reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE
 
 
-@click.command(epilog=examples("new"))
+@command(epilog=examples("new"))
 @click.argument("domain", metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")
 @click.option(
     "-o",
@@ -50,7 +49,7 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
     )
 
 
-@click.command(epilog=examples("fetch"))
+@command(epilog=examples("fetch"))
 @click.argument("url", metavar="URL", help="IRI of an ontology that lies on the web.")
 @click.option(
     "-o",
@@ -72,9 +71,11 @@ def fetch(url: str, folder: Path) -> None:
     )
 
 
-@click.command(epilog=examples("picture"))
+@command(epilog=examples("picture"))
 @SCENE
-@click.option("-o", "--output", "out", type=PATH, required=True, metavar="FILE.png", help="File to draw into.")
+@click.option(
+    "-o", "--output", "out", type=Output(PICTURE), required=True, metavar="FILE.png", help="File to draw into."
+)
 @click.option("--behavior", metavar="BEHAVIOR", help="Draw its conditions and effects instead.")
 @click.option("--classes", is_flag=True, help="Draw the classes of objects instead.")
 def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
@@ -85,7 +86,7 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
     print(draw(load(scene), out, behavior, classes))
 
 
-@click.command(epilog=examples("validate"))
+@command(epilog=examples("validate"))
 @click.argument(
     "files",
     nargs=-1,
@@ -134,9 +135,11 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: flo
     return NO if errors or (strict and warnings) else YES
 
 
-@click.command(epilog=examples("generate"))
+@command(epilog=examples("generate"))
 @click.argument("family", metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable.")
-@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option(
+    "-o", "--output", "out", type=Output(GENERATED), required=True, metavar="SCENE.ttl", help="File to write."
+)
 @click.option("--objects", type=int, default=4, metavar="N", help="Objects, half of them cups.")
 @click.option("--hands", type=int, default=2, metavar="H", help="Hands.")
 @click.option("--clutter", type=int, default=0, metavar="K", help="Irrelevant objects in other rooms.")
@@ -150,7 +153,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
 
 
-@click.command(epilog=examples("convert"))
+@command(epilog=examples("convert"))
 @click.argument("file", type=PATH, metavar="FILE.ttl")
 @click.option(
     "--behaviors",
@@ -163,7 +166,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     "-o",
     "--output",
     "out",
-    type=PATH,
+    type=Output(CONVERTED),
     metavar="FILE.ttl",
     help="File to write; what it is goes to the terminal if not given.",
 )
@@ -176,16 +179,19 @@ def convert(file: Path, form: str, out: Path | None) -> None:
     if out is None:
         show_result(found.text.rstrip())
     else:
-        turtle_path(out).write_text(found.text, encoding="utf-8")
+        from reasoner.files import write_whole
+        from reasoner.kinds import stamped
+
+        write_whole(turtle_path(out), stamped(CONVERTED, [found.text]))
         print(f"{out}: {len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")
     for note in found.notes:
         remark(note)
 
 
-@click.command("import", epilog=examples("import"))
+@command("import", epilog=examples("import"))
 @click.argument("domain", type=PATH, metavar="DOMAIN.pddl")
 @click.argument("problem", type=PATH, metavar="PROBLEM.pddl")
-@click.option("-o", "--output", "out", type=PATH, required=True, metavar="SCENE.ttl", help="File to write.")
+@click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
     "--level", type=click.IntRange(min=1), default=1, help="Level of its behaviours; abstract ones can be added above."
 )
@@ -201,7 +207,7 @@ def import_(domain: Path, problem: Path, out: Path, level: int, time_limit: floa
     print(f"{out}: {behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
 
 
-@click.command(epilog=examples("export"))
+@command(epilog=examples("export"))
 @SCENE
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="FOLDER", help="Folder to write into.")
 @click.option("--level", type=int, help="Level to export; the lowest if not given.")

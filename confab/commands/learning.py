@@ -14,17 +14,21 @@ from confab.commands.options import (
     PATH,
     QUIET,
     TIME_LIMIT,
+    Command,
+    Output,
+    command,
     scene_names,
 )
 from confab.examples import examples
 from confab.progress import progress
 from confab.terminal import EXIT, YES, limited, remark, show_result
+from reasoner.kinds import MEMORY, PICTURE
 
 if TYPE_CHECKING:
     from confab.memory import Memory
 
 
-@click.command(epilog=examples("learn"))
+@command(epilog=examples("learn"))
 @click.argument(
     "scenes",
     nargs=-1,
@@ -33,9 +37,13 @@ if TYPE_CHECKING:
     shell_complete=scene_names,
     help="Scenes to gather experience in.",
 )
-@click.option("--memory", type=PATH, required=True, metavar="FILE", help="Memory file to learn into; made if missing.")
+@click.option(
+    "--memory", type=Output(MEMORY), required=True, metavar="FILE", help="Memory file to learn into; made if missing."
+)
 @click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan instead.")
-@click.option("--plot", type=PATH, metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF.")
+@click.option(
+    "--plot", type=Output(PICTURE), metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF."
+)
 @click.option(
     "--rounds",
     type=click.IntRange(1),
@@ -58,6 +66,7 @@ def learn(
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
+    from reasoner.files import has_content
 
     remembered: Memory | None = None
     status, curve = YES, Curve()
@@ -69,7 +78,7 @@ def learn(
             advance(f"planning in {name}", 0)
             loaded = load_scene(name)
             if remembered is None:
-                remembered = Memory.load(memory, loaded) if memory.is_file() else Memory.of(loaded)
+                remembered = Memory.load(memory, loaded) if has_content(memory) else Memory.of(loaded)
             if plot is not None:
                 curve.measure(name, loaded, remembered)
             links = remembered.links
@@ -102,6 +111,8 @@ def learn(
 class InOrder(click.Group):
     """A group whose help lists its commands as they stand here, the main one first."""
 
+    command_class = Command
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return their names."""
         return list(self.commands)
@@ -113,7 +124,7 @@ def memory_app() -> None:
 
 
 @memory_app.command(epilog=examples("memory migrate"))
-@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("renames", nargs=-1, required=True, metavar="OLD=NEW…", help="Terms that were renamed in the ontology.")
 def migrate(memory: Path, renames: tuple[str, ...]) -> None:
     """Rename terms in a memory, so that what was learned of them isn't lost."""
@@ -145,7 +156,13 @@ def show(memory: str, most: int, as_json: bool) -> None:
 @memory_app.command(epilog=examples("memory merge"))
 @click.argument("memories", nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge.")
 @click.option(
-    "-o", "--output", "out", type=PATH, required=True, metavar="FILE", help="The merged memory; may be one of them."
+    "-o",
+    "--output",
+    "out",
+    type=Output(MEMORY, may_be="memories"),
+    required=True,
+    metavar="FILE",
+    help="The merged memory; may be one of them.",
 )
 @click.option("--trust", is_flag=True, help="Let what they have counted lead; else it runs in strict mode.")
 def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
@@ -161,7 +178,7 @@ def merge(memories: tuple[str, ...], out: Path, trust: bool) -> None:
 
 
 @memory_app.command("trust", epilog=examples("memory trust"))
-@click.argument("memory", type=PATH, metavar="MEMORY", help="Memory file; it is replaced as a whole.")
+@click.argument("memory", type=Output(MEMORY), metavar="MEMORY", help="Memory file; it is replaced as a whole.")
 @click.argument("replicas", nargs=-1, required=True, metavar="REPLICA…", help="IDs of replicas in it, or 'all'.")
 def trust_(memory: Path, replicas: tuple[str, ...]) -> None:
     """Let what other replicas have counted lead the search, too."""

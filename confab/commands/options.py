@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import glob
 import logging
+import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,70 @@ import click
 import ontology
 
 PATH = click.Path(path_type=Path)
+
+
+class Output(click.Path):
+    """A file that a command writes.
+
+    Parameters
+    ----------
+    kind : str
+        What will be written, as `reasoner.kinds` calls it; empty if only the command knows.
+    may_be : str
+        The parameter whose files it may replace.
+    """
+
+    def __init__(self, kind: str = "", may_be: str = "") -> None:
+        super().__init__(path_type=Path)
+        self.kind, self.may_be = kind, may_be
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path, if content of this kind may be written there."""
+        path = Path(str(super().convert(value, param, ctx)))
+        if self.kind and ctx is not None and not ctx.resilient_parsing:
+            from reasoner.files import check_replaceable
+
+            check_replaceable(path, self.kind)
+        return path
+
+
+class Command(click.Command):
+    """A command none of whose outputs is an input or another output of the same call."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command, unless one file stands for two things."""
+        for output in self.params:
+            path = ctx.params.get(output.name or "")
+            if not isinstance(output.type, Output) or not isinstance(path, Path):
+                continue
+            for other in self.params:
+                given = ctx.params.get(other.name or "")
+                if other is output or other.name == output.type.may_be:
+                    continue
+                if any(_same_file(path, one, other) for one in (given if isinstance(given, tuple) else (given,))):
+                    raise click.UsageError(
+                        f"one file for two purposes: {path} is both {_name(other)} and {_name(output)}; give another name",
+                        ctx,
+                    )
+        return super().invoke(ctx)
+
+
+def _same_file(path: Path, given: object, parameter: click.Parameter) -> bool:
+    """Return whether the value of a parameter leads to a file, by whichever links."""
+    if not isinstance(given, str | Path):
+        return False
+    try:
+        return path.samefile(given)
+    except (OSError, ValueError):  # one of them isn't there
+        is_file = isinstance(parameter, click.Argument) or isinstance(parameter.type, click.Path)
+        return is_file and os.path.realpath(path) == os.path.realpath(str(given).replace("\0", ""))
+
+
+def _name(parameter: click.Parameter) -> str:
+    return max(parameter.opts, key=len) if isinstance(parameter, click.Option) else (parameter.metavar or "an argument")
+
+
+command = partial(click.command, cls=Command)
 
 
 def _quiet(context: click.Context, option: click.Parameter, wanted: bool) -> None:

@@ -25,12 +25,15 @@ from confab.commands.options import (
     SCENE_IRI,
     SEED,
     TIME_LIMIT,
+    Output,
+    command,
     scene_names,
 )
 from confab.examples import examples
 from confab.progress import progress
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
 
 if TYPE_CHECKING:
     from confab.explaining import Explanation
@@ -38,7 +41,7 @@ if TYPE_CHECKING:
     from confab.planning import Result
 
 
-@click.command(epilog=examples("plan"))
+@command(epilog=examples("plan"))
 @SCENE
 @GOALS
 @MEMORY_FILE
@@ -62,8 +65,8 @@ if TYPE_CHECKING:
     "--engine", metavar="NAME", help="A planner that unified-planning knows, or none: not even where ours gives up."
 )
 @click.option("--level", type=int, metavar="N", help="The level the engine plans; the lowest.")
-@click.option("--report", type=PATH, metavar="FILE.html", help="Write the plan and its reasons as a page.")
-@click.option("-o", "--output", "out", type=PATH, metavar="PLAN.json", help="Write the plan into this file.")
+@click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write the plan and its reasons as a page.")
+@click.option("-o", "--output", "out", type=Output(PLAN), metavar="PLAN.json", help="Write the plan into this file.")
 @SCENE_IRI
 @AS_JSON
 @QUIET
@@ -118,7 +121,7 @@ def plan(
     raise Exit(EXIT[result.outcome.status.value])
 
 
-@click.command(epilog=examples("run"))
+@command(epilog=examples("run"))
 @click.argument(
     "scene",
     required=False,
@@ -152,7 +155,7 @@ def run(
         raise Exit(run_all(scene, memory, mode, seed, out, film=not no_video, gui=gui))
 
 
-@click.command(epilog=examples("verify"))
+@command(epilog=examples("verify"))
 @SCENE
 @click.argument(
     "plan", type=PATH, metavar="PLAN.json", help="What 'confab plan --json' prints, or a plan in PDDL's form."
@@ -161,9 +164,11 @@ def run(
 @SEED
 @click.option("--workers", default="1", metavar="W", help="Processes that share the rollouts; or ray, ray://HOST:PORT.")
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
-@click.option("--video", type=PATH, metavar="OUT.mp4", help="Film the first rollout.")
+@click.option("--video", type=Output(FILM), metavar="OUT.mp4", help="Film the first rollout.")
 @GUI
-@click.option("-o", "--output", "out", type=PATH, metavar="VERDICTS.json", help="Write the verdicts into this file.")
+@click.option(
+    "-o", "--output", "out", type=Output(VERDICTS), metavar="VERDICTS.json", help="Write the verdicts into this file."
+)
 @TIME_LIMIT
 @AS_JSON
 @QUIET
@@ -202,7 +207,7 @@ def verify(
     raise Exit(YES if report.verified else NO)
 
 
-@click.command(epilog=examples("execute"))
+@command(epilog=examples("execute"))
 @SCENE
 @click.option("--world", default="symbolic", help="Where to act: symbolic or pybullet.")
 @click.option(
@@ -219,11 +224,11 @@ def verify(
     "--output",
     "--save",
     "save",
-    type=PATH,
+    type=Output(EPISODE),
     metavar="EPISODE.ttl",
     help="Write the episode into this file.",
 )
-@click.option("--report", type=PATH, metavar="FILE.html", help="Write what happened as a page.")
+@click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write what happened as a page.")
 @SCENE_IRI
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and fill.")
 @click.option("--both-hands", is_flag=True, help="In PyBullet: all hands at once, without interventions.")
@@ -262,11 +267,6 @@ def execute(
     from confab.live import both, spectator
     from confab.memory import Memory, undisturbed
 
-    given = [file.resolve() for file in (Path(scene), memory, plan, save, report) if file is not None]
-    if len(set(given)) < len(given):
-        raise KnowledgeError(
-            "one file for two purposes: the scene, --memory, --plan, --save and --report each want one of their own"
-        )
     with ExitStack() as stack:
         stack.enter_context(limited(time_limit))
         loaded = load_scene(scene, iri)
@@ -311,7 +311,7 @@ def execute(
     raise Exit({"reached": YES, "impossible": NO, "gave-up": GAVE_UP}[execution.episode.status.value])
 
 
-@click.command(epilog=examples("explain"))
+@command(epilog=examples("explain"))
 @SCENE
 @click.argument(
     "which", required=False, metavar="[STEP]", help="L3#12 (step 12 of level 3, from 0), a path 0.1.2, or its words."
@@ -329,7 +329,7 @@ def execute(
 )
 @click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
 @click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
-@click.option("--plot", type=PATH, metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
+@click.option("--plot", type=Output(PICTURE), metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
 @TIME_LIMIT
 @AS_JSON
 @QUIET

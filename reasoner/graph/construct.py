@@ -9,6 +9,7 @@ import pyoxigraph as ox
 from reasoner.files import as_iri_part, write_whole
 from reasoner.graph.apart import QueryLimits, ask
 from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from reasoner.kinds import CONSTRUCTED, stamped
 from reasoner.vocabulary import OWL, RDF
 
 
@@ -37,6 +38,6 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
         ox.Triple(name, ox.NamedNode(RDF + "type"), ox.NamedNode(OWL + "Ontology")),
         ox.Triple(name, ox.NamedNode(OWL + "imports"), ox.NamedNode(graph.scene)),
     ]
-    text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.spoken)
-    write_whole(path, text or b"")
+    text = ox.serialize([*head, *found], format=ox.RdfFormat.TURTLE, prefixes=graph.spoken) or b""
+    write_whole(path, stamped(CONSTRUCTED, [text.decode("utf-8")]))
     return len(found)

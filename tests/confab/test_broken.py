@@ -135,14 +135,14 @@ def test_counts_that_cannot_be_are_refused(tmp_path: Path, tearoom: Path, old: s
 
 
 def test_a_link_is_followed_and_permissions_stay(tmp_path: Path) -> None:
-    real, link = tmp_path / "a" / "real.ttl", tmp_path / "link.ttl"
+    real, link = tmp_path / "a" / "real.csv", tmp_path / "link.csv"
     real.parent.mkdir()
-    real.write_text("old")
+    real.write_text("thing\nold\n")
     real.chmod(0o600)
     link.symlink_to(real)
-    write_whole(link, "new")
+    write_whole(link, "thing\nnew\n")
     assert link.is_symlink()
-    assert real.read_text() == "new"
+    assert real.read_text() == "thing\nnew\n"
     assert real.stat().st_mode & 0o777 == 0o600
     new = tmp_path / "new.ttl"
     old_mask = os.umask(0o077)

@@ -12,41 +12,50 @@ from reasoner import files
 from reasoner.files import alone, as_iri_part, write_whole
 from reasoner.limits import LimitError
 
+ROWS = "thing\n"
+"""The columns of a query's rows, which replace rows of the same columns."""
+
 
 def left(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
 def test_texts_bytes_and_pieces_are_written_as_they_are(tmp_path: Path) -> None:
-    file = tmp_path / "new" / "folder" / "a.txt"
-    for content, wanted in (("häß", "häß".encode()), (b"\xff\x00", b"\xff\x00"), (iter(["a", "b"]), b"ab"), ("", b"")):
-        write_whole(file, content)
-        assert file.read_bytes() == wanted
-    assert left(file.parent) == ["a.txt"]
+    folder = tmp_path / "new" / "folder"
+    contents: tuple[tuple[str | bytes | Iterator[str], bytes], ...] = (
+        ("häß", "häß".encode()),
+        (b"\xff\x00", b"\xff\x00"),
+        (iter(["a", "b"]), b"ab"),
+        ("", b""),
+    )
+    for number, (content, wanted) in enumerate(contents):
+        write_whole(folder / str(number), content)
+        assert (folder / str(number)).read_bytes() == wanted
+    assert left(folder) == ["0", "1", "2", "3"]
 
 
 def test_what_fails_while_it_is_made_or_read_back_replaces_nothing(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
-    file.write_text("old")
+    file.write_text(ROWS + "old")
 
     def broken() -> Iterator[str]:
         yield "half"
         raise ValueError("no more")
 
     def refuse(part: Path) -> None:
-        assert part.read_text() == "new"
+        assert part.read_text() == ROWS + "new"
         assert part.parent == tmp_path
         raise ValueError("can't be read")
 
     with pytest.raises(ValueError, match="no more"):
         write_whole(file, broken())
     with pytest.raises(ValueError, match="can't be read"):
-        write_whole(file, "new", refuse)
-    assert file.read_text() == "old"
+        write_whole(file, ROWS + "new", refuse)
+    assert file.read_text() == ROWS + "old"
     assert left(tmp_path) == ["a.txt"]
     seen: list[str] = []
-    write_whole(file, "new", lambda part: seen.append(file.read_text()))
-    assert (seen, file.read_text()) == (["old"], "new")
+    write_whole(file, ROWS + "new", lambda part: seen.append(file.read_text()))
+    assert (seen, file.read_text()) == ([ROWS + "old"], ROWS + "new")
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664])
@@ -66,9 +75,9 @@ def test_permissions_stay_and_new_files_have_those_of_the_umask(tmp_path: Path, 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can give a file away")
 def test_a_file_of_somebody_else_stays_theirs(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
-    file.write_text("old")
+    file.write_text(ROWS + "old")
     os.chown(file, 1234, 2345)
-    write_whole(file, "new")
+    write_whole(file, ROWS + "new")
     assert (file.stat().st_uid, file.stat().st_gid) == (1234, 2345)
 
 

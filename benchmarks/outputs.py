@@ -1,0 +1,236 @@
+"""What each command does to a file that is there already where it writes: a table for docs/promises.md.
+
+python -m benchmarks outputs
+
+Each output of each command is given a file of each kind, under a name with the ending that the output wants.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from shutil import copy, copytree
+
+from confab.authoring import new_domain
+from confab.cli import main as confab
+from reasoner.kinds import (
+    CONSTRUCTED,
+    CONVERTED,
+    DOMAIN,
+    EPISODE,
+    FILM,
+    GENERATED,
+    IMPORTED,
+    MEMORY,
+    PICTURE,
+    PLAN,
+    REPORT,
+    ROWS,
+    VERDICTS,
+)
+
+SCENE = "tearoom-scene.ttl"
+COLUMNS = "SELECT ?thing WHERE { ?thing a owl:NamedIndividual } ORDER BY ?thing"
+TRIPLES = "CONSTRUCT WHERE { ?thing a owl:NamedIndividual }"
+
+
+@dataclass(frozen=True)
+class Door:
+    """An output of a command.
+
+    Parameters
+    ----------
+    call : str
+        As one writes it, with OUT for the file.
+    file : str
+        The name that the output has.
+    kind : str
+        What is written.
+    physics : bool
+        Whether it takes a rollout, so that only refusals are tried.
+    """
+
+    call: str
+    file: str
+    kind: str
+    physics: bool = False
+
+    @property
+    def name(self) -> str:
+        """The command and its option."""
+        words = [word for word in self.call.split() if word in ("merge", "trust", "migrate") or word.startswith("-")]
+        command = self.call.split()[0]
+        options = [word for word in words if word.startswith("-") and self.call.split(word)[1].split()[0] == "OUT"]
+        middle = [word for word in words if not word.startswith("-")]
+        return " ".join([command, *middle, *options])
+
+
+DOORS = (
+    Door(f"plan {SCENE} --report OUT", "out.html", REPORT),
+    Door(f"plan {SCENE} -o OUT", "out.json", PLAN),
+    Door("run one-arm-serving --no-video -o .", "report.html", REPORT, physics=True),
+    Door("verify one-arm-serving plan.json -o OUT", "out.json", VERDICTS, physics=True),
+    Door("verify one-arm-serving plan.json --video OUT", "out.mp4", FILM, physics=True),
+    Door(f"execute {SCENE} --save OUT", "out.ttl", EPISODE),
+    Door(f"execute {SCENE} --report OUT", "out.html", REPORT),
+    Door(f"explain {SCENE} --memory memory.ttl --plot OUT", "out.png", PICTURE),
+    Door(f"query {SCENE} QUERY -o OUT", "out.csv", ROWS),
+    Door(f"query {SCENE} CONSTRUCT -o OUT", "out.ttl", CONSTRUCTED),
+    Door(f"learn {SCENE} --memory OUT", "out.ttl", MEMORY),
+    Door(f"learn {SCENE} --memory other.ttl --rounds 1 --plot OUT", "out.png", PICTURE),
+    Door("memory merge memory.ttl -o OUT", "out.ttl", MEMORY),
+    Door("memory trust OUT all", "out.ttl", MEMORY),
+    Door("memory migrate OUT B1_CARRY=B1_BRING", "out.ttl", MEMORY),
+    Door(f"picture {SCENE} --classes -o OUT", "out.png", PICTURE),
+    Door("generate served -o OUT", "out.ttl", GENERATED),
+    Door("convert tearoom.ttl --behaviors sparql -o OUT", "out.ttl", CONVERTED),
+    Door("import domain.pddl problem.pddl -o OUT", "out.ttl", IMPORTED),
+    Door(f"export {SCENE} -o .", "domain.pddl", DOMAIN),
+)
+MADE = {  # by which door the files of each kind come about
+    MEMORY: f"learn {SCENE} --memory memory.ttl",
+    PLAN: f"plan {SCENE} -o plan.json",
+    EPISODE: f"execute {SCENE} --save episode.ttl",
+    REPORT: f"plan {SCENE} --report report.html",
+    GENERATED: "generate served -o generated.ttl",
+    DOMAIN: f"export {SCENE} -o .",
+}
+FILES = {
+    "scene": SCENE,
+    "ontology": "tearoom.ttl",
+    "memory": "memory.ttl",
+    "plan": "plan.json",
+    "episode": "episode.ttl",
+}
+FILES |= {"report": "report.html", "generated": "generated.ttl", "edited": "edited.ttl"}
+LINKS = ("link", "hard link")
+"""To the scene that the command reads."""
+OTHERS = ("folder", "pipe", "read-only", "its own", "empty", "none")
+THERE = (*FILES, *LINKS, *OTHERS)
+KIND_OF = {"memory": MEMORY, "plan": PLAN, "episode": EPISODE, "report": REPORT, "generated": GENERATED}
+
+
+@contextmanager
+def inside(folder: Path) -> Iterator[None]:
+    """Work in a folder for a while."""
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def call(words: str) -> int:
+    """Run a command in this process and return its exit code."""
+    queries = {"QUERY": COLUMNS, "CONSTRUCT": TRIPLES}
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        try:
+            confab([queries.get(word, word) for word in words.split()])
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
+
+
+def prepare(folder: Path) -> None:
+    """Write a scene and a file of every kind into a folder."""
+    new_domain("tearoom", folder)
+    with inside(folder):
+        for words in MADE.values():
+            if code := call(words):
+                raise RuntimeError(f"'{words}' ends with {code}")
+        Path("edited.ttl").write_text(Path("generated.ttl").read_text().replace("@prefix", "# mine\n@prefix", 1))
+        os.mkfifo("pipe")
+        Path("folder").mkdir()
+
+
+def answers(door: Door, whole: Path, there: tuple[str, ...] = THERE) -> Iterator[tuple[str, str]]:
+    """Yield for each thing that may be there what a door does with it: ``refused``, ``replaced``, ``made`` or what is wrong."""
+    for what in there:
+        if door.physics and (what in ("its own", "empty", "none") or KIND_OF.get(what) == door.kind):
+            continue
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name) / "here"
+            copytree(whole, folder, ignore=lambda *_: ["pipe"])
+            with inside(folder):
+                yield what, _answer(door, what)
+
+
+def _answer(door: Door, what: str) -> str:
+    out = Path(door.file)
+    words = door.call.replace("OUT", door.file)
+    own = what in ("its own", "read-only")
+    if own and door.physics:
+        out.write_text("another's")
+    elif own and door.call.startswith("memory") and "merge" not in door.call:
+        _put("memory", out)
+    elif own:
+        call(words)
+    else:
+        _put(what, out)
+    if what == "read-only":
+        out.chmod(0o444)
+    before = _state(out)
+    code = call(words)
+    after = _state(out)
+    if code == 2:
+        return "refused" if after == before else f"exit 2, but {out} was changed"
+    if after == before and what != "its own":
+        return f"exit {code}, and {out} stays"
+    return f"exit {code}" if code else "made" if before is None else "replaced"
+
+
+def _put(what: str, out: Path) -> None:
+    """Have something be where a command writes."""
+    with suppress(FileNotFoundError):
+        out.unlink()
+    if what in FILES:
+        copy(FILES[what], out)
+    elif what == "link":
+        out.symlink_to(SCENE)
+    elif what == "hard link":
+        out.hardlink_to(SCENE)
+    elif what == "folder":
+        out.mkdir()
+    elif what == "pipe":
+        os.mkfifo(out)
+    elif what == "empty":
+        out.touch()
+
+
+def _state(file: Path) -> tuple[int, bytes | None] | None:
+    """Return which file it is and what it holds."""
+    if not os.path.lexists(file):
+        return None
+    return file.lstat().st_ino, file.read_bytes() if file.is_file() else None
+
+
+def main() -> int:
+    """Print the table; return 1 if an answer is another than promised."""
+    wrong = 0
+    print("| command and output | writes | replaces, or makes | refuses |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as name:
+        prepare(Path(name))
+        for door in DOORS:
+            found = dict(answers(door, Path(name)))
+            wrong += sum(answer not in ("refused", "replaced", "made") for answer in found.values())
+            yes = [what for what, answer in found.items() if answer != "refused"]
+            no = [what for what, answer in found.items() if answer == "refused"]
+            print(
+                f"| `{door.name}` | {door.kind} | {', '.join(yes) or 'not tried: physics'} | {', '.join(no)} |",
+                flush=True,
+            )
+            for what, answer in found.items():
+                if answer not in ("refused", "replaced", "made"):
+                    print(f"{door.call}: {what}: {answer}", file=sys.stderr)
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,202 @@
+"""The kinds of files that Confab writes, recognised by their content.
+
+Reports, pictures and films name Confab as their maker, plans and verdicts have keys of their own, memories and episodes
+properties of their own. What people go on editing (scenes, PDDL) ends with a stamp, a comment with a hash of all above it: an
+edited file is no longer recognised. All else is foreign.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import pyoxigraph as ox
+
+from reasoner.nesting import MOST_NESTED, nested
+from reasoner.vocabulary import CORE, EPISODES, OWL, RDF
+
+MAKER = "Made by Confab"
+"""What the metadata of pictures and films says."""
+REPORT, PICTURE, FILM = "a report", "a picture", "a film"
+PLAN, VERDICTS, ROWS, TRIPLES = "a plan", "verdicts", "rows of a query", "triples of a query"
+MEMORY, EPISODE, OBSERVED, REACH = "a memory", "an episode", "observed facts", "facts of what hands reach"
+GENERATED, IMPORTED, CONVERTED, CONSTRUCTED = (
+    "a generated scene",
+    "an imported scene",
+    "a converted ontology",
+    "a constructed ontology",
+)
+DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
+STAMP = re.compile(rb"[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})\n?\Z")
+STAMP_BYTES = 200
+"""More than the longest stamp has."""
+HEAD_BYTES = 4096
+PICTURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-")
+GENERATOR = re.compile(rb'<meta name="generator" content="Confab"')
+
+
+@dataclass(frozen=True)
+class Kind:
+    """The kind of a file's content.
+
+    Parameters
+    ----------
+    name : str
+        As a message says it, with its article.
+    foreign : bool
+        Whether Confab didn't write it; nothing replaces it.
+    columns : tuple of str, optional
+        The columns of rows; None where there are none or the format doesn't tell.
+    """
+
+    name: str
+    foreign: bool = False
+    columns: tuple[str, ...] | None = None
+
+    def __str__(self) -> str:
+        return f"{self.name} (columns {', '.join(self.columns)})" if self.columns else self.name
+
+    def replaces(self, old: Kind) -> bool:
+        """Return whether content of this kind may take the place of content of another."""
+        same_columns = None in (self.columns, old.columns) or self.columns == old.columns
+        return not old.foreign and self.name == old.name and same_columns
+
+
+def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
+    """Yield a text piece by piece, then a comment by which its kind is recognised until it is edited.
+
+    >>> print("".join(stamped("a text", ["one"])).strip())
+    one
+    # Written by Confab: a text; SHA-256 2c8b08da5ce60398e1f19af0e5dccc744df274b826abe585eaba68c525434806
+    """
+    digest, piece = sha256(), "\n"
+    for piece in content:
+        digest.update(piece.encode("utf-8"))
+        yield piece
+    if not piece.endswith("\n"):
+        digest.update(b"\n")
+        yield "\n"
+    yield f"{comment} Written by Confab: {kind}; SHA-256 {digest.hexdigest()}\n"
+
+
+def kind_of(file: Path, suffix: str | None = None) -> Kind | None:
+    """Return the kind of a file's content; None if it is empty.
+
+    Parameters
+    ----------
+    file : Path
+    suffix : str, optional
+        The ending that tells CSV from other texts; by default the file's own.
+
+    Raises
+    ------
+    OSError
+        The file can't be read.
+    """
+    content = file.read_bytes()
+    text = content.strip()
+    if not text:
+        return None
+    return (
+        _binary(content) or _stamp(content) or _marked_up(text) or _json(text) or _turtle(text) or _rows(file, suffix)
+    )
+
+
+def _binary(content: bytes) -> Kind | None:
+    film = content[:4] == b"GIF8" or content[4:8] == b"ftyp"
+    if film or content.startswith(PICTURES) or b"<svg" in content[:HEAD_BYTES]:
+        if MAKER.encode() in content:
+            return Kind(FILM if film else PICTURE)
+        return Kind(f"{FILM if film else PICTURE} from elsewhere", foreign=True)
+    return Kind("binary data", foreign=True) if b"\0" in content[:HEAD_BYTES] else None
+
+
+def _stamp(content: bytes) -> Kind | None:
+    if found := STAMP.search(content, max(0, len(content) - STAMP_BYTES)):
+        name = found["kind"].decode("utf-8", "replace")
+        edited = sha256(content[: found.start()]).hexdigest() != found["hash"].decode()
+        return Kind(f"{name} that was edited since", foreign=True) if edited else Kind(name)
+    if re.match(rb"(\s|;[^\n]*\n)*\(define\s", content):
+        return Kind("PDDL", foreign=True)
+    return None
+
+
+def _marked_up(text: bytes) -> Kind | None:
+    head = text[:HEAD_BYTES]
+    if re.match(rb"<!doctype html|<html", head, re.IGNORECASE):
+        return Kind(REPORT) if GENERATOR.search(head) else Kind("an HTML page from elsewhere", foreign=True)
+    if re.match(rb"(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<catalog\s", head, re.DOTALL):
+        return Kind(CATALOG)
+    if re.match(rb"(<\?xml[^>]*>\s*)?<sparql\s", head):
+        return Kind(ROWS, columns=tuple(name.decode() for name in re.findall(rb'<variable name="([^"]+)"', head)))
+    if re.match(rb"<\?xml|<\w+:RDF\s", head):
+        return Kind("an XML document", foreign=True)
+    return None
+
+
+def _json(text: bytes) -> Kind | None:
+    if not text.startswith((b"{", b"[", b"true", b"false")):
+        return None
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    match data:
+        case {"scene": _, "status": _, "search": _, "seconds": _}:
+            return Kind(PLAN)
+        case {"status": _, "success": _, "rollouts": list()}:
+            return Kind(VERDICTS)
+        case {"head": {"vars": list(names)}, "results": _}:
+            return Kind(ROWS, columns=tuple(map(str, names)))
+        case bool() | [] | {"head": _, "boolean": _}:
+            return Kind(ROWS)
+        case [{}, *_] if all(isinstance(row, dict) and row.keys() == data[0].keys() for row in data):
+            return Kind(ROWS, columns=tuple(data[0]))
+    return Kind("JSON from elsewhere", foreign=True)
+
+
+def _turtle(text: bytes) -> Kind | None:
+    """Return the kind of a Turtle file by the first triple that tells it; None if it isn't Turtle."""
+    some = False
+    if nested(text) <= MOST_NESTED:
+        try:
+            for triple in ox.parse(text, format=ox.RdfFormat.TURTLE, base_iri="urn:confab:file"):
+                some = True
+                if kind := _told_by(triple):
+                    return Kind(kind)
+        except SyntaxError:
+            some = some or text.startswith((b"@prefix", b"@base", b"PREFIX"))
+    return Kind("a scene or another ontology", foreign=True) if some else None
+
+
+def _told_by(triple: ox.Quad) -> str | None:
+    predicate, value = triple.predicate.value, getattr(triple.object, "value", "")
+    if predicate in (CORE + "memoryFormat", CORE + "associatedWith"):
+        return MEMORY
+    if predicate == EPISODES + "scene":
+        return EPISODE
+    if predicate == CORE + "inputsHash":
+        return REACH
+    header = predicate == RDF + "type" and value == OWL + "Ontology"
+    return OBSERVED if header and str(triple.subject).endswith(".observed>") else None
+
+
+def _rows(file: Path, suffix: str | None) -> Kind:
+    """Return the kind of any other text: rows of a query if its first line has columns as its ending says."""
+    with file.open(encoding="utf-8", errors="replace", newline="") as lines:
+        first = lines.readline(HEAD_BYTES).rstrip("\r\n")
+    columns: tuple[str, ...] = ()
+    ending = (suffix or file.suffix).lower()
+    if ending == ".csv":
+        columns = tuple(next(csv.reader([first]), ()))
+    elif ending == ".tsv" and first.startswith("?"):
+        columns = tuple(name[1:] for name in first.split("\t"))
+    elif ending == ".txt":
+        columns = tuple(re.split(r" {2,}", first))
+    names = columns and all(re.fullmatch(r"\w+", name) for name in columns)
+    return Kind(ROWS, columns=columns) if names else Kind("a text", foreign=True)
