@@ -347,6 +347,8 @@ def explain(
     as_json: bool,
 ) -> None:
     """Say why each step is there, why not another one, or why no plan."""
+    from confab.planning import Result
+
     with limited(time_limit):
         told = _explained(scene, which, instead, goal, memory, step, level, against, plot)
     show_result(told.json() if as_json else told)
