@@ -428,7 +428,7 @@ def _is_source(problem: Problem, step: Step) -> bool:
 
 def both_hands() -> None:
     """Print makespan with both hands against serial, and draw the Gantt strip."""
-    from sim.together import perform
+    from sim.together import perform_together
     from sim.verify import expectations, verify
     from sim.world import World
 
@@ -438,7 +438,7 @@ def both_hands() -> None:
     promised = expectations(scene.problem, steps)
     serial = verify(scene.embodiment, scene.problem.initial, steps, promised)
     with World(scene.embodiment, scene.problem.initial) as world:
-        performed = perform(world, scene.problem, steps)
+        performed = perform_together(world, scene.problem, steps)
         seconds, seen = world.seconds, world.observe()
     same = all(promised[-1].get(symbol) == value for symbol, value in seen.items())
     ratio = seconds / serial.simulated_seconds

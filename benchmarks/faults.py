@@ -14,7 +14,7 @@ from functools import cache
 import confab
 from benchmarks.physics import case
 from sim import faults
-from sim.faults import Fault
+from sim.faults import PlantedFault
 from sim.rollouts import Trial
 from sim.verify import Rollout, expectations
 
@@ -39,7 +39,7 @@ class Planted:
     """A fault, the number of the primitive at which it must stop the plan, the code, and objects that must be named."""
 
     kind: str
-    fault: Fault
+    fault: PlantedFault
     step: int
     code: str
     objects: tuple[str, ...] = ()

@@ -463,14 +463,14 @@ def _with_both_hands(
     """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
     from planner.acting.episode import Event, Failure
     from planner.hierarchical.planner import plan as fast_plan
-    from sim.together import perform
+    from sim.together import perform_together
 
     if plan is None:
         begin, limits = planner or fast_plan, patience.planning
         end = limits.end()
         known = problem if caution is None else caution.applied(problem, begin, limits)
         plan = begin(known, limits=limits.until(end)).plan or Plan(())
-    done = perform(live.world, problem, plan.primitives)
+    done = perform_together(live.world, problem, plan.primitives)
     if not done.ok:
         live.take_stock()
     before = [

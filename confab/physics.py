@@ -21,8 +21,7 @@ from sim.rollouts import Done, Trial, wilson
 from sim.rollouts import rollouts as roll_out
 from sim.staging import Perturbation
 from sim.verify import Rollout, expectations
-from sim.world import Step as PrimitiveStep
-from sim.world import World
+from sim.world import PrimitiveStep, World
 
 if TYPE_CHECKING:
     from confab.known import Known

@@ -1,12 +1,12 @@
 """Plan in, physical verdict out: the PyBullet world, robot, skills, perception and verification.
 
 =============================================== =====================================================================
-`sim.verify.verify(embodiment, initial, …)`     carries out a plan's primitives in a new world: a `Rollout`
-`sim.verify.expectations(problem, steps)`       the states that it is held against
+`sim.verify.verify(embodiment, initial, …)`     executes a plan's primitives in a new world; returns a `Rollout`
+`sim.verify.expectations(problem, steps)`       the states that the rollout is compared with
 `sim.world.World(embodiment, initial, seed=0)`  the world itself, `observe()` and `execute(step)`, for closed loops
-`sim.reach.reach(embodiment)`                   which places each hand reaches, by geometry alone
-`sim.film.Film(path, steps, titles)`            records a world that it is given to watch
-`sim.verdict.CODES`                             how a primitive can fail
+`sim.reach.reach(embodiment)`                   the places within reach of each hand, by geometry alone
+`sim.film.Film(path, steps, titles)`            records a rollout as a film
+`sim.verdict.CODES`                             the failure codes of a primitive
 =============================================== =====================================================================
 """
 
@@ -17,11 +17,11 @@ from contextlib import suppress
 
 
 def _import_pybullet_quietly() -> None:
-    """Import PyBullet, if it is there, without the build date that its C code prints to stderr, where errors belong."""
+    """Import PyBullet, if it is installed, and suppress the build date that its C code prints to stderr."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)
-        with suppress(ModuleNotFoundError):  # reach is geometry; what needs physics says so itself
+        with suppress(ModuleNotFoundError):  # reach works without PyBullet; the other modules raise on import
             import pybullet  # noqa: F401
     finally:
         os.dup2(kept, 2)

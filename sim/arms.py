@@ -1,6 +1,6 @@
-"""Arms: read from a URDF, and where a posture puts the hand.
+"""Arms: read from a URDF, with the hand's pose for given postures.
 
-Everything is computed for many postures at once.
+All functions compute many postures at once.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes.
 """
@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.urdf import Array, Model, rotation
+from sim.urdf import Array, UrdfModel, rotation
 
 Flags: TypeAlias = NDArray[np.bool_]
 
@@ -56,13 +56,13 @@ class Arm:
 
     @cached_property
     def length(self) -> float:
-        """Metres from shoulder to wrist at most."""
+        """Maximum distance in metres from shoulder to wrist."""
         bends = [self.elbow] if self.closed else list(self.origins[1:-1])
         return float(sum(np.linalg.norm(b - a) for a, b in pairwise([self.shoulder, *bends, self.wrist])))
 
     @cached_property
     def spherical(self) -> bool:
-        """Whether the last axis, too, goes through the wrist."""
+        """Whether the last axis goes through the wrist as well."""
         return bool(np.linalg.norm(np.cross(self.axes[6], self.wrist - self.origins[6])) < 1e-6)
 
     @property
@@ -72,7 +72,7 @@ class Arm:
 
     @cached_property
     def hang(self) -> Array:
-        """Where the elbow is at swivel 0: below, but above in an arm whose upper arm stands up at the zero posture."""
+        """Direction of the elbow at swivel 0: down, or up for an arm whose upper arm stands up at the zero posture."""
         return -DOWN if self.elbow[2] - self.shoulder[2] > self.upper_length / 2 else DOWN
 
     @cached_property
@@ -88,7 +88,7 @@ class Arm:
 
     @cached_property
     def limbs(self) -> tuple[float, float, Array, float, float]:
-        """Lengths of upper arm and forearm, the elbow's frame (3, 3), its bend in radians, and the side (1 or -1) it bends to."""
+        """Lengths of upper arm and forearm, the elbow's frame (3, 3), its bend in radians, and the side (1 or -1) of the bend."""
         a, b, hinge = self.upper_length, self.lower_length, self.axes[3]
         upper, fore = (self.elbow - self.shoulder) / a, (self.wrist - self.elbow) / b
         bent = float(np.arctan2(cross(upper, fore) @ hinge, upper @ fore))
@@ -97,7 +97,7 @@ class Arm:
 
 
 def read_arm(
-    model: Model,
+    model: UrdfModel,
     joints: Sequence[str],
     tip: str,
     turned: Sequence[float] = (0.0, 0.0, 0.0),
@@ -110,7 +110,7 @@ def read_arm(
     Raises
     ------
     ValueError
-        The robot has no such joint or tip, the arm has too few or too many joints, or one that can't be. The message says which.
+        The robot has no such joint or tip, or the arm has too few, too many or unsuitable joints. The message says which.
     """
     if missing := [
         *(f"joint '{name}'" for name in joints if name not in model.joints),
@@ -119,10 +119,10 @@ def read_arm(
         raise ValueError(f"the robot's URDF has no {missing[0]}, which the arm of '{tip}' needs; mend the name")
     chain = [model.joints[name] for name in joints]
     if len(chain) not in (6, 7):
-        raise ValueError(f"arm of '{tip}' has {len(chain)} joints; 6 or 7 are needed for a hand to be anywhere")
+        raise ValueError(f"arm of '{tip}' has {len(chain)} joints; an arm needs 6 or 7")
     for joint in chain:
         if joint.kind not in ("revolute", "continuous"):
-            raise ValueError(f"joint '{joint.name}' of the arm is {joint.kind}; wanted one that turns")
+            raise ValueError(f"joint '{joint.name}' of the arm is {joint.kind}; wanted a revolute or continuous joint")
         if joint.lower > joint.upper:
             raise ValueError(
                 f"joint '{joint.name}' turns from {joint.lower:g} to {joint.upper:g}; wanted the lower limit first"
@@ -150,7 +150,7 @@ def read_arm(
 
 
 def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
-    """Return shoulder, elbow and wrist of an arm with a closed form: neighbouring axes at right angles that meet; else None."""
+    """Return shoulder, elbow and wrist of an arm whose neighbouring axes meet at right angles (closed form), else None."""
     if len(axes) != 7 or any(abs(axes[i] @ axes[j]) > 1e-6 for i, j in ((0, 1), (1, 2), (4, 5), (5, 6))):
         return None
     shoulder, wrist = _meeting(origins[:3], axes[:3]), _meeting(origins[4:6], axes[4:6])
@@ -161,7 +161,7 @@ def _closed(origins: Array, axes: Array) -> tuple[Array, Array, Array] | None:
 
 
 def _meeting(origins: Array, axes: Array) -> Array | None:
-    """Return the point where axes meet (least squares), if they do."""
+    """Return the point where axes meet (least squares), or None if they don't."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     point = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, origins))
     gap = np.abs(np.einsum("nij,nj->ni", across, point - origins)).max()
@@ -190,7 +190,7 @@ def turn(axis: Array, angle: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _turning(axis: bytes) -> tuple[Array, Array]:
-    """Return the cross-product matrix (3, 3) of an axis, and its square: an arm has few axes, about which it often turns."""
+    """Return the cross-product matrix (3, 3) of an axis, and its square. Cached, since an arm has few axes."""
     crosses = cross_matrix(np.frombuffer(axis))
     return crosses, crosses @ crosses
 
@@ -205,14 +205,14 @@ def turn_about(vectors: Array) -> Array:
 
 
 def _turned(crosses: Array, squares: Array, angle: Array) -> Array:
-    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes: their cross-product matrices, and these squared."""
+    """Return rotation matrices (..., 3, 3) by `angle` (...) radians about axes, given their cross-product matrices and squares."""
     sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     matrices: Array = EYE + sin * crosses + (1 - cos) * squares
     return matrices
 
 
 def link_transforms(arm: Arm, q: Array) -> tuple[Array, Array]:
-    """Return rotation (n, k, 3, 3) and shift (n, k, 3) of what hangs on each joint, against the zero posture.
+    """Return the rotation (n, k, 3, 3) and shift (n, k, 3) of each joint's child link, relative to the zero posture.
 
     A point x of link i at the zero posture is at ``R[:, i] @ x + t[:, i]``.
     """

@@ -1,6 +1,6 @@
-"""Robots as they are put together: somebody's URDF, grippers on its flanges, joints on which its base drives.
+"""Assembly of a robot from its URDF, grippers on its flanges and the joints of a mobile base.
 
-What is put together is a URDF again, so that physics and kinematics read the same text.
+The result is a URDF again, so that physics and kinematics read the same text.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from reasoner.embodiment.values import Hand, Robot
-from sim.urdf import Array, Model, mesh_file, read_model, read_urdf
+from sim.urdf import Array, UrdfModel, mesh_file, read_model, read_urdf
 
 DRIVE = (("drive_x", "prismatic", "1 0 0"), ("drive_y", "prismatic", "0 1 0"), ("drive_yaw", "continuous", "0 0 1"))
-"""Joints below the base of a robot that drives: along, across, about."""
+"""Joints below the base of a mobile robot: along x, along y and about z."""
 
 FARTHEST = 100.0
-"""Metres that it may drive."""
+"""Limits in metres of the joints along x and y."""
 
 
-def read_robot(robot: Robot, base: Array | None = None) -> Model:
-    """Return a robot at its zero posture; its base is where the robot is said to stand, or at `base` (x, y, yaw).
+def read_robot(robot: Robot, base: Array | None = None) -> UrdfModel:
+    """Return a robot's model at the zero posture, with its base at the stated position or at `base` (x, y, yaw).
 
     Raises
     ------
@@ -36,19 +36,19 @@ def read_robot(robot: Robot, base: Array | None = None) -> Model:
 
 
 def plain(robot: Robot) -> bool:
-    """Whether a robot is just what its URDF says."""
+    """Return whether a robot has neither mounted grippers nor a mobile base."""
     return not robot.driving and not any(hand.gripper for hand in robot.hands)
 
 
 def assembled(robot: Robot) -> str:
-    """Return a robot as one URDF text, with its grippers, and the joints on which it drives; meshes by their whole paths."""
+    """Return a robot, its grippers and the joints of its mobile base as one URDF text, with absolute paths of meshes."""
     root = _parsed(robot.urdf)
     for hand in robot.hands:
         if hand.gripper:
             _mount(root, hand)
     if robot.driving:
         _drive(root, robot)
-    ET.indent(root)  # PyBullet's parser wants short lines
+    ET.indent(root)  # PyBullet's parser requires short lines
     return ET.tostring(root, encoding="unicode")
 
 
@@ -63,13 +63,13 @@ def _parsed(path: str) -> ET.Element:
 
 
 def _base(root: ET.Element) -> str:
-    """Return the link that hangs on no joint."""
+    """Return the root link, which is the child of no joint."""
     hanging = {child.get("link") for child in root.iter("child")}
     return next(name for link in root.findall("link") if (name := link.get("name", "")) not in hanging)
 
 
 def _mount(root: ET.Element, hand: Hand) -> None:
-    """Add a hand's gripper, whose names get the hand's before them."""
+    """Add a hand's gripper, its names prefixed by the hand's."""
     if all(link.get("name") != hand.flange for link in root.findall("link")):
         raise ValueError(f"the robot's URDF has no link '{hand.flange}', the flange of '{hand.name}'; mend the name")
     gripper = _parsed(hand.gripper)
@@ -88,7 +88,7 @@ def _mount(root: ET.Element, hand: Hand) -> None:
 
 
 def _drive(root: ET.Element, robot: Robot) -> None:
-    """Put the base on joints along, across and about, which are in the robot's own frame."""
+    """Put the base on joints along x and y and about z of the robot's own frame."""
     base, parent = _base(root), "ground"
     _weigh(ET.SubElement(root, "link", name=parent), "0")
     for i, (name, kind, axis) in enumerate(DRIVE):

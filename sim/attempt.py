@@ -1,4 +1,4 @@
-"""A skill at work: the hand, what it holds, how everything stood when it began; choosing poses, moving, and common checks."""
+"""One execution of a skill: its state at the beginning, the choice of poses, motions and common checks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.collision import Mover, Surroundings, free
 from sim.engine import Engine
 from sim.motion import (
     SWIVELS,
-    Limits,
+    MotionLimits,
     Reacher,
     beyond,
     comfort,
@@ -34,38 +34,38 @@ from sim.urdf import Array
 from sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Metres kept off on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
+"""Margin in metres on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""
 
 NOWHERE = 100.0
-"""Metres beyond which no arm is asked for: a pose there stands for one that no hand can have."""
+"""Distance in metres from which on a pose stands for one that the hand cannot take at all."""
 
 TIGHT = (0.006, 0.004, 0.003)
-"""Metres kept off everything where nothing else is left: more than `CLOSE`, since the load may slip before it is put down."""
+"""Margins in metres tried in turn where the full one leaves no candidate; above `CLOSE`, since the load may slip on the way."""
 
 ROUNDED = 3
-"""Samples over which corners of a path are rounded, on either side, if nothing is near them."""
+"""Maximum number of samples on either side over which corners of a path are rounded."""
 
 THIN = 0.01
-"""Metres by which fingers are open around a handle."""
+"""Opening in metres of fingers that are closed around a handle."""
 
 WARY = 0.5
-"""Share of its speed at which a hand that was stopped goes back."""
+"""Share of its speed at which a stopped hand withdraws."""
 
 SAMPLES = 1500
-"""Samples of a search for a path to any of the goals."""
+"""Maximum number of samples in the search for a path to one of the goals."""
 
 FINER = 4
-"""By how much denser than others a line is sampled that is followed as far as it is free."""
+"""Factor by which a line that ends at a guard is sampled more finely than others."""
 
 BATCH, ENOUGH = 24, 6
-"""Candidates checked for collisions at a time, and how many good ones end the search."""
+"""Number of candidates checked for collisions at a time, and number of free ones that end the check."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One execution of a skill: the world, the hand, what it holds, and where bodies and stray beads were before it.
+    """One execution of a skill: the world, the hand, the body it holds, and the bodies and stray beads before the skill.
 
-    `before` has by body what carried it (a drawer, say), and where it was in its carrier's frame.
+    `before` has for each body its carrier, such as a drawer, and its position in the carrier's frame.
     """
 
     world: Engine
@@ -76,7 +76,7 @@ class Attempt:
 
     @classmethod
     def begin(cls, world: Engine, hand: str) -> Attempt:
-        """Return an attempt that begins now."""
+        """Return the attempt of a hand that begins now."""
         before = {}
         for name in world.bodies:
             carrier = world.carried_by(name)
@@ -84,32 +84,32 @@ class Attempt:
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
-        """Return the attempt with nothing in the hand any more; where that is was felt until now."""
+        """Return the attempt with an empty hand, and store the last felt pose of the released body."""
         if self.held in self.world.bodies:
             self.world.remember(self.held, *self.world.truth(self.held))
         return replace(self, held=None)
 
     def body(self, name: str) -> str:
-        """Return the name of a body, or raise if the world has no such body any more."""
+        """Return the name of a body that is in the world and whose pose is known, else raise `SkillError`."""
         if name not in self.world.bodies or not self.world.knows(name):
             raise SkillError("no grasp", (name,), f"{name} is nowhere to be seen", seen=0.0)
         return name
 
     @contextmanager
     def planning(self) -> Iterator[None]:
-        """Count the CPU time inside as planning."""
+        """Count the CPU time of the block as motion planning."""
         begin = time.process_time()
         try:
             yield
         finally:
             self.world.clock.planning += time.process_time() - begin
 
-    # ------------------------------------------------------------------------------------------------- where to
+    # ------------------------------------------------------------------------------------------------- choice of poses
 
     def reacher(
         self, *ignored: str, margin: float = MARGIN, opening: float | None = None, whole: bool = False
     ) -> Reacher:
-        """Return the arm, with what it holds, maybe fingers at another `opening`, among its surroundings less the `ignored`."""
+        """Return the arm with its load among all obstacles but the `ignored`, with fingers open by `opening` if given."""
         mover = self.hand.mover(opening)
         if self.held is not None:
             mover = mover.holding(self.world.load_spheres(self.hand, self.held, whole))
@@ -117,14 +117,14 @@ class Attempt:
         return Reacher(mover, around, margin)
 
     def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None) -> list[int]:
-        """Return candidates for which every stage is reachable and free, the most comfortable first.
+        """Return the numbers of candidates whose stages are all reachable and free, the most comfortable first.
 
-        With an `opening`, the fingers are taken to be open so far, as they will be when the hand lets go.
+        With `opening`, the fingers are assumed to be open by that many metres, as after a release.
 
         Raises
         ------
         SkillError
-            There is none: `unreachable` with the missing metres, or `goal in collision` with what is in the way.
+            No candidate is left: `unreachable` with the missing metres, or `goal in collision` with the obstacles.
         """
         with self.planning():
             reacher = self.reacher(opening=opening)
@@ -142,14 +142,16 @@ class Attempt:
                     _scene(reacher, *movers, stage, min(CLOSE, least) if stage.near else least) for stage in stages
                 ]
                 found = _free(scenes, solved, order)
-                if found:  # little room is better than none; and what isn't seen well may be farther
+                if (
+                    found
+                ):  # with noise the last margin is below zero, since an obstacle may be farther away than perceived
                     break
             if not found:
                 raise _blocked(scenes, [q[order] for q in solved], objects)
             return [int(left[i]) for i in found]
 
     def _unreachable(self, stages: Sequence[Stage], at: Stage, objects: tuple[str, ...]) -> SkillError:
-        """Return what to raise where no posture is left at a stage: by how much it is too far, and where a joint is by then."""
+        """Return the error for a stage without a posture: the missing metres, and the value of the moved joint at that stage."""
         if at.joint is None:
             return SkillError("unreachable", objects, beyond_m=max(beyond(self.hand.arm, one.poses) for one in stages))
         missing = beyond(self.hand.arm, at.poses)
@@ -161,7 +163,7 @@ class Attempt:
         )
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
-        """Return how little the candidates are liked: cramped, pointing aside, or far from where the hand is now."""
+        """Return the candidates' costs: for cramped postures, for pointing aside and for the distance from the present pose."""
         arm, now = self.hand.arm, self.hand.pose
         ahead = np.arctan2(*(poses[:, :2] - arm.shoulder[:2]).T[::-1])
         cost: Array = np.sum([comfort(arm, q) for q in postures], axis=0)
@@ -172,17 +174,17 @@ class Attempt:
     # ------------------------------------------------------------------------------------------------- moving
 
     @property
-    def limits(self) -> Limits:
-        """How fast the hand moves: gently with something in it."""
+    def limits(self) -> MotionLimits:
+        """The hand's limits of speed and acceleration, lower with a load."""
         limits = self.hand.limits
         return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
 
     def follow(
         self, q: Array, speed: float = 1.0, enough: Callable[[], bool] | None = None, corners: int = ROUNDED
     ) -> None:
-        """Drive the arm along sampled postures, from where it is, at a share of its speed, until it is `enough`.
+        """Drive the arm along sampled postures at a share `speed` of its speed, or until `enough` returns true.
 
-        Corners are rounded over as many samples as `corners` says.
+        The path begins at the present posture; its corners are rounded over `corners` samples.
         """
         with self.planning():
             q, limits = np.concatenate([self.hand.posture[None], q[1:]]), self.limits
@@ -199,7 +201,10 @@ class Attempt:
             ) from failure
 
     def go(self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None) -> int:
-        """Move to the first goal pose that a free path leads to, maybe with fingers that go to an `opening`; return which it is."""
+        """Move along a free path to one of the goal poses, the first if possible; return its number.
+
+        With `opening`, the fingers are assumed to be open by that many metres.
+        """
         with self.planning():
             reacher = self.reacher(*ignored, opening=opening, whole=True)
             start = self.hand.pose
@@ -227,7 +232,7 @@ class Attempt:
         return reached[0]
 
     def _withdraw(self, q: Array) -> None:
-        """Go back along the postures that the arm has come along, from where something stopped it."""
+        """Move back along the postures passed so far, after something has stopped the arm."""
         now = self.hand.measured()
         self.hand.command(now)
         passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
@@ -241,9 +246,9 @@ class Attempt:
         speed: float = 1.0,
         enough: Callable[[], bool] | None = None,
     ) -> None:
-        """Move along the straight line to a pose, or until it is `enough`; raise if it isn't free.
+        """Move along the straight line to a pose, or until `enough` returns true; raise `SkillError` if the line isn't free.
 
-        Where a guard ends it, it is begun as far as it is free; else the elbow turns on the way if it must.
+        With `enough`, the line only has to be free at its beginning. Without it, the elbow may turn on the way.
         """
         start = self.hand.pose
         if enough is not None:
@@ -264,9 +269,10 @@ class Attempt:
         partly: bool = False,
         others: Iterable[Array] = (),
     ) -> None:
-        """Move along sampled poses, else `others`, or until it is `enough`; raise if none can be followed, or not even `partly`.
+        """Move along the first of `poses` and `others` that is free, or until `enough` returns true.
 
-        What is followed `partly` ends where something is felt, so what is only seen to be in the way doesn't end it.
+        With `partly`, the free beginning of a path suffices, and the margin is reduced by the noise: contact ends the motion.
+        `SkillError` is raised if no path is free.
         """
         with self.planning():
             reacher = self.reacher(*ignored, margin=CLOSE - 2 * self.world.noise if partly else CLOSE)
@@ -282,7 +288,7 @@ class Attempt:
         self.follow(q, speed, enough)
 
     def rise(self, goal: Array, objects: tuple[str, ...], *ignored: str) -> None:
-        """Go up in a line, the elbow turning as it must, or else around what is in the way."""
+        """Move straight up with the elbow free to turn, or around the obstacles if the line is blocked."""
         if goal[2] - self.hand.pose[2] < 1e-3:
             return
         try:
@@ -295,7 +301,7 @@ class Attempt:
     # ------------------------------------------------------------------------------------------------- checks
 
     def check_others(self, numbers: Numbers, *moved: str) -> None:
-        """Raise if something other than the `moved` objects and the held one was disturbed or toppled."""
+        """Raise `SkillError` if a body other than the `moved` and the held one was shifted or toppled."""
         for name, (carrier, position) in self.before.items():
             if name in (*moved, self.held, *self.world.elsewhere) or name not in self.world.bodies:
                 continue
@@ -307,7 +313,7 @@ class Attempt:
                 raise SkillError("object disturbed", (name,), moved_m=shift)
 
     def check_grip(self, numbers: Numbers) -> dict[str, float]:
-        """Return how far the held object slipped in the hand since it was grasped; raise if too far or if it's lost."""
+        """Return how far the held object has slipped since the grasp; raise `SkillError` if it slipped too far or is lost."""
         if self.held is None or self.hand.grasp is None:
             return {}
         if self.held not in self.world.bodies:
@@ -321,7 +327,7 @@ class Attempt:
         return {"slip_m": slip, "turned_rad": turned}
 
     def check_arrival(self, goal: Array, numbers: Numbers) -> dict[str, float]:
-        """Return how far the hand is from a pose (6,) where it should be; raise if too far."""
+        """Return the hand's distance from a goal pose (6,); raise `SkillError` if it exceeds the tolerance."""
         error = float(np.linalg.norm(self.hand.frame()[1] - goal[:3]))
         if error > numbers["tolerance"]:
             raise SkillError("tracking error", self.world.touching(self.hand), tip_error_m=error)
@@ -329,26 +335,23 @@ class Attempt:
 
 
 def rounding(reacher: Reacher, q: Array) -> int:
-    """Return over how many samples corners of a path may be rounded: only as far as it keeps off everything as it must.
-
-    Spheres leave the edges of a hand out by almost as much as that.
-    """
+    """Return the largest number of samples over which the corners of a path can be rounded so that it stays free."""
     return next((n for n in range(ROUNDED, 0, -1) if reacher.free(smooth(q, n)).all()), 0)
 
 
 def _seen_from(world: Engine, carrier: str, body: str) -> Array:
-    """Return where a body is in the frame of what carries it."""
+    """Return a body's position in the frame of its carrier."""
     turned, origin = world.carrier(carrier)
     local: Array = (world.truth(body)[1] - origin) @ turned
     return local
 
 
 Scene = tuple[Mover, Surroundings, float]
-"""An arm as it is at a stage, what is around it then, and the metres by which it keeps off that."""
+"""The arm at a stage, its obstacles, and the margin in metres."""
 
 
 def _free(scenes: Sequence[Scene], postures: Sequence[Array], order: NDArray[np.intp]) -> list[int]:
-    """Return the first few candidates, in `order`, that touch nothing at any stage."""
+    """Return the first few candidates, in `order`, that are free at every stage."""
     chosen: list[int] = []
     for start in range(0, len(order), BATCH):
         left = order[start : start + BATCH]
@@ -368,7 +371,7 @@ def _scene(reacher: Reacher, closed: Mover, bare: Mover, stage: Stage, margin: f
 
 
 def _blocked(scenes: Sequence[Scene], postures: Sequence[Array], objects: tuple[str, ...]) -> SkillError:
-    """Return what to raise where no candidate is free: it names what blocks most of them."""
+    """Return the error for stages without a free candidate; it names the bodies that block most candidates."""
     nearest: dict[str, Array] = {}
     for (mover, around, margin), q in zip(scenes, postures, strict=True):
         for name, gap in mover.clearances(q, around).items():

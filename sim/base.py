@@ -1,4 +1,4 @@
-"""The base of a robot that drives, in a physics world: its joints along x and y and about z."""
+"""The base of a mobile robot in a physics world: joints along x and y and about z."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ from sim.assembly import DRIVE
 from sim.urdf import Array
 
 FORCE = 5000.0
-"""Newtons, or newton metres, that hold and move a base."""
+"""Maximum force, in newtons or newton metres, of each motor of a base."""
 
 
 @dataclass
 class Base:
-    """The base of a robot in a physics world, on joints along x and y and about z; it stops up to `miss` metres and radians off."""
+    """The base of a robot in a physics world, on joints along x and y and about z.
+
+    Every drive ends up to `miss` metres and radians off its goal.
+    """
 
     client: int
     body: int
@@ -27,7 +30,7 @@ class Base:
     miss: float = 0.0
 
     def pose(self) -> Array:
-        """Return where it is: x, y, yaw."""
+        """Return the base's x, y and yaw."""
         along, across, turned = (
             state[0] for state in pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
         )
@@ -41,13 +44,13 @@ class Base:
         return [cos * dx + sin * dy, cos * dy - sin * dx, pose[2] - yaw]
 
     def set(self, pose: Array) -> None:
-        """Begin at a pose (x, y, yaw): the only time that a base is set instead of driven."""
+        """Place the base at a pose (x, y, yaw) before the first step; later it moves by its motors only."""
         for joint, value in zip(self.joints, self._values(pose), strict=True):
             pybullet.resetJointState(self.body, joint, value, physicsClientId=self.client)
         self.command(pose)
 
     def command(self, pose: Array) -> None:
-        """Set where the motors bring it, and keep it."""
+        """Set the motors' target to a pose (x, y, yaw); they hold it until the next command."""
         pybullet.setJointMotorControlArray(
             self.body,
             self.joints,
@@ -61,7 +64,7 @@ class Base:
 
 
 def read_base(client: int, body: int, robot: Robot, miss: float) -> Base:
-    """Return the base of a robot that drives, held where it is."""
+    """Return the base of a mobile robot, with its motors holding the present pose."""
     names = [name for name, _, _ in DRIVE]
     numbers = {}
     for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
@@ -72,6 +75,6 @@ def read_base(client: int, body: int, robot: Robot, miss: float) -> Base:
 
 
 def astray(base: Base, stand: Stand) -> tuple[float, float]:
-    """Return by how many metres and radians a base is beside a stand."""
+    """Return the distance in metres and the angle in radians between a base and a stand."""
     x, y, yaw = base.pose() - np.array([*stand.position[:2], stand.yaw])
     return float(np.hypot(x, y)), abs(float(np.angle(np.exp(1j * yaw))))

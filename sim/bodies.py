@@ -1,8 +1,9 @@
-"""Objects of the world: what they look like, weigh and contain.
+"""Bodies of the world: their shape, mass and appearance.
 
-A shape kind is a `Kind` in `KINDS`: how to make it in PyBullet, and the cylinder that motion planning takes it for. A vessel is
-a wall of revolution, for contact a ring of flat boxes per segment of its profile on a bottom cylinder; to the eye it is round.
-Metres and kilograms; a body's frame has its origin in the middle of the base, z up.
+`KINDS` has a `ShapeKind` for each kind of shape: the function that makes it in PyBullet, and the cylinder that stands for it in
+motion planning. A vessel is a wall of revolution. Its collision shape is a bottom cylinder and a ring of flat boxes for each
+segment of the profile; its visual shape is a smooth mesh. Metres and kilograms; a body's frame has its origin in the middle of the
+base, z up.
 """
 
 from __future__ import annotations
@@ -29,18 +30,18 @@ from reasoner.embodiment.values import Shape
 from sim.urdf import Array
 
 PLANKS = 12
-"""Flat boxes per ring of a vessel's wall."""
+"""Number of flat boxes in each ring of a vessel's wall."""
 
 STEP = 0.001
-"""Metres up to which a piece of a turned solid's outline is a step, with nothing in it."""
+"""Maximum height in metres of a segment of a turned solid's outline that is a mere step and gets no cylinder."""
 
 SIDES = 40
-"""Corners of a circle to the eye."""
+"""Number of corners of a circle in a visual mesh."""
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A shape kind: `make` builds it with (client, shape, position, orientation) and returns the body; `outer` its radius."""
+class ShapeKind:
+    """A kind of shape: `make` creates a body from (client, shape, position, orientation); `outer` and `height` give a cylinder."""
 
     make: Callable[[int, Shape, Array, Array], int]
     outer: Callable[[Shape], float]
@@ -68,7 +69,7 @@ def inner_radius(shape: Shape, height: Array) -> Array:
 
 
 def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a vessel from a URDF of its own: PyBullet's compound shapes have at most 16 parts, a vessel's wall has more."""
+    """Make a vessel from a generated URDF: PyBullet's compound shapes have at most 16 parts, a vessel's wall has more."""
     planks = [*_planks(shape)]
     base = shape.profile[0][1] + wall(shape)
     inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
@@ -89,9 +90,10 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
 
 
 def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
-    """Load a URDF that is written for it, and the mesh that it calls by its `file_name`; nothing of that stays on disk.
+    """Load a URDF given as text, with an optional OBJ mesh that the URDF refers to by `file_name`; return the body.
 
-    PyBullet never forgets a file, and knows it by its name: under new names each vessel would take 50 KB more.
+    The files are temporary. PyBullet caches files by name for good, so equal texts get equal names: new names would cost 50 KB a
+    vessel.
     """
     with _LOADING:
         folder = Path(tempfile.gettempdir()) / _folder(os.getpid())
@@ -109,13 +111,13 @@ def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: s
 
 
 def file_name(text: str, kind: str) -> str:
-    """Return the name under which a text is loaded, a name of its own."""
+    """Return the name of the temporary file for a text: a hash of the text, with the suffix `kind`."""
     return f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.{kind}"
 
 
 @cache
 def _folder(process: int) -> str:
-    """Return the name of a process's own folder, which nobody can guess."""
+    """Return the unguessable name of a process's folder for temporary files."""
     return f"confab-bodies-{process}-{uuid4().hex}"
 
 
@@ -139,7 +141,7 @@ PLANK = """<collision>
 
 
 def _planks(shape: Shape) -> Iterator[str]:
-    """Yield the wall's boxes: a ring per segment of the profile. Lines stay short, since PyBullet's parser wants that."""
+    """Yield the wall's boxes as URDF text, a ring per segment of the profile, in short lines as PyBullet's parser requires."""
     thickness = wall(shape)
     for (low, r_low), (high, r_high) in pairwise(shape.profile):
         radius = (r_low + r_high) / 2 + thickness / 2
@@ -158,7 +160,7 @@ def _planks(shape: Shape) -> Iterator[str]:
 
 
 def _revolved(shape: Shape) -> str:
-    """Return a smooth visual as an OBJ file: outside up, over the rim, inside down to the bottom."""
+    """Return the visual mesh as OBJ text: the outside upwards, the rim, the inside downwards, the bottom."""
     thickness = wall(shape)
     inner = [(h, r) for h, r in reversed(shape.profile)][:-1]
     bottom = [(thickness, shape.profile[0][1]), (thickness, 0.0)]
@@ -179,7 +181,7 @@ def _revolved(shape: Shape) -> str:
 
 
 def make_turned(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a solid of revolution, a lid with a knob say: a cylinder per segment of its outline."""
+    """Make a solid of revolution, such as a lid with a knob: a cylinder per segment of its outline."""
     lines = []
     for (low, below), (high, above) in pairwise(shape.profile):
         if high - low <= STEP:
@@ -238,7 +240,7 @@ def center_height(shape: Shape) -> float:
 
 
 def _body(client: int, shape: Shape, collision: int, visual: int, position: Array, orientation: Array) -> int:
-    """Make the body and give it its friction; maximal coordinates are three times as fast as a multibody."""
+    """Create the body and set its friction; maximal coordinates are three times as fast as a multibody."""
     body = pybullet.createMultiBody(
         baseMass=shape.mass,
         baseCollisionShapeIndex=collision,
@@ -253,7 +255,7 @@ def _body(client: int, shape: Shape, collision: int, visual: int, position: Arra
 
 
 def _rub(client: int, shape: Shape, body: int) -> int:
-    """Give a body its friction."""
+    """Set a body's friction, and return the body."""
     pybullet.changeDynamics(
         body,
         -1,
@@ -265,11 +267,11 @@ def _rub(client: int, shape: Shape, body: int) -> int:
     return int(body)
 
 
-KINDS: Mapping[str, Kind] = {
-    "vessel": Kind(make_vessel, vessel_radius, vessel_height),
-    "turned": Kind(make_turned, lambda s: max(radius for _, radius in s.profile), lambda s: s.profile[-1][0]),
-    "cylinder": Kind(make_cylinder, lambda s: s.numbers["radius"], lambda s: s.numbers["height"]),
-    "box": Kind(
+KINDS: Mapping[str, ShapeKind] = {
+    "vessel": ShapeKind(make_vessel, vessel_radius, vessel_height),
+    "turned": ShapeKind(make_turned, lambda s: max(radius for _, radius in s.profile), lambda s: s.profile[-1][0]),
+    "cylinder": ShapeKind(make_cylinder, lambda s: s.numbers["radius"], lambda s: s.numbers["height"]),
+    "box": ShapeKind(
         make_box, lambda s: math.hypot(s.numbers["width"], s.numbers["depth"]) / 2, lambda s: s.numbers["height"]
     ),
 }
@@ -281,12 +283,12 @@ def outer_radius(shape: Shape) -> float:
 
 
 def height_of(shape: Shape) -> float:
-    """Return how high the shape stands above its base."""
+    """Return the height of the shape above its base."""
     return KINDS[shape.kind].height(shape)
 
 
 def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
-    """Yield what motion planning takes a shape for: upright cylinders with their lower and upper ends and radii."""
+    """Yield the upright cylinders that stand for a shape in motion planning: lower end, upper end and radius."""
     if shape.kind != "turned":
         yield 0.0, height_of(shape), outer_radius(shape)
         return
@@ -296,7 +298,7 @@ def cylinders(shape: Shape) -> Iterator[tuple[float, float, float]]:
 
 
 def outline(shape: Shape) -> tuple[Array, Array]:
-    """Return heights and outer radii that describe the shape from the side, for whatever stands upright."""
+    """Return the heights and outer radii of the side view of an upright shape."""
     if shape.profile:
         heights, radii = np.array(shape.profile).T
         return heights, radii + (wall(shape) if shape.kind == "vessel" else 0.0)
@@ -304,12 +306,12 @@ def outline(shape: Shape) -> tuple[Array, Array]:
 
 
 def packed(shape: Shape, count: int, radius: float) -> Array:
-    """Return positions (count, 3) in a vessel's frame at which beads of `radius` can be let go: layers of rings, bottom up.
+    """Return positions (count, 3) in a vessel's frame at which beads of `radius` fit: layers of rings, bottom up.
 
     Raises
     ------
     ValueError
-        They don't fit; the message says how many do.
+        The vessel has room for fewer; the message has the number.
     """
     spots: list[tuple[float, float, float]] = []
     height, pitch, layer = wall(shape) + radius * 1.05, radius * 2.06, 0

@@ -1,7 +1,7 @@
-"""Distances between an arm and everything around it, for many postures at once.
+"""Distances between an arm and its obstacles, for many postures at once.
 
-The arm, and what its hand holds, is a set of spheres; the surroundings are solids (boxes and upright or lying cylinders) and the
-spheres of the robot's body and of other arms. A distance below zero is a collision. Metres throughout.
+The arm and its load are a set of spheres. The obstacles are solids (boxes and upright or lying cylinders) and the spheres of the
+robot's body and of other arms. A distance below zero is a collision. Metres throughout.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 
 from reasoner.embodiment.values import Fixture
 from sim.arms import Arm, Flags, link_transforms, turn
-from sim.urdf import Array, Model, Spheres
+from sim.urdf import Array, Spheres, UrdfModel
 
 EDGE, BETWEEN = 0.004, 0.02
-"""Radius of the spheres along the lower edge of what is held, and metres from one to the next."""
+"""Radius of the spheres along the lower edge of a load, and distance between neighbours, in metres."""
 
 POINTS = 4000
-"""Points whose distances from everything are worked out at once: more at a time would have to wait for memory."""
+"""Number of points whose distances are computed at once; larger arrays no longer fit the processor's cache."""
 
 
 @dataclass(frozen=True)
 class Solid:
     """A named box (half extents) or cylinder (radius, radius, half height) with its centre and rotation in the world.
 
-    A `part` tells one solid of a thing from its others.
+    `part` names one of several solids of the same thing.
     """
 
     name: str
@@ -50,14 +50,14 @@ class Solid:
         return distance
 
     def bounds(self) -> tuple[Array, Array]:
-        """Return the corners of the axis-aligned box around it."""
+        """Return the corners of the axis-aligned box around the solid."""
         extent = np.abs(self.rotation) @ self.half
         return self.center - extent, self.center + extent
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an arm must not touch: solids, and the spheres of the robot's body and other arms with their owners' names."""
+    """The obstacles of an arm: solids, and the spheres of the robot's body and other arms with their owners' names."""
 
     solids: tuple[Solid, ...] = ()
     centers: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -65,7 +65,7 @@ class Surroundings:
     owners: tuple[str, ...] = ()
 
     def without(self, *names: str) -> Surroundings:
-        """Return the surroundings less the solids, parts or robots of these names."""
+        """Return the surroundings without the solids, parts and robots of these names."""
         left = replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
         if names and (gone := {*names} & {*self.owners}):
             kept = np.array([owner not in gone for owner in self.owners])
@@ -75,9 +75,9 @@ class Surroundings:
 
     @cached_property
     def packed(self) -> tuple[Array, Array, Array, Array, Array]:
-        """The solids as arrays: turned axes (s, 3, 3), centres in them (s, 3), half extents (s, 3), and bounds (s, 3) twice.
+        """The solids as arrays, boxes before cylinders.
 
-        Boxes come before cylinders.
+        Axes (s, 3, 3), centres along these axes (s, 3), half extents (s, 3), lower and upper bounds (s, 3).
         """
         solids = sorted(self.solids, key=lambda solid: solid.kind == "cylinder")
         turned = np.array([solid.rotation for solid in solids]).reshape(-1, 3, 3)
@@ -88,11 +88,11 @@ class Surroundings:
 
     @cached_property
     def boxes(self) -> int:
-        """How many of the solids are boxes."""
+        """Number of boxes among the solids."""
         return sum(solid.kind != "cylinder" for solid in self.solids)
 
     def plus(self, owner: str, spheres: Spheres) -> Surroundings:
-        """Return the surroundings with more spheres."""
+        """Return the surroundings with an owner's spheres added."""
         return replace(
             self,
             centers=np.concatenate([self.centers, spheres.centers]),
@@ -116,7 +116,7 @@ class Mover:
         return centers
 
     def holding(self, spheres: Spheres) -> Mover:
-        """Return the arm with more spheres in its hand, given in the hand's frame."""
+        """Return the arm with a load of spheres, given in the hand's frame."""
         world = spheres.centers @ self.arm.tip_rotation.T + self.arm.tip
         together = Spheres(
             np.concatenate([self.spheres.centers, world]), np.concatenate([self.spheres.radii, spheres.radii])
@@ -126,12 +126,12 @@ class Mover:
         )
 
     def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
-        """Return, for everything that is near, its distance (n,) from the arm at each posture."""
+        """Return the distance (n,) of each nearby obstacle from the arm at each posture."""
         return clearances(self.at(q), self.spheres.radii, around)
 
 
 def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
-    """Return where (n,) spheres (m,) at centres (n, m, 3) keep a margin off everything: `clearances` without the distances."""
+    """Return for which of n postures the spheres (m,) at centres (n, m, 3) keep the margin; faster than `clearances`."""
     some = max(POINTS // max(len(radii), 1), 1)
     return np.concatenate(
         [_free(centers[i : i + some], radii, around, margin) for i in range(0, max(len(centers), 1), some)]
@@ -170,9 +170,9 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
 
 
 def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return which of the boxes from `low` to `high` (m, 3) meet any from `bottom` to `top` (s, 3), and which of those are met.
+    """Return the boxes `low` to `high` (m, 3) that meet any box `bottom` to `top` (s, 3), and those of the latter that are met.
 
-    An arm that goes along a path is far from most things with most of its spheres.
+    Most spheres of an arm on a path are far from most obstacles, so this filter pays.
     """
     near = np.ones((len(low), len(bottom)), dtype=bool)
     for i in range(3):
@@ -181,7 +181,7 @@ def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArra
 
 
 def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, Array]:
-    """Return, for everything that is near, its distance (n,) from spheres (m,) that are at centres (n, m, 3)."""
+    """Return the distance (n,) of each nearby obstacle from spheres (m,) at centres (n, m, 3)."""
     low, high = (centers - radii[:, None]).min((0, 1)) - 0.05, (centers + radii[:, None]).max((0, 1)) + 0.05
     found: dict[str, Array] = {}
     for solid in around.solids:
@@ -200,15 +200,15 @@ def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, 
 
 
 def box(fixture: Fixture) -> Solid:
-    """Return a piece of furniture as a solid."""
+    """Return a fixture as a solid."""
     turned = turn(np.array([0.0, 0.0, 1.0]), np.array(fixture.yaw))
     return Solid(fixture.name, "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
 
 
-def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
+def read_mover(model: UrdfModel, arm: Arm, openings: Mapping[str, float]) -> Mover:
     """Return the arm's moving spheres, with finger joints at `openings` (metres).
 
-    What the first joint carries turns on the spot, touching what carries the arm: it is left out.
+    The links between the first and second joint are left out: they turn on the spot and touch the arm's mount.
     """
     centers, radii, carriers = [], [], []
     for link, spheres in model.spheres.items():
@@ -222,7 +222,7 @@ def read_mover(model: Model, arm: Arm, openings: Mapping[str, float]) -> Mover:
     return Mover(arm, Spheres(np.concatenate(centers), np.concatenate(radii)), np.concatenate(carriers))
 
 
-def fixed_spheres(model: Model, arms: Sequence[Arm]) -> Spheres:
+def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
     """Return the spheres of the robot that no arm moves."""
     joints = {name for arm in arms for name in arm.joints}
     still = [s for link, s in model.spheres.items() if not joints & {joint.name for joint in model.chains[link]}]
@@ -230,7 +230,7 @@ def fixed_spheres(model: Model, arms: Sequence[Arm]) -> Spheres:
 
 
 def column(heights: Array, radii: Array, bottom: float) -> Spheres:
-    """Return spheres that cover an upright body of revolution above `bottom`, but for its edges.
+    """Return spheres that cover an upright body of revolution above `bottom`, except its edges.
 
     `heights` (ascending) and `radii` are its outline; each sphere is as wide as the body at its centre.
 

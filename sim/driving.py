@@ -1,7 +1,7 @@
-"""A base that drives: ways for it, the arms as they are, between things that stand about.
+"""Motions of a mobile base among obstacles, with the arms at rest in their present postures.
 
-A way is planned as a hand's is (`sim.motion.connect`): the base's pose is (x, y, 0, yaw, 0, 0), which touches nothing if no sphere
-of robot and load does. Afterwards the arms' kinematics begin at the base where it has come to.
+A path is planned as a hand's is (`sim.motion.connect`). The base's pose is (x, y, 0, yaw, 0, 0); it is free if no sphere of robot
+and load touches anything. After the drive the arms' kinematics start from the base's new pose.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from sim.urdf import Array, Spheres
 from sim.verdict import SkillError, named
 
 BASE = np.array([0, 1, 3])
-"""Where x, y and yaw are in a pose."""
+"""Indices of x, y and yaw in a pose."""
 
 MARGIN = 0.02
-"""Metres that a robot keeps off things while it drives."""
+"""Margin in metres between a driving robot and its obstacles."""
 
 GENTLY = 0.8
-"""Seconds in which a base comes to its speed: what a hand carries must not slip, and a full cup not spill."""
+"""Seconds in which a base reaches its speed; slow enough that no load slips and no full cup spills."""
 
 ASTRAY = 0.03
-"""Metres or radians by which a base may be behind its command before it counts as stopped."""
+"""Lag in metres or radians behind its command from which on a base counts as stopped."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
-"""Metres by which a robot draws back from a table before it turns, and comes up to another one."""
+"""Distances in metres, tried in turn, by which a robot backs off before it turns, and from which it approaches its goal."""
 
 SAMPLES = 600
-"""How many samples a search for a way takes at most."""
+"""Maximum number of samples in the search for a path."""
 
 
 @dataclass(frozen=True)
 class Roller:
-    """A robot that may drive among its surroundings: its spheres (m, 3), arms and loads as they are, in the frame of its base."""
+    """A mobile robot among its obstacles: spheres (m, 3) of robot, arms and loads in the frame of the base."""
 
     centers: Array
     radii: Array
@@ -51,7 +51,7 @@ class Roller:
 
     @property
     def spread(self) -> Array:
-        """How far beyond start and goal a way is searched."""
+        """Size of the search region beyond start and goal (6,)."""
         return np.array([1.0, 1.0, 0.0, np.pi, 0.0, 0.0])
 
     def at(self, q: Array) -> Array:
@@ -62,11 +62,11 @@ class Roller:
         return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return where the base is at poses: it gets everywhere."""
+        """Return the base's x, y, yaw at poses, and that all are within reach."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
     def free(self, q: Array) -> Flags:
-        """Return where the robot touches nothing."""
+        """Return at which of the base's positions the robot touches nothing."""
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
@@ -75,11 +75,11 @@ class Roller:
         return q if self.free(q).all() else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some ways that can be followed, or None."""
+        """Return the number of the first of some paths that can be followed, or None."""
         return next((i for i, way in enumerate(ways) if self.follow(way) is not None), None)
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield ways that draw back, turn, and come up to the goal from before it."""
+        """Yield paths that back off, turn, and approach the goal from the front."""
         for back in BACKING:
             ends = []
             for pose in (start, goal):
@@ -92,7 +92,7 @@ class Roller:
             yield np.stack([ends[0], turned, ends[1]])
 
     def blame(self, poses: Array) -> Blocked:
-        """Return what is in the way along poses."""
+        """Return the obstacles along poses."""
         gaps = {
             name: float(gap.min()) for name, gap in clearances(self.at(poses[:, BASE]), self.radii, self.around).items()
         }
@@ -101,7 +101,7 @@ class Roller:
 
 
 def drive(engine: Engine, robot: str, stand: str) -> None:
-    """Let a robot drive to a stand, with what its hands hold, or raise `SkillError`."""
+    """Drive a robot with its loads to a stand; raise `SkillError` if that fails."""
     if robot not in engine.bases or stand not in engine.embodiment.stands:
         raise SkillError("ill-defined", (robot, stand), f"{robot} doesn't drive, or {stand} is no stand")
     base, there = engine.bases[robot], engine.embodiment.stands[stand]
@@ -122,7 +122,7 @@ def drive(engine: Engine, robot: str, stand: str) -> None:
 
 
 def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | None], things: tuple[str, ...]) -> Array:
-    """Return where the base is at each step of the simulation; raise if there is no way."""
+    """Return the base's x, y, yaw at each simulation step; raise `SkillError` if there is no free path."""
     begin = time.process_time()
     x, y, yaw = base.pose()
     spheres = [engine.standing[base.robot.name]]
@@ -150,7 +150,7 @@ def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | Non
 
 
 def _check(engine: Engine, base: Base, wanted: Array, hands: tuple[str, ...]) -> None:
-    """Raise if the base is behind its command, naming what the robot touches, or if the time is over."""
+    """Raise `SkillError` if the skill's time limit has passed or the base lags behind its command."""
     hand = engine.hands[hands[0]]
     if engine.steps > hand.deadline:
         raise SkillError("too slow", (base.robot.name,), seconds=hand.limit)
@@ -161,7 +161,7 @@ def _check(engine: Engine, base: Base, wanted: Array, hands: tuple[str, ...]) ->
 
 
 def take_up(engine: Engine, base: Base) -> None:
-    """Let the kinematics of a robot's arms begin where its base is now."""
+    """Update the kinematics of a robot's arms to the present pose of its base."""
     robot = base.robot
     model = read_robot(robot, base.pose())
     hands = [hand for hand in engine.hands.values() if hand.robot == robot]

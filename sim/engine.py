@@ -1,7 +1,8 @@
-"""PyBullet with the things of a scene in it: stepping, and sensing what is there.
+"""PyBullet with the bodies of a scene: simulation steps and perception.
 
 Rule 1: time is counted in steps of ``1 / RATE`` seconds, and every loop has a bound in steps.
-Rule 2: nothing is set but motor targets; only `sim.staging` before the first step and planted faults (`sim.faults`) may.
+Rule 2: only motor targets are set. Exceptions: `sim.staging` before the first step, planted faults (`sim.faults`) and
+interventions (`sim.live`).
 Rule 3: every random number comes from `Engine.rng`, so the same arguments give the same world, bit by bit.
 """
 
@@ -31,27 +32,27 @@ RATE = 240.0
 """Simulation steps per second."""
 
 CLINGING = 0.005
-"""Metres by which two bodies may shift along each other before a contact between them is looked for anew.
+"""Metres that two bodies may shift along each other before Bullet drops their contact and detects it anew.
 
-Bullet's own 2 cm are for larger things: a finger's edge that had touched a ledge would go on to press where the ledge was.
+Bullet's default of 2 cm suits larger bodies: a finger that has left a ledge would still press where the ledge was.
 """
 
 LAG = 0.08
-"""Radians that a joint may stay behind its command."""
+"""Maximum lag in radians of a joint behind its command."""
 
 LOOKS = 6
-"""So often is looked at something before its position is told; the mean is taken, so that noise grows less."""
+"""Number of noisy measurements whose mean is a perceived position."""
 
 STEADY = 5.0
-"""Standard deviations of what is perceived within which a body may be where it was."""
+"""Standard deviations of the perceived position within which a body counts as unmoved."""
 
 BESIDE = 0.05
-"""Metres from a place up to which a body is at it; and below a place from which on it is no longer at it."""
+"""Maximum distance in metres between a place and a body that is at it."""
 
 
 @dataclass(frozen=True)
 class Thing:
-    """An object in the world: its PyBullet body and its shape, as perturbed."""
+    """A body in the world: its PyBullet number and its shape after perturbation."""
 
     body: int
     shape: Shape
@@ -67,7 +68,7 @@ class Bead:
 
 @dataclass
 class Clock:
-    """CPU seconds by what they were spent on."""
+    """CPU seconds spent on motion planning, simulation steps and rendering."""
 
     planning: float = 0.0
     stepping: float = 0.0
@@ -75,17 +76,17 @@ class Clock:
 
 
 class Engine:
-    """A physics server with bodies, hands and beads: what skills move and perceivers look at.
+    """A physics server with bodies, hands and beads, which skills move and perceivers read.
 
     Parameters
     ----------
     embodiment : Embodiment
     seed : int
-        Of everything random.
+        Seed of all random numbers.
     noise : float
         Standard deviation in metres of perceived positions.
     gui : bool
-        Open PyBullet's window (`sim.screen.require_screen` first: where there is no screen PyBullet ends the process).
+        Open PyBullet's window. Call `sim.screen.require_screen` first: without a screen PyBullet ends the process.
     """
 
     def __init__(self, embodiment: Embodiment, seed: int = 0, noise: float = 0.0, gui: bool = False) -> None:
@@ -102,20 +103,20 @@ class Engine:
         self.standing: dict[str, Spheres] = {}
         self.mechanics: list[Mechanic] = []
         self.links: dict[str, Mechanic] = {}  # by the names of their links
-        self.shifts: dict[
-            int, Array
-        ] = {}  # by mechanism's body: how far off it is perceived, since it was last looked at
-        self.errors: dict[str, tuple[int, Array]] = {}  # by body: when it was looked at, how far off it was seen
+        self.shifts: dict[int, Array] = {}  # by the mechanism's body: error of its perceived position at the last look
+        self.errors: dict[
+            str, tuple[int, Array]
+        ] = {}  # by body: step of the last look, error of the perceived position
         self.known: dict[
             str, tuple[str, Array, Array]
-        ] = {}  # by body: what carried it when seen last, and where in its frame
-        self.told: dict[tuple[str, str], float] = {}  # by vessel and filling: servings that were seen last
+        ] = {}  # by body: its carrier when last seen, and its rotation and base in the carrier's frame
+        self.told: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
         self.sighted: tuple[int, Sight] | None = None
         self.remembered: dict[str, int] = {}
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.filled: dict[str, float] = {}
-        self.elsewhere: set[str] = set()  # bodies that other hands see to, while one hand is at work
+        self.elsewhere: set[str] = set()  # bodies that other hands or interventions move during the present skill
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
             raise RuntimeError("PyBullet could not start a physics server")
@@ -158,7 +159,7 @@ class Engine:
     def follow(
         self, hand: Manipulator, positions: Array, velocities: Array, enough: Callable[[], bool] | None = None
     ) -> None:
-        """Drive an arm along timed postures until it is `enough`; raise `SkillError` if it stays behind its command."""
+        """Drive an arm along timed postures, or until `enough` returns true; raise `SkillError` if it lags behind its command."""
         for i, (q, v) in enumerate(zip(positions, velocities, strict=True)):
             hand.command(q, v)
             self.run(1)
@@ -172,9 +173,9 @@ class Engine:
         self.check_course(hand)
 
     def check_course(self, hand: Manipulator) -> None:
-        """Raise `SkillError` if the skill's time is over, or if a joint is too far from its command.
+        """Raise `SkillError` if the skill's time limit has passed, or if a joint lags too far behind its command.
 
-        The latter names what the arm touches, else the hand.
+        In the second case the error names the bodies that the arm touches, else the hand.
         """
         if self.steps > hand.deadline:
             raise SkillError("too slow", (hand.hand.name,), seconds=hand.limit)
@@ -183,7 +184,10 @@ class Engine:
             raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
 
     def touching(self, hand: Manipulator) -> tuple[str, ...]:
-        """Return what a hand's robot, or a body that it touches or holds, is in contact with, the held one excepted."""
+        """Return the bodies in contact with a hand's robot, with the held body or with a body that the robot touches.
+
+        The held body itself is left out.
+        """
         held = self.held(hand.hand.name)
         around = self._contacts(hand.body)
         if held is not None:
@@ -199,12 +203,12 @@ class Engine:
         return [contact for contact in found if contact[2] != body]
 
     def _contacts(self, body: int) -> set[str]:
-        """Return what presses against a body."""
+        """Return the names of the bodies and links that press against a body."""
         found = {self._name(contact[2], contact[4]) for contact in self.contacts(body) if contact[9] > 0.5}
         return found - {""}
 
     def _name(self, body: int, part: int) -> str:
-        """Return what a body is called, or its link of that number if that moves; an empty name if nobody knows it."""
+        """Return the name of a body, or of its link `part` if that moves; an empty string if it has no name."""
         links = (name for name, one in self.links.items() if (one.body, one.joints.get(name)) == (body, part))
         return next(links, self.names.get(body, ""))
 
@@ -221,12 +225,12 @@ class Engine:
     # ------------------------------------------------------------------------------------------------- sensing
 
     def truth(self, name: str) -> tuple[Array, Array]:
-        """Return where a body is: its rotation (3, 3) and the middle of its base (3,) in metres.
+        """Return a body's rotation (3, 3) and the middle of its base (3,) in metres.
 
         Raises
         ------
         SkillError
-            The world has no such body any more.
+            The body was removed from the world.
         """
         if name not in self.bodies:
             raise SkillError("misplaced", (name,), f"{name} is nowhere to be seen", seen=0.0)
@@ -236,14 +240,15 @@ class Engine:
         return rotation, np.array(position) - rotation[:, 2] * center_height(thing.shape)
 
     def sense(self, name: str) -> tuple[Array, Array]:
-        """Return a body's rotation and base as the robot perceives them: the mean of several looks, each with its noise.
+        """Return a body's perceived rotation and base: the mean of several noisy measurements.
 
-        Until the simulation goes on it is the same. One that is hidden is believed to be where it was, with what carried it there.
+        The result stays the same until the next simulation step. A hidden body keeps its last perceived pose in the frame of its
+        carrier.
 
         Raises
         ------
         SkillError
-            The body isn't seen, and nothing is known of it.
+            The body is not visible, and no earlier pose of it is known.
         """
         if name in self.bodies:
             rotation, position = self.truth(name)
@@ -260,9 +265,9 @@ class Engine:
         return self._believed(name)
 
     def remember(self, name: str, rotation: Array, position: Array) -> None:
-        """Take note of where a body is, in the frame of what carries it there.
+        """Store a body's perceived pose in the frame of its carrier.
 
-        What isn't seen exactly, and may not have moved, is taken for where it was, and a little for where it seems to be now.
+        With noise, a body that may not have moved keeps its stored position, shifted a little towards the new measurement.
         """
         carrier = self.carried_by(name, position)
         frame, origin = self.carrier(carrier)
@@ -276,7 +281,7 @@ class Engine:
         )
 
     def sight(self) -> Sight:
-        """Return what the cameras see; what is seen to be gone is no longer believed to be where it was."""
+        """Return what the cameras see, and forget the pose of each body that they see to be gone."""
         if self.sighted is None or self.sighted[0] != self.steps:
             self.sighted = self.steps, Sight()
             poses = {name: self._believed(name) for name in self.known}
@@ -301,7 +306,7 @@ class Engine:
         return frame @ turned, origin + frame @ base
 
     def _cameras(self) -> Array:
-        """Return where cameras are (n, 3): as the scene states, else over the shoulders of each robot."""
+        """Return the cameras' positions (n, 3): those of the scene, else two over the shoulders of each robot."""
         if self.embodiment.cameras:
             return np.array(self.embodiment.cameras)
         found = []
@@ -312,13 +317,13 @@ class Engine:
         return np.concatenate(found)
 
     def perceives(self, name: str) -> bool:
-        """Tell whether a body is seen, or felt in a hand."""
+        """Return whether a body is seen by a camera or felt in a hand."""
         return name in self.bodies and (
             name in self.sight().seen or any(self.held(hand) == name for hand in self.hands)
         )
 
     def knows(self, name: str) -> bool:
-        """Tell whether a body is perceived, or believed to be somewhere."""
+        """Return whether a body is perceived now, or an earlier pose of it is known."""
         self.sight()
         return name in self.known or self.perceives(name)
 
@@ -328,9 +333,9 @@ class Engine:
         return self.noise / float(np.sqrt(LOOKS))
 
     def look(self, before: int = 0) -> None:
-        """Look anew: until the next look each mechanism is perceived to be as far off as now, each body until things move.
+        """Draw new perception errors: for each mechanism until the next look, for each body until the next simulation step.
 
-        Each is the mean of several; after some `before`, of which the mean is what is perceived, it is that of all.
+        The errors are means over several measurements; after `before` earlier looks at an unchanged world, means over all of them.
         """
         seen = {name: error for name, (steps, error) in self.errors.items() if before and steps == self.steps}
         self.errors.clear()
@@ -340,32 +345,32 @@ class Engine:
             self.errors = {name: (self.steps, self._mean(before, error)) for name, error in seen.items()}
 
     def _mean(self, before: int, error: Array) -> Array:
-        """Return the mean error of so many looks before, and of one more."""
+        """Return the mean error of one more look and of `before` looks whose mean is `error`."""
         seen = self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
         mean: Array = (before * error + seen) / (before + 1)
         return mean
 
     def shift(self, mechanic: Mechanic) -> Array:
-        """Return by how much a mechanism is perceived to be elsewhere than it is."""
+        """Return the error (3,) of a mechanism's perceived position."""
         return self.shifts.get(mechanic.body, np.zeros(3))
 
     def carrier(self, name: str) -> tuple[Array, Array]:
-        """Return the frame of a link or body that carries places; that of the world for an empty name."""
+        """Return the frame of a link or body that carries places; the world's frame for an empty name."""
         if not name:
             return np.eye(3), np.zeros(3)
         return self.links[name].frame(name) if name in self.links else self.truth(name)
 
     def place(self, name: str) -> Array:
-        """Return where a place is now."""
+        """Return a place's present position (3,)."""
         place = self.embodiment.places[name]
         turned, origin = self.carrier(place.carrier)
         point: Array = origin + turned @ np.array(place.position)
         return point
 
     def carried_by(self, name: str, base: Array | None = None) -> str:
-        """Return the carrier of the place at which a body is: a link or a body; empty if it is at none that is carried.
+        """Return the carrier (a link or body) of the place at which a body is; an empty string if no carried place is near.
 
-        It is where it is, or at `base`.
+        `base` stands in for the body's true position.
         """
         carried = [place for place in self.embodiment.places.values() if place.carrier not in ("", name)]
         base = self.truth(name)[1] if base is None else base
@@ -374,12 +379,12 @@ class Engine:
         return self.embodiment.places[best].carrier if best and gaps[best] < BESIDE else ""
 
     def top(self, name: str) -> Array:
-        """Return the middle of a body's perceived top: of a vessel, its mouth."""
+        """Return the middle of a body's perceived top, which for a vessel is the mouth."""
         rotation, base = self.sense(name)
         return base + rotation[:, 2] * height_of(self.bodies[name].shape)
 
     def nearest_place(self, point: Array) -> tuple[str, float]:
-        """Return the place that is horizontally nearest to a point, and its distance; of two above one another the next below."""
+        """Return the horizontally nearest place to a point, and its distance; of places above one another, the next below it."""
         points = {name: self.place(name) for name in self.embodiment.places}
         gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
         below = {name: float(point[2] - where[2]) for name, where in points.items()}
@@ -389,7 +394,7 @@ class Engine:
         return best, gaps[best]
 
     def acting(self, roles: Mapping[str, str]) -> str:
-        """Return the hand of a skill's roles, of a robot that acts as a whole the first; empty if there is none."""
+        """Return the hand of a skill's roles, else the first hand of its robot; an empty string if the roles have neither."""
         own = (name for name, hand in self.hands.items() if hand.robot.name == roles.get("robot"))
         return roles.get("hand") or next(own, "")
 
@@ -402,7 +407,7 @@ class Engine:
         return None
 
     def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> int:
-        """Return how many beads, of one filling or of all, are inside a vessel, where that is or is `sensed`."""
+        """Return the number of beads, of one filling or all, inside a vessel at its true pose, or its perceived one if `sensed`."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
@@ -417,7 +422,7 @@ class Engine:
         return np.array([get(bead.body, physicsClientId=self.client)[0] for bead in beads])
 
     def amount(self, vessel: str, filling: str) -> float:
-        """Return how many servings of a filling a vessel contains, as the robot perceives it."""
+        """Return the perceived number of servings of a filling in a vessel."""
         if not self.beads:
             return float(filling in self.contents.get(vessel, ()))
         seen = self.perceives(vessel)
@@ -427,7 +432,7 @@ class Engine:
         return self.told.get((vessel, filling), 0.0)
 
     def servings(self, vessel: str) -> Fraction:
-        """Return how many servings a vessel contains, as the robot perceives it; without beads, as it is counted."""
+        """Return the perceived number of servings in a vessel; without beads, the counted number."""
         if not self.beads:
             return Fraction(
                 self.filled.get(vessel, self.embodiment.bodies[vessel].servings if self.contents.get(vessel) else 0)
@@ -435,7 +440,7 @@ class Engine:
         return sum((Fraction(self.amount(vessel, name)) for name in self.embodiment.fillings), Fraction(0))
 
     def stray(self) -> int:
-        """Return how many beads are in no vessel."""
+        """Return the number of beads outside all vessels."""
         return len(self.beads) - sum(self.inside(name) for name in self.bodies)
 
     # ------------------------------------------------------------------------------------------------- surroundings
@@ -443,9 +448,9 @@ class Engine:
     def surroundings(
         self, mover: str, held: str | None = None, values: Mapping[str, float] | None = None
     ) -> Surroundings:
-        """Return what a hand must not touch: furniture, bodies as perceived, the robots' trunks and other arms.
+        """Return the obstacles of a hand: furniture, perceived bodies, the robots' trunks and the other arms.
 
-        With `values` some links are taken to be elsewhere than they are.
+        `values` replaces the joint values of some links.
         """
         solids = [box(fixture) for fixture in self.embodiment.fixtures]
         for mechanic in self.mechanics:
@@ -472,7 +477,7 @@ class Engine:
         return around
 
     def taken_along(self, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return where a body will be perceived when links have moved to `values` and taken along what they carry."""
+        """Return the rotation and base of a body after links have moved to `values` and carried it along."""
         rotation, base = self.sense(name)
         link = self.known[name][0]
         if link not in values:
@@ -489,7 +494,7 @@ class Engine:
         return rotation.T @ turned, rotation.T @ (base - point)
 
     def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
-        """Return spheres for a held body in its hand; its lowest centimetres, which may touch a table, only if `whole`."""
+        """Return spheres for a held body in the hand's frame; the lowest centimetres, which may touch a table, only if `whole`."""
         shape = self.bodies[body].shape
         rotation, base = self.in_hand(hand, body)
         spheres = column(*outline(shape), bottom=outer_radius(shape) / 3 if whole else min(0.03, height_of(shape) / 3))

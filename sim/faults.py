@@ -1,19 +1,18 @@
-"""Faults that can be planted in a world, to see that verification finds them: give one to `sim.verify.verify` as `prepare`.
+"""Faults that can be planted in a world to test that verification detects them: pass one to `sim.verify.verify` as `prepare`.
 
-Only here is a running world interfered with. A fault of the table below is called with its arguments and returns a `Fault`,
-which can be sent to another process. What may happen in the middle of a task takes `step`, the number of the primitive, and
-`seconds` after that began.
+Each function of the table below returns a `PlantedFault`, which can be sent to another process. A fault that may occur during a
+task takes `step`, the number of a primitive, and `seconds` after the beginning of that primitive.
 
 ==================================================== ============================================================
-`hidden_wall`, `stranger`                            something in the way, which the robot doesn't, or does, perceive
-`displaced`, `knocked`, `gone`, `lying`              an object that isn't as it was
-`heavy`, `slippery`, `sealed`, `drained`             an object that isn't as it should be
-`place_displaced`, `settings`                        knowledge that is wrong
-`lets_go`, `arm_at`, `jammed`, `joint_range`         a robot that isn't as it should be
-`weak_arm`, `slow_arm`, `weak_grip`, `shut`          the same, for want of strength
-`noisy`, `misaligned`, `misread`                     perception that isn't as it should be
-`stiff`, `stopped`, `swung`, `sprung`                a joint of furniture that isn't as it should be
-`unlatched`, `greasy`                                a button that doesn't stay in; a handle that slips
+`hidden_wall`, `stranger`                            an obstacle that the robot does not, or does, perceive
+`displaced`, `knocked`, `gone`, `lying`              an object in another pose
+`heavy`, `slippery`, `sealed`, `drained`             an object with other properties
+`place_displaced`, `settings`                        wrong knowledge
+`lets_go`, `arm_at`, `jammed`, `joint_range`         a defect of the robot
+`weak_arm`, `slow_arm`, `weak_grip`, `shut`          a weakness of the robot
+`noisy`, `misaligned`, `misread`                     a defect of perception
+`stiff`, `stopped`, `swung`, `sprung`                a defective joint of furniture
+`unlatched`, `greasy`                                a button that does not latch, a handle that slips
 ==================================================== ============================================================
 """
 
@@ -38,40 +37,40 @@ P = ParamSpec("P")
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 PLANTS: dict[str, Callable[..., None]] = {}
-"""What plants the faults, by name."""
+"""The functions that plant the faults, by name."""
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A fault with its arguments; called with a world, it is planted there."""
+class PlantedFault:
+    """A fault with its arguments. Calling it with a world plants it there."""
 
     kind: str
     arguments: tuple[Any, ...]
     options: tuple[tuple[str, Any], ...] = ()
 
     def __call__(self, world: Engine) -> None:
-        """Plant it."""
+        """Plant the fault in a world."""
         PLANTS[self.kind](world, *self.arguments, **dict(self.options))
 
     def __str__(self) -> str:
-        """Return it as it is written in Python."""
+        """Return the fault as a Python expression."""
         options = [f"{name}={value!r}" for name, value in self.options]
         return f"{self.kind}({', '.join([*map(repr, self.arguments), *options])})"
 
 
-def fault(plant: Callable[Concatenate[Engine, P], None]) -> Callable[P, Fault]:
-    """Turn a function that plants a fault in a world into one that chooses the fault."""
+def fault(plant: Callable[Concatenate[Engine, P], None]) -> Callable[P, PlantedFault]:
+    """Register a function that plants a fault, and return a function that creates the `PlantedFault` from the arguments."""
     PLANTS[plant.__name__] = plant
 
     @wraps(plant)
-    def choose(*arguments: P.args, **options: P.kwargs) -> Fault:
-        return Fault(plant.__name__, arguments, tuple(options.items()))
+    def choose(*arguments: P.args, **options: P.kwargs) -> PlantedFault:
+        return PlantedFault(plant.__name__, arguments, tuple(options.items()))
 
     return choose
 
 
 def later(world: Engine, step: int, seconds: float, act: Callable[[Engine], None]) -> None:
-    """Do something once, some simulated seconds after primitive number `step` began."""
+    """Call `act` once, `seconds` of simulated time after the beginning of primitive number `step`."""
     began: int | None = None
     earlier = world.disturb
 
@@ -87,14 +86,14 @@ def later(world: Engine, step: int, seconds: float, act: Callable[[Engine], None
     world.disturb = look
 
 
-# ------------------------------------------------------------------------------------------------- in the way
+# ------------------------------------------------------------------------------------------------- obstacles
 
 
 @fault
 def hidden_wall(
     world: Engine, before: str, distance: float = 0.075, size: tuple[float, float, float] = (0.02, 0.12, 0.16)
 ) -> None:
-    """Put up a wall that the robot doesn't perceive, `distance` metres on the robot's side of an object or place.
+    """Put up a wall that the robot does not perceive, `distance` metres on the robot's side of an object or place.
 
     `size` is its extent in metres along the line from robot to object, across it, and up.
     """
@@ -116,7 +115,7 @@ def hidden_wall(
 def stranger(
     world: Engine, point: tuple[float, float, float], size: tuple[float, float, float] = (0.06, 0.06, 0.12)
 ) -> None:
-    """Put a box on the table that the robot perceives and that no fact speaks of."""
+    """Put a box on the table that the robot perceives but no fact mentions."""
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", mass=1.0, grasp_height=size[2] / 2, numbers=numbers)
     body = KINDS["box"].make(world.client, shape, np.array(point), np.array(UPRIGHT))
@@ -127,7 +126,7 @@ def stranger(
 
 
 def _put(world: Engine, name: str, base: Array, orientation: tuple[float, float, float, float] = UPRIGHT) -> None:
-    """Put a body somewhere, awake and at rest."""
+    """Move a body to a base position and orientation, and wake it."""
     thing = world.bodies[name]
     up = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)[:, 2]
     middle = (base + center_height(thing.shape) * up).tolist()
@@ -139,7 +138,7 @@ def _put(world: Engine, name: str, base: Array, orientation: tuple[float, float,
 
 @fault
 def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1, seconds: float = 0.0) -> None:
-    """Shift an object by metres along x and y; what it contains stays behind."""
+    """Shift an object by metres along x and y; its contents stay behind."""
 
     def shift(world: Engine) -> None:
         _put(world, body, world.truth(body)[1] + np.array([*by, 0.0]))
@@ -152,7 +151,7 @@ def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1,
 
 @fault
 def knocked(world: Engine, body: str, step: int, seconds: float, speed: float = 1.5) -> None:
-    """Hit an object's rim, so that it falls over."""
+    """Hit an object's rim so that it falls over."""
 
     def hit(world: Engine) -> None:
         thing = world.bodies[body]
@@ -163,7 +162,7 @@ def knocked(world: Engine, body: str, step: int, seconds: float, speed: float = 
 
 @fault
 def gone(world: Engine, body: str, step: int = -1, seconds: float = 0.0) -> None:
-    """Take an object away."""
+    """Remove an object."""
 
     def take(world: Engine) -> None:
         thing = world.bodies.pop(body)
@@ -207,7 +206,7 @@ def slippery(world: Engine, body: str, friction: float = 0.022) -> None:
 
 @fault
 def sealed(world: Engine, vessel: str, radius: float = 0.0235, height: float = 0.075) -> None:
-    """Let a ball swim in a vessel that is too large for its neck: tilted, it closes the neck."""
+    """Put a ball into a vessel that is too large for its neck, so that it blocks the neck when the vessel is tilted."""
     rotation, base = world.truth(vessel)
     ball = pybullet.createMultiBody(
         0.01,
@@ -221,7 +220,7 @@ def sealed(world: Engine, vessel: str, radius: float = 0.0235, height: float = 0
 
 @fault
 def drained(world: Engine, vessel: str, left: int = 0) -> None:
-    """Leave only so many beads in a vessel."""
+    """Remove all but `left` beads from a vessel."""
     rotation, base = world.truth(vessel)
     reach = KINDS[world.bodies[vessel].shape.kind].outer(world.bodies[vessel].shape)
     inside, get = [], pybullet.getBasePositionAndOrientation
@@ -239,7 +238,7 @@ def drained(world: Engine, vessel: str, left: int = 0) -> None:
 
 @fault
 def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
-    """Let a place be elsewhere than where it was when reach was computed, by metres along x and y."""
+    """Shift a place, by metres along x and y, after reach was computed."""
     known = world.embodiment.places[place]
     x, y, z = known.position
     moved = replace(known, position=(x + by[0], y + by[1], z))
@@ -248,7 +247,7 @@ def place_displaced(world: Engine, place: str, by: tuple[float, float]) -> None:
 
 @fault
 def settings(world: Engine, /, behavior: str, **numbers: float) -> None:
-    """Carry a behaviour out with other numbers than the ontology's."""
+    """Execute a behaviour with numbers that differ from the ontology's."""
     use = world.embodiment.skills[behavior]
     changed = replace(use, numbers={**use.numbers, **numbers})
     world.embodiment = replace(world.embodiment, skills={**world.embodiment.skills, behavior: changed})
@@ -259,7 +258,7 @@ def settings(world: Engine, /, behavior: str, **numbers: float) -> None:
 
 @fault
 def stiff(world: Engine, link: str, friction: float) -> None:
-    """Let a joint resist with so many newtons, or newton metres."""
+    """Set the friction of a joint, in newtons or newton metres."""
     mechanic = world.links[link]
     pybullet.setJointMotorControl2(
         mechanic.body,
@@ -273,7 +272,7 @@ def stiff(world: Engine, link: str, friction: float) -> None:
 
 @fault
 def stopped(world: Engine, link: str, lower: float, upper: float, step: int = -1, seconds: float = 0.0) -> None:
-    """Let a joint go no farther than from one value to another, which the robot doesn't know."""
+    """Narrow the limits of a joint of furniture without the robot's knowledge."""
     mechanic = world.links[link]
 
     def stop(world: Engine) -> None:
@@ -293,7 +292,7 @@ def stopped(world: Engine, link: str, lower: float, upper: float, step: int = -1
 
 @fault
 def swung(world: Engine, link: str, value: float, step: int, seconds: float) -> None:
-    """Move a joint to a value, as a person might."""
+    """Set a joint of furniture to a value, as a person might."""
     mechanic = world.links[link]
 
     def swing(world: Engine) -> None:
@@ -304,7 +303,7 @@ def swung(world: Engine, link: str, value: float, step: int, seconds: float) -> 
 
 @fault
 def sprung(world: Engine, link: str, rest: float, force: float, step: int = 0, seconds: float = 0.0) -> None:
-    """Let a spring draw a joint to a value."""
+    """Pull a joint to the value `rest` by a spring."""
     mechanic = world.links[link]
 
     def draw(world: Engine) -> None:
@@ -322,7 +321,7 @@ def sprung(world: Engine, link: str, rest: float, force: float, step: int = 0, s
 
 @fault
 def unlatched(world: Engine, link: str) -> None:
-    """Let a button that should stay in when it is pressed come out again."""
+    """Remove the latch of a button, so that it springs back after a press."""
     mechanic = world.links[link]
     links = tuple(replace(one, latches=one.latches and one.name != link) for one in mechanic.mechanism.links)
     mechanic.mechanism = replace(mechanic.mechanism, links=links)
@@ -330,7 +329,7 @@ def unlatched(world: Engine, link: str) -> None:
 
 @fault
 def greasy(world: Engine, link: str, friction: float = 0.01) -> None:
-    """Give a link, its handle included, another coefficient of friction."""
+    """Give a link, including its handle, another coefficient of friction."""
     mechanic = world.links[link]
     pybullet.changeDynamics(
         mechanic.body,
@@ -347,13 +346,13 @@ def greasy(world: Engine, link: str, friction: float = 0.01) -> None:
 
 @fault
 def lets_go(world: Engine, hand: str, step: int, seconds: float) -> None:
-    """Open a hand in the middle of something."""
+    """Open a hand during a primitive."""
     later(world, step, seconds, lambda world: world.hands[hand].open())
 
 
 @fault
 def arm_at(world: Engine, hand: str, point: tuple[float, float, float], yaw: float, step: int) -> None:
-    """Let an arm be where nobody sent it: with its hand at a point, pointing along `yaw`."""
+    """Move an arm without a command, so that its hand is at a point and points along `yaw`."""
 
     def go(world: Engine) -> None:
         arm = world.hands[hand].arm
@@ -369,7 +368,7 @@ def arm_at(world: Engine, hand: str, point: tuple[float, float, float], yaw: flo
 
 @fault
 def jammed(world: Engine, hand: str, joint: int, step: int, seconds: float) -> None:
-    """Let a joint of an arm stay where it is from then on, which the robot doesn't know."""
+    """Lock a joint of an arm at its present angle without the robot's knowledge."""
 
     def jam(world: Engine) -> None:
         manipulator = world.hands[hand]
@@ -387,7 +386,7 @@ def jammed(world: Engine, hand: str, joint: int, step: int, seconds: float) -> N
 
 @fault
 def joint_range(world: Engine, hand: str, joint: int, lower: float, upper: float) -> None:
-    """Give a joint of an arm narrower limits, in radians, which the robot knows."""
+    """Give a joint of an arm other limits, in radians, with the robot's knowledge."""
     manipulator = world.hands[hand]
     low, high = manipulator.arm.lower.copy(), manipulator.arm.upper.copy()
     low[joint], high[joint] = lower, upper
@@ -396,27 +395,27 @@ def joint_range(world: Engine, hand: str, joint: int, lower: float, upper: float
 
 @fault
 def weak_arm(world: Engine, hand: str, share: float) -> None:
-    """Leave the motors of an arm only a share of their torque."""
+    """Reduce the torque of an arm's motors to a share."""
     manipulator = world.hands[hand]
     manipulator.efforts = tuple(effort * share for effort in manipulator.efforts)
 
 
 @fault
 def slow_arm(world: Engine, hand: str, share: float) -> None:
-    """Let an arm move at a share of its speeds only, which the robot knows."""
+    """Reduce the speeds of an arm to a share, with the robot's knowledge."""
     world.hands[hand].pace = share
 
 
 @fault
 def weak_grip(world: Engine, hand: str, newtons: float) -> None:
-    """Let the fingers of a hand press with less force."""
+    """Set the force with which the fingers of a hand press."""
     manipulator = world.hands[hand]
     manipulator.hand = replace(manipulator.hand, grip=newtons)
 
 
 @fault
 def shut(world: Engine, hand: str) -> None:
-    """Let the fingers of a hand stay closed."""
+    """Lock the fingers of a hand in the closed position."""
     manipulator = world.hands[hand]
     for finger in manipulator.fingers:
         pybullet.resetJointState(manipulator.body, finger, 0.0, physicsClientId=world.client)
@@ -430,13 +429,13 @@ def shut(world: Engine, hand: str) -> None:
 
 @fault
 def noisy(world: Engine, metres: float) -> None:
-    """Let perceived positions scatter with a standard deviation of so many metres."""
+    """Set the standard deviation of perceived positions, in metres."""
     world.noise = metres
 
 
 @fault
 def misaligned(world: Engine, by: tuple[float, float]) -> None:
-    """Let everything be perceived off by metres along x and y, as with a camera that was pushed."""
+    """Shift all perceived positions by metres along x and y, as a displaced camera would."""
     true_sense = world.sense
 
     def sense(name: str) -> tuple[Array, Array]:
@@ -448,7 +447,7 @@ def misaligned(world: Engine, by: tuple[float, float]) -> None:
 
 @fault
 def misread(world: Engine, link: str, by: float) -> None:
-    """Let a joint's value be perceived off by metres or radians."""
+    """Shift a joint's perceived value by metres or radians."""
     mechanic = world.links[link]
     true_values = mechanic.values
 

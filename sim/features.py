@@ -1,7 +1,7 @@
-"""Where a hand can take hold: the features of things as frames, and the ways to bring a hand to them.
+"""Grasp features of things as frames, and the hand's candidate turns at them.
 
-A frame has x where the fingers point, y from finger to finger, and z along what they close around. A hand points level, so of the
-ways to turn about z those are left in which it does: all of them if z is upright, else at most two.
+In a feature's frame, x is the fingers' direction, y leads from finger to finger, and z is the axis that the fingers close around.
+A hand always points level. That allows every turn about z if z is upright, else at most two.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sim.urdf import Array
 from sim.verdict import SkillError
 
 AROUND = 2 * np.pi - 0.01
-"""Who may turn by more than that may turn all the way round."""
+"""Range in radians from which on a hand may turn all the way round."""
 
 TURNS = 13
-"""So many ways to turn about an upright bar are tried."""
+"""Number of turns tried about an upright bar with limited range."""
 
 
 @dataclass(frozen=True)
-class Frame:
-    """A feature in the world: rotation (3, 3), point (3,), and from where to where a hand may turn about its z (radians)."""
+class FeatureFrame:
+    """A feature in the world: rotation (3, 3), point (3,), and the range of a hand's turn about its z, in radians."""
 
     rotation: Array
     point: Array
@@ -37,7 +37,7 @@ class Frame:
 
     @property
     def upright(self) -> bool:
-        """Whether z is vertical, so that a hand is level however it turns."""
+        """Whether z is vertical, so that every turn about it leaves the hand level."""
         return bool(np.hypot(self.rotation[2, 0], self.rotation[2, 1]) < 1e-6)
 
     def turns(self) -> Array:
@@ -57,19 +57,19 @@ class Frame:
 
 @dataclass(frozen=True)
 class Ways:
-    """How a hand may be at a feature: turned about its z by `first` radians, after the joint has moved by `last`; elbow swivels."""
+    """Candidates (n,) for a hand at a feature: turn about its z at first and after the joint's motion, and the elbow's swivel."""
 
     first: Array
     last: Array
     swivel: Array
 
     def pick(self, i: int) -> Ways:
-        """Return one of the ways."""
+        """Return the candidate of number `i`."""
         return Ways(self.first[i : i + 1], self.last[i : i + 1], self.swivel[i : i + 1])
 
 
-def ways(frame: Frame, moving: bool) -> Ways:
-    """Return all ways to be at a feature that are tried; with a joint that is `moving` the hand may turn on the way."""
+def ways(frame: FeatureFrame, moving: bool) -> Ways:
+    """Return all candidates at a feature; if its joint is `moving`, the hand may turn during the motion."""
     turns = frame.turns()
     if not moving or not frame.upright or len(turns) == len(YAWS):
         turn, swivel = (part.ravel() for part in np.meshgrid(turns, SWIVELS))
@@ -77,33 +77,33 @@ def ways(frame: Frame, moving: bool) -> Ways:
     return Ways(*(part.ravel() for part in np.meshgrid(turns, turns, SWIVELS)))
 
 
-def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] | None = None) -> Frame:
-    """Return where a feature of a place or object is perceived to be, or that of a link is, maybe with joints at other `values`.
+def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
+    """Return the frame of a feature: perceived for an object, true for a place or link, with joints at `values` if given.
 
     Raises
     ------
     SkillError
-        The thing is nowhere to be seen, or has no such feature.
+        The object is not visible, or has no such feature.
     """
     if name in engine.embodiment.places:
-        return Frame(np.eye(3), engine.place(name))
+        return FeatureFrame(np.eye(3), engine.place(name))
     if name in engine.links:
         mechanic = engine.links[name]
         found = mechanic.link(name).features.get(feature)
         if found is None:
             raise SkillError("ill-defined", (name,), f"{name} has no feature '{feature}'")
         turned, point = feature_frame(mechanic.frame(name, values), found)
-        return Frame(turned, point, found.low, found.high)
+        return FeatureFrame(turned, point, found.low, found.high)
     base = engine.sense(name)[1]
     shape = engine.bodies[name].shape
     height = {"base": 0.0, "grip": shape.grasp_height, "top": height_of(shape)}.get(feature)
     if height is None:
         raise SkillError("ill-defined", (name,), f"{name} has no feature '{feature}'")
-    return Frame(np.eye(3), base + np.array([0.0, 0.0, height]))
+    return FeatureFrame(np.eye(3), base + np.array([0.0, 0.0, height]))
 
 
 def touched(engine: Engine, name: str, feature: str) -> tuple[str, ...]:
-    """Return the parts of a link that a hand touches at a feature, or the thing itself."""
+    """Return the parts of a link that a hand touches at a feature; for anything else its name."""
     if name in engine.links:
         found: Feature | None = engine.links[name].link(name).features.get(feature)
         return found.parts if found is not None else ()

@@ -23,50 +23,50 @@ from sim.picture import Camera, hide_vessels, picture, view_of
 from sim.urdf import Array
 
 if TYPE_CHECKING:
-    from sim.world import Step
+    from sim.world import PrimitiveStep
 
 SIZES = (17, 15, 13, 11)
-"""Font sizes of the caption; the first that fits is used."""
+"""Font sizes of the caption, of which the first that fits is used."""
 
 BAR = 46
-"""Pixels at the bottom that hold caption and plan strip."""
+"""Height in pixels of the bar at the bottom with caption and plan strip."""
 
 NAMED = 480
-"""From so many pixels of width on there is room for names."""
+"""Minimum width in pixels of a picture with names."""
 
 SPEED = 2.5
-"""How much faster than the simulated time a film runs."""
+"""Ratio of simulated time to the film's time."""
 
 DONE, DOING, TODO = (64, 120, 200), (245, 150, 40), (206, 213, 222)
 
 
 class Film:
-    """Records a world that it watches: give it to `verify` as `watch`, and close it, or use it in a ``with`` statement.
+    """A film of a world: pass it to `verify` as `watch`, and close it, or use it in a ``with`` statement.
 
     Parameters
     ----------
     path : str or Path
         ``.mp4`` or ``.gif``; its folder must exist.
-    steps : sequence of Step
+    steps : sequence of PrimitiveStep
         The primitives, for the plan strip.
     titles : mapping of path to text
-        What to write for steps, by their position in the plan's tree; nothing else is written for those above the primitives.
+        Captions of steps by their position in the plan's tree. Steps above the primitives without a caption are left out.
     camera : Camera, optional
         By default one that looks at the table, with pictures of `width` by `height` pixels (divisible by 16).
     frames : int
         Frames per second of the film.
     speed : float
-        How much faster than the simulated time it runs.
+        Ratio of simulated time to the film's time.
     stills : str or Path, optional
         Folder for a PNG per primitive, taken at its end.
     names : mapping of name to text, optional
-        What people call places and objects; what isn't in it is called by its name.
+        Displayed names of places and objects; the others keep their own.
     """
 
     def __init__(
         self,
         path: str | Path,
-        steps: Sequence[Step],
+        steps: Sequence[PrimitiveStep],
         titles: Mapping[tuple[int, ...], str] | None = None,
         camera: Camera | None = None,
         frames: int = 12,
@@ -100,7 +100,7 @@ class Film:
             self._file.__exit__(kind, error, trace)  # which removes what was filmed
 
     def __call__(self, world: Engine) -> None:
-        """Take a frame if it is time for one; what that costs is rendering, by the world's clock."""
+        """Take a frame if one is due, and count its CPU time as rendering."""
         begin = time.process_time()
         self._take(world)
         world.clock.rendering += time.process_time() - begin
@@ -116,12 +116,12 @@ class Film:
             self._write(self._latest)
 
     def frame(self, world: Engine) -> Array:
-        """Return the picture of now, captioned."""
+        """Return the present picture with its caption."""
         self.camera = self.camera or view_of(world.embodiment, self.width, self.height, BAR)
         return self._caption(self._named(picture(world, self.camera), world), world.current)
 
     def close(self) -> None:
-        """Finish the file, which has its name only from now on."""
+        """Finish the film and move it to its path."""
         self._keep()
         if self._writer is None:
             return
@@ -133,7 +133,7 @@ class Film:
         self._file.close()
 
     def _keep(self) -> None:
-        """Keep the latest frame as the still of the primitive that has ended."""
+        """Save the latest frame as the still of the primitive that has ended."""
         if self.stills is None or self._latest is None or not 0 <= self._number < len(self.steps):
             return
         step = self.steps[self._number]
@@ -174,7 +174,7 @@ class Film:
         return np.asarray(canvas)
 
     def _caption(self, image: Array, number: int) -> Array:
-        """Write what is done, with the steps above it, and the strip of primitives below the picture."""
+        """Write the present primitive, with its parents, and the strip of all primitives below the picture."""
         height, width = image.shape[:2]
         canvas = Image.fromarray(image)
         draw = ImageDraw.Draw(canvas)

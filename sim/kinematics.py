@@ -1,12 +1,12 @@
-"""Which posture puts the hand where it should be: in closed form for arms that have one, else numerically.
+"""Inverse kinematics: the posture for a pose of the hand, in closed form where the arm has one, else numerically.
 
-An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A hand pose then leaves
-one freedom, the *swivel*. There are two kinds. Where all three axes of the wrist meet, as a human's do (KUKA's iiwa), the swivel is
-that of the elbow around the line from shoulder to wrist (0: the elbow hangs down, or is up if the arm rises from its shoulder at
-zero, as one does that is mounted on a table; positive turns it about that line). Where the last axis passes the point in which the
-two before it meet (Franka's Panda), it is the angle of the last joint from the middle of its limits, less the hand's roll, which
-that joint makes: with it given, the other six have a closed form as well. All other arms of seven joints or six are solved by
-`sim.numeric`: of seven the swivel is that of the third joint, of six there is none but 0.
+An arm with a closed form has three axes through the shoulder, one at the elbow and three at the wrist. A pose of the hand leaves it
+one degree of freedom, the *swivel*. There are two kinds. If all three axes of the wrist meet (KUKA's iiwa), the swivel is the
+elbow's angle about the line from shoulder to wrist. At 0 the elbow hangs down, or is up if the arm rises from its shoulder at the
+zero posture, as on a table. If the last axis misses the point where the two before it meet (Franka's Panda), the swivel is the
+angle of the last joint from the middle of its limits, less the hand's roll, which that joint makes; given it, the other six joints
+have a closed form. `sim.numeric` solves all other arms. With seven joints the swivel is the angle of the third; with six it is
+always 0.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
 shoulder, elbow, wrist.
@@ -21,11 +21,11 @@ from sim.numeric import REDUNDANT, solved
 from sim.urdf import Array
 
 STRETCHED = 0.9999
-"""Cosine of the angle between where a joint is and where its two solutions meet, up to which they are told apart."""
+"""Largest cosine of the angle between a joint and the point where its two solutions meet, at which they still differ."""
 
 
 def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fold: float = 0.0) -> tuple[Array, Flags]:
-    """Return postures (n, k) that put the hand at rotations `r`, points `p` with the arm's `swivel`, and which are valid.
+    """Return postures (n, k) with the hand at rotations `r` and points `p` and the arm at `swivel`, and which of them are valid.
 
     Parameters
     ----------
@@ -34,16 +34,16 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     margin : float
         Distance in radians that every joint keeps from its limits.
     fold : float
-        Distance in radians that a joint keeps from where its two solutions meet: beyond it a point is out of reach.
+        Distance in radians that a joint keeps from the point where its two solutions meet, beyond which the hand is out of reach.
 
     Returns
     -------
     q : array (n, k), radians
         Meaningless where not valid.
     valid : array (n,) of bool
-        The point is in reach and every joint within its limits. Of the two postures of a sphere only the one that has the
-        middle joint within ±90° is considered, about parallel axes the one that is farther from the limits, without a closed form
-        the one to which the arm is led from rest, so neighbouring poses give neighbouring postures.
+        The point is in reach and every joint within its limits. Only one of the two postures of a spherical joint is considered, so
+        that neighbouring poses have neighbouring postures: the one with the middle joint within ±90°; with parallel axes, the one
+        farther from the limits; without a closed form, the one that the arm reaches when it is led from rest.
     """
     if not arm.closed:
         return solved(arm, r, p, swivel, margin, fold)
@@ -53,7 +53,7 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
 
 
 def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the elbow at a swivel about the line from shoulder to wrist, and which are in reach."""
+    """Return postures with the elbow at `swivel` about the line from shoulder to wrist, and which of them are in reach."""
     last = r @ arm.tip_rotation.T
     wrist = p + np.einsum("nij,j->ni", last, arm.wrist - arm.tip)
     a, b, zero, bent, side = arm.limbs
@@ -78,7 +78,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _gentler(arm: Arm, r: Array, first: int) -> Array:
-    """Return the angles (n, 3) of the sphere that begins with a joint; about parallel axes those farther from its limits."""
+    """Return the angles (n, 3) of the spherical joint from joint `first` on; with parallel axes, those farther from the limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:
@@ -89,10 +89,11 @@ def _gentler(arm: Arm, r: Array, first: int) -> Array:
 
 
 def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the last joint at `swivel` and the hand's roll from the middle of its limits, and which are in reach.
+    """Return postures with the last joint at `swivel` plus the hand's roll from its middle, and which of them are in reach.
 
-    The last angle gives where the wrist is (w) and where the sixth axis points (e). The wrist's distance from the shoulder
-    gives the elbow's angle, the angle between w and e the fifth's, and the two directions together the shoulder's turn.
+    The last angle determines the wrist (w) and the direction of the sixth axis (e). The wrist's distance from the shoulder
+    determines the elbow's angle, the angle between w and e that of the fifth joint, and both directions together the shoulder's
+    rotation.
     """
     shoulder, fourth, fifth, sixth = arm.shoulder, arm.axes[3], arm.axes[4], arm.axes[5]
     hand = r @ arm.tip_rotation.T
@@ -106,7 +107,7 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
     )
     elbow = elbow[:, 1 if _wrapped(arm.middle[3] - _phase(fourth, upper, lower)) > 0 else 0]
     bent = turn(fourth, elbow)
-    v = np.swapaxes(bent, -1, -2) @ upper + lower  # from shoulder to wrist as the forearm sees it
+    v = np.swapaxes(bent, -1, -2) @ upper + lower  # from shoulder to wrist in the forearm's frame
     both, met = _angles_of(fifth, v, sixth, np.einsum("ni,ni->n", w, e), most)
     found = []
     for angle in both.T:
@@ -119,31 +120,31 @@ def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> 
         others = np.stack([elbow, angle, last, seventh], -1)
         found += [np.concatenate([way, others], -1) for way in (three, _flipped(three, arm.axes[:3]))]
     offsets = _wrapped(np.stack(found) - arm.middle)
-    strain = np.abs(offsets / (arm.upper - arm.lower)).max(-1)  # the farther from all limits, the better
+    strain = np.abs(offsets / (arm.upper - arm.lower)).max(-1)  # prefer the posture farthest from all limits
     return arm.middle + offsets[np.argmin(strain, axis=0), np.arange(len(p))], reached & met
 
 
 def _flipped(three: Array, axes: Array) -> Array:
-    """Return the other angles (n, 3) that turn alike."""
+    """Return the other angles (n, 3) of the same rotation."""
     x, y, z = three.T
     return np.stack([x + np.pi, (0.0 if abs(axes[0] @ axes[2]) > 0.5 else np.pi) - y, z + np.pi], -1)
 
 
 def _rolled(arm: Arm, r: Array) -> Array:
-    """Return by how much (n,) the last joint alone would have rolled a level hand."""
+    """Return the roll (n,) of level hands, as an angle of the last joint."""
     along = np.sign(arm.axes[6] @ arm.tip_rotation[:, 0])
     return np.asarray(along * np.arctan2(r[:, 2, 1], r[:, 2, 2]))
 
 
 def _phase(axis: Array, a: Array, b: Array) -> float:
-    """Return the angle about an axis at which the turned `b` is nearest to `a`."""
+    """Return the angle about an axis by which `b` has to turn to come nearest to `a`."""
     return float(np.arctan2(a @ cross(axis, b), a @ b - (a @ axis) * (b @ axis)))
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
-    """Return both angles (n, 2) about an axis at which the turned `b` (3,) has a product with `a` (n, 3), and where there are.
+    """Return both angles (n, 2) about an axis at which `b` (3,), turned, has the given product with `a` (n, 3), and which exist.
 
-    Of what their cosine would be, at most `most` counts.
+    An angle exists if the cosine that determines it is below `most`.
     """
     cosine, sine = a @ b - (a @ axis) * (b @ axis), a @ cross(axis, b)
     reach = np.maximum(np.hypot(cosine, sine), 1e-9)
@@ -196,7 +197,7 @@ def three_angles(r: Array, axes: Array) -> Array:
 
 
 def swivel_of(arm: Arm, q: Array) -> Array:
-    """Return the swivel (n,) of postures: the inverse of what `inverse` was given."""
+    """Return the swivel (n,) of postures."""
     if not arm.closed:
         return q[:, REDUNDANT] - arm.middle[REDUNDANT] if arm.swivels else np.zeros(len(q))
     if not arm.spherical:

@@ -1,6 +1,6 @@
-"""Furniture with moving links as geometry: where links, features and solids are at which values of the joints.
+"""Geometry of mechanisms: the positions of links, features and solids for given joint values.
 
-A mechanism is a URDF, written from its parts or somebody's file. Lengths in metres, angles in radians.
+A mechanism is a URDF, either a given file or written from its parts. Lengths in metres, angles in radians.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, Place
 from sim.collision import Solid
-from sim.urdf import Array, Model, read_model, rotation
+from sim.urdf import Array, UrdfModel, read_model, rotation
 
 WIDER = 0.25
-"""The share of the way from `opened` to the end of a joint to which it is opened."""
+"""Share of the range from `opened` to a joint's upper limit by which the joint is opened further."""
 
 HERE = np.zeros(3)
 
 BASE = "base"
-"""The link of a generated URDF that stands fast."""
+"""The fixed link of a generated URDF."""
 
 
 def urdf_name(mechanism: Mechanism, link: str) -> str:
@@ -31,8 +31,8 @@ def urdf_name(mechanism: Mechanism, link: str) -> str:
     return found.urdf_link or found.name
 
 
-def moved(mechanism: Mechanism, model: Model, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
-    """Return rotation and shift of a link against the zero posture, its joints at `values` (by link, else 0)."""
+def moved(mechanism: Mechanism, model: UrdfModel, name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """Return a link's rotation and shift relative to the zero posture, with the joints at `values` (by link, default 0)."""
     turned, shift = np.eye(3), np.zeros(3)
     by_urdf = {urdf_name(mechanism, link.name): values.get(link.name, 0.0) for link in mechanism.links}
     for joint in model.chain(urdf_name(mechanism, name)):
@@ -54,8 +54,8 @@ def about(axis: Array, angle: float) -> Array:
     return matrix
 
 
-def solids(mechanism: Mechanism, model: Model, values: Mapping[str, float], aside: Array = HERE) -> Iterator[Solid]:
-    """Yield the solids of a mechanism with its joints at `values`, named after it and their parts, all of it `aside` by metres."""
+def solids(mechanism: Mechanism, model: UrdfModel, values: Mapping[str, float], aside: Array = HERE) -> Iterator[Solid]:
+    """Yield the solids of a mechanism with its joints at `values`, shifted by `aside` (3,) metres."""
     owners = {urdf_name(mechanism, link.name): link.name for link in mechanism.links}
     for link, primitives in model.primitives.items():
         owner = owners.get(link, mechanism.name)
@@ -66,12 +66,12 @@ def solids(mechanism: Mechanism, model: Model, values: Mapping[str, float], asid
 
 
 def open_values(mechanism: Mechanism) -> dict[str, float]:
-    """Return the joints' values when all is open."""
+    """Return the joint values of the mechanism with every link open."""
     return {link.name: wide(link) for link in mechanism.links}
 
 
 def wide(link: Link) -> float:
-    """Return the value to which a joint is opened: somewhat beyond the one from which on it counts as open.
+    """Return the value to which a joint is opened, somewhat beyond the value from which on it counts as open.
 
     >>> wide(Link("lid", "revolute", opened=1.2, upper=1.6))
     1.3
@@ -80,9 +80,9 @@ def wide(link: Link) -> float:
 
 
 def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list[Solid]]:
-    """Return the places, those that links carry in the world's frame, and the mechanisms' solids, all with every joint open.
+    """Return the places in the world's frame and the mechanisms' solids, both with every joint open.
 
-    Places on other carriers, which nobody knows the place of, are left out.
+    Places on movable bodies have no fixed position and are left out.
     """
     places = {name: place for name, place in embodiment.places.items() if not place.carrier}
     around: list[Solid] = []
@@ -100,19 +100,19 @@ def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list
 
 
 def feature_frame(frame: tuple[Array, Array], feature: Feature) -> tuple[Array, Array]:
-    """Return where a feature is when its link's frame is `frame`."""
+    """Return the frame of a feature in the world, given its link's frame."""
     turned, origin = frame
     return turned @ rotation(*feature.turned), origin + turned @ np.array(feature.position)
 
 
-def read_mechanism(mechanism: Mechanism) -> Model:
+def read_mechanism(mechanism: Mechanism) -> UrdfModel:
     """Return a mechanism's model at the zero posture, placed in the world."""
     text = Path(mechanism.urdf).read_text(encoding="utf-8") if mechanism.urdf else written(mechanism)
     return read_model(text, mechanism.urdf or mechanism.name, mechanism.position, mechanism.yaw, False)
 
 
 def written(mechanism: Mechanism) -> str:
-    """Return a mechanism as URDF text, in short lines, as PyBullet's parser wants them."""
+    """Return a mechanism as URDF text, in short lines as PyBullet's parser requires."""
     lines = [f'<robot name="{mechanism.name}">', *_link(BASE, mechanism.parts, 0.0)]
     for link in mechanism.links:
         lines += _link(link.name, link.parts, link.mass)
@@ -130,14 +130,14 @@ def written(mechanism: Mechanism) -> str:
 
 
 def _link(name: str, parts: Sequence[Part], mass: float) -> list[str]:
-    """Return a link; its inertia is that of a box around its parts."""
+    """Return a link as lines of URDF, with the inertia of the box around its parts."""
     center, extent = np.zeros(3), np.full(3, 0.1)
     if parts:
         low = np.min([np.array(p.position) - np.array(p.size) / 2 for p in parts], axis=0)
         high = np.max([np.array(p.position) + np.array(p.size) / 2 for p in parts], axis=0)
         center, extent = (low + high) / 2, high - low
     if not mass:
-        center = np.zeros(3)  # the base stands fast; PyBullet then takes its frame for its centre of mass
+        center = np.zeros(3)  # the base is fixed; PyBullet then takes its frame for its centre of mass
     squares = extent**2
     ixx, iyy, izz = (max(mass, 1e-3) / 12 * (squares.sum() - square) for square in squares)
     lines = [

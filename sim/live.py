@@ -1,9 +1,8 @@
-"""A physical world in which people interfere: the world that the executive acts in (`planner.acting.executive`).
+"""A physical world with interventions, in which the executive acts (`planner.acting.executive`).
 
-Rule 1: an intervention acts on bodies: a cup that is moved is taken out of the hand, and what is in it goes with it.
-Rule 2: a primitive is stopped where it is as soon as something happens to what it concerns.
-Rule 3: a hand that stands where no fact names its position, or is empty and lies on its side, stands upright and is lifted
-before anything is reported.
+Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents.
+Rule 2: an intervention that changes an object of the running primitive stops the primitive.
+Rule 3: a hand at a position without a fact, or an empty tilted hand, is brought upright and lifted before facts are observed.
 """
 
 from __future__ import annotations
@@ -29,23 +28,23 @@ from sim.verdict import SkillError, Verdict
 from sim.world import World
 
 STOPPED = 0.02
-"""Radians by which a joint stays behind its command if something stops it."""
+"""Lag in radians of a joint behind its command from which on its arm counts as stopped."""
 
 UPRIGHT = 0.1
-"""Radians by which a hand that stands upright may be tilted."""
+"""Maximum tilt in radians of an upright hand."""
 
 PAUSE = 60
-"""Simulation steps in which what was moved comes to rest."""
+"""Simulation steps after an intervention in which bodies come to rest."""
 
 
 class LiveWorld:
-    """A `World` that can be disturbed.
+    """A `World` with interventions.
 
     Parameters
     ----------
     world : World
     classes : mapping of class to individuals
-        To give an object that is added the shape of one of its class.
+        An object that an intervention adds gets the shape of an object of its class.
     """
 
     def __init__(self, world: World, classes: Mapping[str, Sequence[str]]) -> None:
@@ -60,11 +59,11 @@ class LiveWorld:
         return self.world.seconds
 
     def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of what shall happen at a time."""
+        """Schedule the interventions that have a time."""
         self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
 
     def observe(self) -> State:
-        """Return the facts that are perceived now."""
+        """Return the facts perceived now, after bringing hands without a perceivable position upright and up."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}
@@ -73,7 +72,7 @@ class LiveWorld:
         return self.world.observe() if lost else seen
 
     def execute(self, step: Step) -> Verdict:
-        """Carry out a primitive, or stop it when something happens to what it concerns."""
+        """Execute a primitive; stop it when an intervention changes one of its objects."""
         self.concerned = {*step.arguments, *step.bindings.values()}
         held = [self.world.held(hand) for hand in step.arguments if hand in self.world.hands]
         self.concerned |= {body for body in held if body is not None}
@@ -86,10 +85,10 @@ class LiveWorld:
         return verdict
 
     def take_stock(self) -> None:
-        """After a failure, begin from how things are.
+        """Adopt the present state after a failure.
 
-        An arm that something stopped no longer presses against it, and what slipped in a hand is held the way it is now: the next
-        primitive asks if it slips further.
+        A stopped arm is commanded to its present posture, so that it no longer presses. The present grasp of a held object becomes
+        the reference for further slip.
         """
         stopped = [h for h in self.world.hands.values() if float(np.abs(h.measured() - h.posture).max()) > STOPPED]
         for hand in stopped:
@@ -102,11 +101,11 @@ class LiveWorld:
                 hand.grasp = self.world.in_hand(hand, held)
 
     def impossible(self, intervention: Intervention) -> str | None:
-        """Return why an intervention can't happen in this world, whenever that is; None if it can."""
+        """Return why an intervention is impossible in this world at any time, or None if it is possible."""
         if intervention.change is Change.ADD and self._model_of(intervention.kind) is None:
-            return f"no {intervention.kind} of this scene has a shape that {intervention.individual} could take"
+            return f"no {intervention.kind} of this scene has a shape for {intervention.individual}"
         if intervention.change is Change.REMOVE and intervention.individual not in self.world.bodies:
-            return f"{intervention.individual} is no body on the table (those are {', '.join(self.world.bodies)})"
+            return f"{intervention.individual} is no body of this world (bodies: {', '.join(self.world.bodies)})"
         if not intervention.of_world:
             return None
         perceivers = self.world.embodiment.perceivers
@@ -114,21 +113,21 @@ class LiveWorld:
             use = perceivers.get(fact.symbol.situation)
             if use is None or use.perceiver not in DISTURBERS:
                 able = [name for name, use in perceivers.items() if use.perceiver in DISTURBERS]
-                return f"nobody can make {fact} true by hand; people change {' and '.join(able)}"
+                return f"an intervention cannot make {fact} true; interventions change {' and '.join(able)}"
             if fact.value not in self.world.embodiment.places and DISTURBERS[use.perceiver] is move:
                 places = ", ".join(self.world.embodiment.places)
                 return (
-                    f"{fact.symbol.arguments[0]} can't be put at '{fact.value}', which is no place (those are {places})"
+                    f"{fact.symbol.arguments[0]} can't be put at '{fact.value}', which is no place (places: {places})"
                 )
         return None
 
     def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention happen now, and what it moved come to rest."""
+        """Apply an intervention now, and let the bodies come to rest."""
         self._interfere(intervention)
         self.world.run(PAUSE)
 
     def retreat(self, hand: str) -> None:
-        """Bring a hand with a load upright and up, as far as that is possible, and an empty one home by whatever way there is."""
+        """Bring a hand with a load upright and up, or an empty one home, as far as that is possible."""
         uses = {use.skill: use for use in self.world.embodiment.skills.values()}
         loaded = self.world.held(hand) is not None
         for name in ("lift",) if self._upright(hand) or not loaded else ("stand_upright", "lift"):
@@ -144,17 +143,17 @@ class LiveWorld:
     def _upright(self, hand: str) -> bool:
         return tilt_of(self.world.hands[hand].frame()[0]) < UPRIGHT
 
-    # ------------------------------------------------------------------------------------------------- interfering
+    # ------------------------------------------------------------------------------------------------- interventions
 
     def _each_step(self, world: Engine) -> None:
         happened = False
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
             self._interfere(intervention)
-            self.world.elsewhere = self.world.elsewhere | _named(intervention)  # the hand isn't to blame for that
+            self.world.elsewhere = self.world.elsewhere | _named(intervention)  # the hand didn't disturb these
             happened = happened or not _named(intervention).isdisjoint(self.concerned)
         if happened:
-            raise SkillError("interrupted", tuple(sorted(self.concerned)), "somebody interfered with what it concerns")
+            raise SkillError("interrupted", tuple(sorted(self.concerned)), "an intervention changed an object of it")
 
     def _interfere(self, intervention: Intervention) -> None:
         if intervention.change is Change.REMOVE:
@@ -163,10 +162,7 @@ class LiveWorld:
             self._add(intervention)
         else:
             for fact in intervention.facts:
-                if fact.symbol.arguments[0] in (
-                    *self.world.bodies,
-                    *self.world.links,
-                ):  # else somebody has taken it away
+                if fact.symbol.arguments[0] in (*self.world.bodies, *self.world.links):  # else it has been removed
                     self._make_true(fact)
 
     def _make_true(self, fact: Fact) -> None:
@@ -188,19 +184,19 @@ class LiveWorld:
             self._make_true(fact)
 
     def _model_of(self, kind: str) -> Body | None:
-        """Return what an object of a class looks like: the first of this scene that has a shape."""
+        """Return the body of the first object of a class that has a shape, or None."""
         bodies = self.world.embodiment.bodies
         return next((bodies[one] for one in self.classes.get(kind, ()) if one in bodies), None)
 
 
 def _named(intervention: Intervention) -> set[str]:
-    """Return what an intervention names: what is moved or changed, and what it becomes."""
+    """Return the individuals that an intervention names: the changed ones and their new values."""
     named = {intervention.individual, *(fact.symbol.arguments[0] for fact in intervention.facts)}
     return named | {fact.value for fact in intervention.facts}
 
 
 def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Put an object, and what is in it, at a place; a hand that holds it lets it go."""
+    """Put an object with its contents at a place; a hand that holds it opens."""
     name = symbol.arguments[0]
     for hand in world.hands:
         if world.held(hand) == name:
@@ -216,7 +212,7 @@ def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
 
 
 def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Empty a vessel, and fill it with something else unless that is nothing."""
+    """Empty a vessel, and fill it with the value unless that is `empty`."""
     for bead in contents(world, symbol.arguments[0]):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
@@ -225,7 +221,7 @@ def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
 
 
 def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
-    """Open or shut a link with what it carries; a hand that holds it lets it go."""
+    """Open or shut a link with the bodies that it carries; a hand that holds the link opens."""
     name = symbol.arguments[0]
     mechanic = world.links[name]
     for hand in world.hands.values():
@@ -243,7 +239,7 @@ def push_joint(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> N
 
 
 def take_away(world: World, name: str) -> None:
-    """Take an object, and what is in it, out of the world, unless somebody was faster."""
+    """Remove an object and its contents from the world, if it is still there."""
     if name not in world.bodies:
         return
     for bead in contents(world, name):
@@ -270,7 +266,7 @@ def contents(world: World, vessel: str) -> list[Bead]:
 
 
 def world_position(world: World, bead: Bead) -> Array:
-    """Return where a bead is."""
+    """Return a bead's position (3,)."""
     return np.array(pybullet.getBasePositionAndOrientation(bead.body, physicsClientId=world.client)[0])
 
 
@@ -284,4 +280,4 @@ DISTURBERS: Mapping[str, Callable[[World, PerceiverUse, Symbol, str], None]] = {
     "perceive_content": fill,
     "perceive_joint": push_joint,
 }
-"""By the perceiver that reads a situation type off the world: how a person makes a value true."""
+"""By perceiver: the function that makes a value of its situation types true."""

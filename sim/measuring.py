@@ -1,4 +1,4 @@
-"""What skills measure: quantities of which guards say where a motion ends, and what must hold after it."""
+"""Quantities that skills measure. Guards on them end a motion, or must hold after it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from sim.verdict import SkillError
 
 
 def finger_force(run: Run, name: str) -> float:
-    """Return the newtons with which the weaker finger presses a body or link."""
+    """Return the force in newtons of the finger that presses a body or link less."""
     return min(finger_forces(run, name))
 
 
 def finger_forces(run: Run, name: str) -> tuple[float, ...]:
-    """Return the newtons with which each finger presses a body or link."""
+    """Return the force in newtons with which each finger presses a body or link."""
     hand, world = run.attempt.hand, run.world
     if name in world.links:
         mechanic = world.links[name]
@@ -35,7 +35,7 @@ def _slip(run: Run) -> float | None:
 
 
 def _load(run: Run) -> str:
-    """Return what the skill handles: what is in the hand, else its object."""
+    """Return the held body, else the skill's object."""
     return run.attempt.held or run.roles.get("object", "")
 
 
@@ -47,7 +47,7 @@ def _height(run: Run) -> float:
 
 
 def _bearing(run: Run) -> float:
-    """Return the newtons with which what is held, or was just let go, is borne by something other than the hand."""
+    """Return the force in newtons with which bodies other than the hand carry the load or the object just released."""
     world, load = run.world, _load(run)
     others = (c for c in world.contacts(world.bodies[load].body) if c[2] != run.attempt.hand.body)
     return float(sum(contact[9] * max(contact[7][2], 0.0) for contact in others))
@@ -75,25 +75,27 @@ def _astray(run: Run) -> float:
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """Something that can be measured: how, under which name it is told, and how a skill has failed if it is out of bounds."""
+class MeasuredQuantity:
+    """A quantity: the function that measures it, its name in a verdict, and the failure code if it is out of bounds."""
 
     measure: Callable[[Run], float | None]
-    told: str
+    name: str
     code: str
 
 
-QUANTITIES: Mapping[str, Quantity] = {
-    "slip": Quantity(_slip, "slip_m", "slip or drop"),
-    "tilt": Quantity(lambda run: tilt_of(run.world.truth(_load(run))[0]), "tilt_rad", "toppled"),
-    "height": Quantity(_height, "height_m", "misplaced"),
-    "off": Quantity(_off, "off_place_m", "misplaced"),
-    "joint": Quantity(_value, "joint", "stuck"),
-    "push": Quantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
-    "grip": Quantity(_grip, "grip_n", "slip or drop"),
-    "bearing": Quantity(_bearing, "bearing_n", "misplaced"),
-    "astray": Quantity(_astray, "off_stand_m", "misplaced"),
-    "leaning": Quantity(lambda run: tilt_of(run.world.truth(run.who("target")[0])[0]), "tilt_rad", "toppled"),
+QUANTITIES: Mapping[str, MeasuredQuantity] = {
+    "slip": MeasuredQuantity(_slip, "slip_m", "slip or drop"),
+    "tilt": MeasuredQuantity(lambda run: tilt_of(run.world.truth(_load(run))[0]), "tilt_rad", "toppled"),
+    "height": MeasuredQuantity(_height, "height_m", "misplaced"),
+    "off": MeasuredQuantity(_off, "off_place_m", "misplaced"),
+    "joint": MeasuredQuantity(_value, "joint", "stuck"),
+    "push": MeasuredQuantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
+    "grip": MeasuredQuantity(_grip, "grip_n", "slip or drop"),
+    "bearing": MeasuredQuantity(_bearing, "bearing_n", "misplaced"),
+    "astray": MeasuredQuantity(_astray, "off_stand_m", "misplaced"),
+    "leaning": MeasuredQuantity(
+        lambda run: tilt_of(run.world.truth(run.feature_of("target")[0])[0]), "tilt_rad", "toppled"
+    ),
 }
 
 
@@ -104,11 +106,11 @@ def _holds(run: Run, guard: Guard) -> tuple[bool, float | None]:
 
 
 def check(run: Run, phase: Phase, guard: Guard) -> None:
-    """Measure, and raise if the guard doesn't hold."""
+    """Measure the quantity of a guard; raise `SkillError` if the guard doesn't hold."""
     holds, value = _holds(run, guard)
     quantity = QUANTITIES[guard.quantity]
     if value is not None:
-        run.measured[quantity.told] = value
+        run.measured[quantity.name] = value
     if not holds:
         load = _load(run)
         things = (
@@ -122,7 +124,7 @@ def check(run: Run, phase: Phase, guard: Guard) -> None:
 
 
 def until(run: Run, phase: Phase) -> Callable[[], bool] | None:
-    """Return what tells whether a motion has come far enough; None if it goes on to its end."""
+    """Return a function that says whether a guard ends the motion of a phase now; None if the phase has no such guard."""
     if not phase.until:
         return None
     return lambda: any(_holds(run, guard)[0] for guard in phase.until)

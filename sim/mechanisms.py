@@ -1,4 +1,4 @@
-"""Furniture with moving links in a physics world: loaded, driven, and looked at.
+"""Mechanisms, which are furniture with moving links, in a physics world.
 
 Joints resist by friction and damping; springs push back and latches hold.
 """
@@ -14,56 +14,56 @@ from reasoner.embodiment.values import Link, Mechanism
 from sim.bodies import load_written
 from sim.collision import Solid
 from sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, wide, written
-from sim.urdf import Array, Model
+from sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the way from `opened` to the end of a latching joint at which it trips, and at which it is then held."""
+"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which it is then held."""
 
 
 @dataclass
 class Mechanic:
-    """A mechanism in a physics world: its body, its model at the zero posture, and the number of each link's joint."""
+    """A mechanism in a physics world: its PyBullet body, its model at the zero posture, and the number of each link's joint."""
 
     client: int
     body: int
     mechanism: Mechanism
-    model: Model
+    model: UrdfModel
     joints: Mapping[str, int]
     held: dict[str, bool] = field(default_factory=dict)
     tripped: dict[str, bool] = field(default_factory=dict)
 
     @property
     def latching(self) -> bool:
-        """Whether there is a joint that latches."""
+        """Whether one of the joints latches."""
         return any(link.latches for link in self.mechanism.links)
 
     def link(self, name: str) -> Link:
-        """Return the link of that name."""
+        """Return a link by its name."""
         return next(link for link in self.mechanism.links if link.name == name)
 
     def values(self) -> dict[str, float]:
-        """Return the joints' values by link."""
+        """Return the joint values by link."""
         return {
             name: pybullet.getJointState(self.body, joint, physicsClientId=self.client)[0]
             for name, joint in self.joints.items()
         }
 
     def moved(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
-        """Return rotation and shift of a link against the zero posture, with its joints as they are or at `values`."""
+        """Return a link's rotation and shift relative to the zero posture, with the joints as they are or at `values`."""
         return moved(self.mechanism, self.model, name, self.values() if values is None else values)
 
     def frame(self, name: str, values: Mapping[str, float] | None = None) -> tuple[Array, Array]:
-        """Return a link's frame (rotation, origin) in the world; that of the base for the mechanism's own name."""
+        """Return a link's frame (rotation, origin) in the world; the mechanism's own name stands for its base."""
         turned, shift = self.moved(name, values)
         zero, origin = self.model.frames[urdf_name(self.mechanism, name)]
         return turned @ zero, turned @ origin + shift
 
     def solids(self, values: Mapping[str, float] | None = None, aside: Array = HERE) -> Iterator[Solid]:
-        """Yield what an arm must not touch, `aside` by some metres."""
+        """Yield the mechanism's solids, with the joints at `values` if given, shifted by `aside` (3,) metres."""
         return solids(self.mechanism, self.model, self.values() if values is None else values, aside)
 
     def set(self, name: str, opened: bool) -> None:
-        """Begin with a link open or shut: the only time, but for interventions, that a joint is set instead of moved."""
+        """Set a link's joint open or shut; used for the initial state and for interventions only."""
         link = self.link(name)
         value = wide(link) if opened else 0.0
         pybullet.resetJointState(self.body, self.joints[name], value, physicsClientId=self.client)
@@ -72,7 +72,7 @@ class Mechanic:
             _resist(self.client, self.body, self.joints[name], link, opened)
 
     def drive(self) -> None:
-        """Let joints that latch trip, and springs push to where they are held."""
+        """Update the latching joints: a joint pushed far enough trips, and its spring then pushes to the other rest value."""
         for name, joint in self.joints.items():
             link = self.link(name)
             if not link.latches:
@@ -87,7 +87,7 @@ class Mechanic:
 
 
 def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
-    """Put a mechanism into a physics world, every joint at 0."""
+    """Load a mechanism into a physics world, with every joint at 0."""
     position, orientation = mechanism.position, pybullet.getQuaternionFromEuler([0, 0, mechanism.yaw])
     if mechanism.urdf:
         body = pybullet.loadURDF(mechanism.urdf, position, orientation, useFixedBase=True, physicsClientId=client)
@@ -106,9 +106,9 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
 
 
 def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:
-    """Give a joint its friction, or the spring that pushes it to where it rests or is held.
+    """Set a joint's friction, or the spring that pushes it to its rest value or the value at which it is held.
 
-    A motor at rest is what Coulomb friction is; PyBullet doesn't read that from the URDF.
+    Coulomb friction is modelled as a motor with target velocity 0, since PyBullet does not read it from the URDF.
     """
     if link.spring:
         rest = link.opened + STAY * (link.upper - link.opened) if held else 0.0

@@ -1,6 +1,6 @@
-"""Meshes as what collision checks need: points all over the surface, and the spheres that cover them.
+"""Spheres that cover the surface of a mesh, for collision checks.
 
-PyBullet takes the convex hull of a moving link's mesh; the spheres cover its surface, which is what touches first.
+PyBullet replaces the mesh of a moving link by its convex hull; the spheres cover the surface of the mesh itself.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SPACING = 0.008
-"""Metres between points of a surface."""
+"""Maximum distance in metres between neighbouring points of a surface."""
 SLACK, LEAST, MOST = 0.2, 0.004, 0.02
-"""How far spheres may stand out, as a share of a mesh's thickness, and within how many metres: more takes fewer spheres."""
+"""Maximum protrusion of spheres: share of the mesh's thickness, and its bounds in metres. Larger values need fewer spheres."""
 MOST_POINTS, CANDIDATES, SHARES = 1_500, 150, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""So many points of a surface are covered, by spheres about so many at each of these shares of the way from the middle to it."""
+"""Maximum number of points to cover, maximum number of candidate centres per shell, and the shells: shares of the way from the
+middle to the surface."""
 MOST_PIECES, FARTHEST = 400_000, 1_000.0
-"""Of a mesh that is taken: points, and metres from its link's origin."""
+"""Maximum number of surface points of a mesh, and maximum distance in metres of its points from the link's origin."""
 DIRECTIONS = np.array(
     [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=float
 )
@@ -27,12 +28,12 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
 def triangles(file: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Array:
-    """Return the triangles (n, 3, 3) of a mesh in an OBJ or STL file, in metres if that is the file's scale.
+    """Return the triangles (n, 3, 3) of a mesh in an OBJ or STL file, multiplied by `scale`, which converts to metres.
 
     Raises
     ------
     ValueError
-        There is no such file, it is of another kind, has no triangles, or lies too far away.
+        The file is missing or of another format, or the mesh has no triangles or lies too far away.
     """
     try:
         data = file.read_bytes()
@@ -40,13 +41,13 @@ def triangles(file: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -
         raise ValueError(f"cannot read the mesh {file}: {problem.strerror}") from problem
     reader = {".obj": _obj, ".stl": _stl}.get(file.suffix.lower())
     if reader is None:
-        raise ValueError(f"the mesh {file} is no OBJ or STL file; convert it, or cover the link with primitives")
+        raise ValueError(f"the mesh {file} is neither OBJ nor STL; convert it, or cover the link with primitives")
     try:
         found = reader(data)
     except (ValueError, IndexError, OverflowError) as problem:
         raise ValueError(f"the mesh {file} can't be read: {problem}") from problem
     if not len(found) or not np.isfinite(found).all():
-        raise ValueError(f"the mesh {file} has no triangles, or vertices that are no points")
+        raise ValueError(f"the mesh {file} has no triangles, or vertices that aren't finite")
     with np.errstate(over="ignore", invalid="ignore"):
         scaled: Array = found * np.array(scale)
     if not np.abs(scaled).max() <= FARTHEST:
@@ -86,7 +87,7 @@ def surface(corners: Array) -> Array:
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(1)
     parts = np.ceil(edges / SPACING)
     if not (parts**2).sum() <= MOST_PIECES:
-        raise ValueError(f"a mesh that takes more than {MOST_PIECES} points; give its scale in metres")
+        raise ValueError(f"a mesh takes more than {MOST_PIECES} points; give its scale in metres")
     parts = parts.astype(int)
     for count in sorted(set(parts.tolist()) - {0, 1}):
         u, v = (part.ravel() / count for part in np.mgrid[0 : count + 1, 0 : count + 1])
@@ -98,21 +99,22 @@ def surface(corners: Array) -> Array:
 
 @lru_cache(maxsize=256)
 def covered_mesh(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return the spheres of `cover` for a mesh file; a file is looked at once in a process."""
+    """Return the spheres of `cover` for a mesh file; cached for the process."""
     return cover(triangles(file, scale))
 
 
 def bounds(file: Path, scale: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return the corners of the box around a mesh."""
+    """Return the lower and upper corner of the axis-aligned box around a mesh."""
     corners = triangles(file, scale).reshape(-1, 3)
     return corners.min(0), corners.max(0)
 
 
 def cover(corners: Array) -> tuple[Array, Array]:
-    """Return centres (n, 3) and radii (n,) of spheres that cover triangles (m, 3, 3) and stand out little.
+    """Return centres (n, 3) and radii (n,) of spheres that cover triangles (m, 3, 3) and protrude little.
 
-    A sphere inside may be as wide as the way to the surface, or out of the convex hull, and `SLACK` of the mesh's thickness, within
-    `LEAST` and `MOST` metres; of those, the one that covers most of what is uncovered is taken, until nothing is.
+    The radius of a candidate is its distance from the surface, or from the convex hull if that is nearer, plus the allowed
+    protrusion: `SLACK` of the mesh's thickness, between `LEAST` and `MOST` metres. The candidate that covers most uncovered points
+    is chosen, until all points are covered.
     """
     points = _thinned(surface(corners), MOST_POINTS)
     low, high = points.min(0), points.max(0)
@@ -121,16 +123,15 @@ def cover(corners: Array) -> tuple[Array, Array]:
         [_thinned((low + high) / 2 * (1 - share) + share * points, CANDIDATES) for share in SHARES]
     )
     distances = np.linalg.norm(candidates[:, None] - points, axis=-1)
-    to_hull = ((points @ DIRECTIONS.T).max(0) - candidates @ DIRECTIONS.T).min(
-        1
-    )  # a hollow of the mesh isn't beyond it
+    # a hollow of the mesh lies inside the hull
+    to_hull = ((points @ DIRECTIONS.T).max(0) - candidates @ DIRECTIONS.T).min(1)
     radii = np.minimum(distances.min(1), to_hull) + slack
     covers = distances <= radii[:, None]
     missing, chosen = np.ones(len(points), dtype=bool), []
     while missing.any():
         counts = covers[:, missing].sum(1)
         best = int(np.argmax(counts))
-        if not counts[best]:  # between the candidates on the surface
+        if not counts[best]:  # the points between the surface's candidates are left
             left = points[missing][:1]
             candidates, radii = np.concatenate([candidates, left]), np.append(radii, slack)
             covers = np.concatenate([covers, np.linalg.norm(left - points, axis=-1)[None] <= slack])

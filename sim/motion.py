@@ -1,9 +1,8 @@
-"""Collision-free motion of a hand, planned in the hand's own coordinates and timed within the joints' limits.
+"""Collision-free motion of a hand, planned in the hand's coordinates and timed within the joints' limits.
 
-A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres, the heading of its level pointing direction, the roll about
-it (0: upright; this is what pours), and the elbow's swivel, in radians. `sim.kinematics` turns a pose into a posture, so a path
-that keeps a cup upright is simply one whose roll is 0: a straight line where it's free, else a short RRT-Connect over the same six
-numbers.
+A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres; in radians the heading of its level pointing direction, the
+roll about it (0 is upright; pouring changes it), and the elbow's swivel. `sim.kinematics` maps a pose to a posture. A path with
+roll 0 keeps a cup upright: a straight line where that is free, else the path of a short RRT-Connect in the same six coordinates.
 
 ``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
 """
@@ -23,30 +22,30 @@ from sim.kinematics import inverse, swivel_of
 from sim.urdf import Array
 
 STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
-"""How far apart checked poses of a path are (metres, radians)."""
+"""Maximum distance between checked poses of a path (metres, radians)."""
 
 COARSE = 6
-"""One in so many samples of a path is looked at before all are: most that aren't free are found out so."""
+"""Every `COARSE`-th sample of a path is checked before all others, which rejects most blocked paths early."""
 
 JUMP = 0.35
-"""Radians that a joint may move between neighbouring poses of a path: more means that it passes a singularity."""
+"""Maximum motion in radians of a joint between neighbouring poses of a path; more indicates a singularity."""
 
 TREMBLE = 0.001
-"""Metres by which a hand that leaves something it is too near to may come nearer still."""
+"""Metres by which a hand that leaves an obstacle within the margin may still approach it."""
 
 FEWEST = 5
-"""Samples of a path that timing needs: it is at rest at the first and the last, and speeds up and brakes between them."""
+"""Minimum number of samples of a timed path, which is at rest at both ends and accelerates and brakes between them."""
 
 YAWS = np.linspace(-np.pi, np.pi, 48, endpoint=False)
 SWIVELS = np.linspace(-1.6, 1.6, 17)
-"""Headings of a hand and swivels of an elbow that are tried at a point."""
+"""Headings of a hand and swivels of an elbow tried at a point."""
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Blocked:
-    """Why a path isn't possible: a code of `sim.verdict`, what is in the way, and the smallest clearance in metres."""
+    """Why a path is impossible: a code of `sim.verdict`, the obstacles, and the smallest clearance in metres."""
 
     code: str
     objects: tuple[str, ...] = ()
@@ -54,33 +53,33 @@ class Blocked:
 
 
 class Traveller(Protocol):
-    """What goes along poses: an arm with its hand, or a base that drives. `spread` is how far a search looks beyond both ends."""
+    """An arm with its hand, or a mobile base, that moves along poses."""
 
     @property
     def spread(self) -> Array:
-        """How far beyond start and goal poses are tried (6,)."""
+        """Size of the search region beyond start and goal (6,)."""
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return the joints' values at poses, and which are within reach."""
+        """Return the joint values at poses, and which poses are within reach."""
 
     def free(self, q: Array) -> Flags:
-        """Return which of them touch nothing."""
+        """Return which joint values touch nothing."""
 
     def follow(self, poses: Array) -> Array | None:
-        """Return the joints' values along poses, or None if these can't be followed."""
+        """Return the joint values along poses, or None if these can't be followed."""
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some ways, sampled poses, that can be followed, or None."""
+        """Return the number of the first of some paths of sampled poses that can be followed, or None."""
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield poses (n, 6) to pass through, to be tried before a search."""
+        """Yield via poses (n, 6) to try before a search."""
 
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among its surroundings: answers which paths are possible. `margin` metres keep it off everything.
+    """An arm among its obstacles, from which it keeps `margin` metres: says which paths are possible.
 
-    Every joint keeps `joint_margin` radians from its limits, and `fold` from where the arm would be stretched.
+    Every joint keeps `joint_margin` radians from its limits, and `fold` radians from the stretched arm.
     """
 
     mover: Mover
@@ -96,11 +95,11 @@ class Reacher:
 
     @property
     def spread(self) -> Array:
-        """How far beyond start and goal a path is searched."""
+        """Size of the search region beyond start and goal (6,)."""
         return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return postures of the poses and which are within reach and limits."""
+        """Return the postures at poses, and which poses are within reach and limits."""
         return inverse(self.arm, rotations(poses), poses[:, :3], poses[:, 5], self.joint_margin, self.fold)
 
     def free(self, q: Array) -> Flags:
@@ -113,27 +112,27 @@ class Reacher:
         return q if self._goes(q, valid) else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
-        """Return the number of the first of some ways that can be followed, or None; all are solved at once, which is faster."""
+        """Return the number of the first of some paths that can be followed, or None. All are solved at once, which is faster."""
         q, valid = self.solve(np.concatenate(ways))
         ends = np.cumsum([len(way) for way in ways])[:-1]
         pairs = zip(np.split(q, ends), np.split(valid, ends), strict=True)
         return next((i for i, pair in enumerate(pairs) if self._goes(*pair)), None)
 
     def _goes(self, q: Array, valid: Flags) -> bool:
-        """Return whether postures are within reach, follow one another and touch nothing."""
+        """Return whether postures are within reach, continuous and free."""
         if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP):
             return False
         return bool(self.free(q[COARSE // 2 :: COARSE]).all() and self.free(q).all())
 
     def begin(self, poses: Array) -> Array | None:
-        """Return the postures along sampled poses up to where `follow` would refuse them, or None if it refuses the first."""
+        """Return the postures of the longest beginning of sampled poses that `follow` accepts, or None if it refuses the first."""
         q, valid = self.solve(poses)
         smooth = np.abs(np.diff(q, axis=0, prepend=q[:1])).max(1) <= JUMP
         end = _first(np.all([valid, self.free(q), smooth], axis=0))
         return q[:end] if end else None
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield poses to pass through: over things, and closer to the body."""
+        """Yield via poses above the obstacles and closer to the body."""
         for back, up in ((0.0, 0.12), (0.12, 0.0), (0.12, 0.12), (0.0, 0.25), (0.2, 0.2)):
             middle = (start + goal) / 2
             heading = np.array([np.cos(middle[3]), np.sin(middle[3])])
@@ -172,7 +171,7 @@ def turned_near(start: Array, goal: Array) -> Array:
 
 
 def beyond(arm: Arm, poses: Array) -> float:
-    """Return by how many metres the nearest of some poses exceeds the arm's length; 0 if only joint limits forbid it."""
+    """Return the metres by which the nearest of some poses exceeds the arm's length; 0 if only joint limits forbid it."""
     wrists = poses[:, :3] + (rotations(poses) @ arm.tip_rotation.T) @ (arm.wrist - arm.tip)
     distance = float(np.linalg.norm(wrists - arm.shoulder, axis=-1).min())
     return max(distance - arm.length, 0.0)
@@ -204,16 +203,16 @@ def polyline(corners: Array) -> Array:
 def connect(
     reacher: Traveller, start: Array, goals: Sequence[Array], rng: np.random.Generator, attempts: int = 400
 ) -> tuple[int, Array] | None:
-    """Return to which of some goals a free path leads, and its corner poses: a line, else a detour, else by RRT-Connect; or None.
+    """Return the number of a goal and the corner poses of a free path to it: a line, a detour, or found by RRT-Connect; else None.
 
     Parameters
     ----------
     goals : sequence of array (6,)
-        The most wanted first; a search grows from all of them at once.
+        In order of preference; a search grows from all of them at once.
     attempts : int
-        Bound on the number of samples.
+        Maximum number of samples.
     """
-    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # a search would end at the others as well
+    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # the search must not end at the others
     if within and reacher.follow(line(start, goals[within[0]])) is not None:
         return within[0], np.stack([start, goals[within[0]]])
     for i in within:
@@ -230,7 +229,7 @@ def connect(
 
 
 def leave(reacher: Reacher, start: Array) -> Array | None:
-    """Return a pose that is free and to which a line leads that comes no nearer to anything than `start` is; None if none does."""
+    """Return a free pose at the end of a line from `start` that comes no nearer to any obstacle than `start`; else None."""
     ahead = np.array([np.cos(start[3]), np.sin(start[3]), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
     for metres in (0.03, 0.06, 0.1, 0.15):
@@ -269,7 +268,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Add to a tree the free part of the way to `target`: a stretch of it, or all of it if `greedy`."""
+    """Extend a tree towards `target` by the free part of the line, limited unless `greedy`; return the new pose or None."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:
@@ -287,12 +286,12 @@ def _extend(
 
 
 def _first(good: Flags) -> int:
-    """Return how many are good before the first that isn't."""
+    """Return the number of true values before the first false one."""
     return len(good) if good.all() else int(np.argmin(good))
 
 
 def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
-    """Return the poses from a tree's root to its last node, at which both trees have `met`."""
+    """Return the poses from a tree's root to its last node `met`, where both trees meet."""
     way, i = [met], back[-1]
     while i >= 0:
         way.append(nodes[i])
@@ -301,7 +300,7 @@ def _branch(nodes: list[Array], back: list[int], met: Array) -> Array:
 
 
 def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, attempts: int = 40) -> Array:
-    """Replace stretches between any two points of the way by straight lines where these are free."""
+    """Replace the stretch between two random points of the path by a straight line where that is free, `attempts` times."""
     for _ in range(attempts):
         if len(corners) < 3:
             break
@@ -314,7 +313,7 @@ def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, atte
         if reacher.follow(line(a, b)) is not None:
             corners = np.concatenate([corners[: i + 1], [a, b], corners[j + 1 :]])
     i = 1
-    while i < len(corners) - 1:  # leave out corners that a line can do without
+    while i < len(corners) - 1:  # leave out unnecessary corners
         if reacher.follow(line(corners[i - 1], corners[i + 1])) is not None:
             corners = np.delete(corners, i, axis=0)
         else:
@@ -326,8 +325,8 @@ def _shortcut(reacher: Traveller, corners: Array, rng: np.random.Generator, atte
 
 
 @dataclass(frozen=True)
-class Limits:
-    """How fast a motion may be: joint speeds (k,) and accelerations in radians, the hand's speed and acceleration in metres."""
+class MotionLimits:
+    """Limits of a motion: joint speeds (k,) and acceleration in radians, the hand's speed and acceleration in metres."""
 
     velocity: Array
     acceleration: float
@@ -336,7 +335,7 @@ class Limits:
 
 
 def smooth(q: Array, window: int = 3) -> Array:
-    """Return postures with corners rounded by a moving average that leaves the ends where they are."""
+    """Return postures with corners rounded by a moving average that keeps both ends."""
     out = q.copy()
     for i in range(1, len(q) - 1):
         half = min(window, i, len(q) - 1 - i)
@@ -344,15 +343,15 @@ def smooth(q: Array, window: int = 3) -> Array:
     return out
 
 
-def timed(arm: Arm, q: Array, limits: Limits, rate: float) -> tuple[Array, Array]:
+def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array, Array]:
     """Return positions and velocities (m, k) at `rate` hertz along postures (n, k), as fast as the limits allow.
 
-    Time-optimal along the path but for one simplification: a joint gives half of its acceleration to the path's curvature and
-    half to speeding up, so that both can be bounded apart.
+    The timing is optimal along the path except for one simplification: half of a joint's acceleration is reserved for the path's
+    curvature and half for the change of speed, so that each can be bounded by itself.
     """
     if len(q) < 2 or np.abs(q - q[0]).max() < 1e-9:
         return q[-1:], np.zeros((1, q.shape[1]))
-    if len(q) < FEWEST:  # between two samples that are both at rest nothing could ever move
+    if len(q) < FEWEST:  # a path of two samples would be at rest at both
         spread = np.linspace(0, len(q) - 1, FEWEST)
         q = np.stack([np.interp(spread, np.arange(len(q)), joint) for joint in q.T], -1)
     rows = np.concatenate([q, hand_frames(arm, q)[1]], -1)
@@ -394,7 +393,7 @@ def _sampled(q: Array, speed: Array, clock: Array, rate: float) -> tuple[Array, 
 
 
 def comfort(arm: Arm, q: Array) -> Array:
-    """Return how far postures (n, k) are from the middle of the joints' ranges, growing steeply near the limits."""
+    """Return the discomfort (n,) of postures (n, k): distance from the middle of the joints' ranges, steep near the limits."""
     middle, half = (arm.lower + arm.upper) / 2, (arm.upper - arm.lower) / 2
     cost: Array = np.sum(((q - middle) / half) ** 8, -1)
     return cost

@@ -1,9 +1,8 @@
-"""Inverse kinematics of arms without a closed form: damped least squares, within the joints' limits.
+"""Inverse kinematics of arms without a closed form: damped least squares within the joints' limits.
 
-A posture is found by turning the arm at rest about its first axis until it points to where the hand shall be, and leading the hand
-straight there, a stretch at a time. So the same
-pose always has the same posture, and neighbouring poses have neighbouring ones, but for where the arm has to change over on the
-way. What isn't found so is searched for from other postures, which are drawn with a fixed seed.
+The arm at rest is turned about its first axis until it points to the goal, and the hand is led straight there, a stretch at a time.
+So equal poses have equal postures, and neighbouring poses have neighbouring postures except where the arm has to reconfigure. If
+that fails, further searches start from postures drawn with a fixed seed.
 """
 
 from __future__ import annotations
@@ -14,29 +13,29 @@ from sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn_about
 from sim.urdf import Array
 
 REDUNDANT = 2
-"""The joint of seven that the swivel turns, from the middle of its limits."""
+"""Index of the joint of a seven-joint arm whose angle, from the middle of its limits, is the swivel."""
 
 STRETCHES, EACH = 6, 3
-"""Stretches in which the hand is led from its pose at rest, and steps for each."""
+"""Number of stretches in which the hand is led from its pose at rest, and number of search steps for each."""
 
 STARTS, AROUND = 6, 1.5
-"""Postures from which is searched for what isn't found so, and radians by which their joints are beside those at rest."""
+"""Number of random start postures, and maximum deviation in radians of their joints from the posture at rest."""
 
 STEPS, STRIDE = 30, 0.6
-"""So many steps a search may take, and radians by which a joint moves in one at most."""
+"""Maximum number of steps of a search, and maximum motion in radians of a joint in one step."""
 
 EXACT, CLOSE = 1e-10, 1e-7
-"""Metres and radians within which a search ends, and within which a posture that it ends at counts."""
+"""Errors in metres and radians at which a search ends early, and up to which its result is valid."""
 
 DAMPING = 1e-6
-"""What the squares of the Jacobian are damped by beside the error: more is slower, less is wild near singularities."""
+"""Damping of the normal equations in addition to the error; more is slower, less is unstable near singularities."""
 
 SINGULAR = 0.45
-"""The least singular value of an arm of two equal limbs at an angle, as a share of the sine of that angle."""
+"""Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between them."""
 
 
 def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: float) -> tuple[Array, Flags]:
-    """Return postures (n, k) that put the hand at rotations `r` and points `p`, and which are valid: `sim.kinematics.inverse`."""
+    """Return postures (n, k) with the hand at rotations `r` and points `p`, and which are valid; see `sim.kinematics.inverse`."""
     low, high = arm.lower + margin, arm.upper - margin
     found, valid = np.tile(np.clip(arm.home, low, high), (len(p), 1)), np.zeros(len(p), dtype=bool)
     if arm.swivels:
@@ -67,12 +66,12 @@ def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: flo
 
 
 def _free(arm: Arm) -> list[int]:
-    """Return the numbers of the joints that aren't given by the swivel."""
+    """Return the indices of the joints that the swivel does not determine."""
     return [i for i in range(len(arm.joints)) if not (arm.swivels and i == REDUNDANT)]
 
 
 def _led(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> Array:
-    """Return the postures (n, k) in which the arm comes near to the poses when the hand is led there from postures `q`."""
+    """Return the postures (n, k) near the goal poses that the arm reaches when the hand is led there from postures `q`."""
     axis, foot = arm.axes[0], arm.origins[0]
     ahead, wanted = hand_frames(arm, q)[1] - foot, p - foot
     round_it = np.arctan2(cross(ahead, wanted) @ axis, (ahead * wanted).sum(-1) - (ahead @ axis) * (wanted @ axis))
@@ -87,9 +86,9 @@ def _led(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> 
 
 
 def _searched(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array, steps: int) -> tuple[Array, Flags]:
-    """Return the postures (n, k) at which searches from `q` end, and which of them put the hand where it should be.
+    """Return the postures (n, k) at which searches from `q` end, and which of them reach the goal.
 
-    `last` is how the last link should be turned against the zero posture.
+    The goal is the rotation `last` of the last link relative to the zero posture, and the hand's point `p`.
     """
     q, free = q.copy(), _free(arm)
     going, size = np.arange(len(q)), np.full(len(q), np.inf)
@@ -111,7 +110,7 @@ def _searched(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array
 
 
 def _error(arm: Arm, q: Array, last: Array, p: Array) -> tuple[Array, Array]:
-    """Return by how much (n, 6) the hand misses where it should be, and the Jacobian (n, 6, k)."""
+    """Return the hand's error (n, 6), metres and radians, and the Jacobian (n, 6, k)."""
     rotations, shifts = link_transforms(arm, q)
     tip = np.einsum("nij,j->ni", rotations[:, -1], arm.tip) + shifts[:, -1]
     axes = np.einsum("nkij,kj->nki", rotations, arm.axes)
@@ -122,7 +121,7 @@ def _error(arm: Arm, q: Array, last: Array, p: Array) -> tuple[Array, Array]:
 
 
 def _angle(r: Array) -> Array:
-    """Return rotations (n, 3, 3) as axes times angles (n, 3)."""
+    """Return rotations (n, 3, 3) as rotation vectors (n, 3)."""
     skew = np.stack([r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], -1) / 2
     sine = np.linalg.norm(skew, axis=-1)
     angle = np.arctan2(sine, (np.trace(r, axis1=1, axis2=2) - 1) / 2)
@@ -130,7 +129,7 @@ def _angle(r: Array) -> Array:
 
 
 def _least(arm: Arm, q: Array) -> Array:
-    """Return the least singular values (n,) of the Jacobian, lengths as shares of half of the arm's."""
+    """Return the least singular values (n,) of the Jacobian, with lengths in units of half the arm's length."""
     jacobian = _error(arm, q, np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3)))[1]
     jacobian[:, :3] /= arm.length / 2
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, 5])

@@ -1,10 +1,9 @@
-"""Facts read off the world: each perceiver answers for one kind of situation type, and can set it up in a new world.
+"""Perceivers: each reads the values of one kind of situation type off the world, and can set them up in a new world.
 
-A perceiver is an entry of `PERCEIVERS`: `observe` returns the value that holds for the arguments, or None if none does;
-`arrange` makes a value true in the draft of a world that isn't built yet; `code` is how a primitive failed if the value is not
-the expected one. Which situation type uses which perceiver, with which thresholds (metres, newtons, radians, numbers) and which
-individuals stand for its special values, is said in the ontology. Perceivers of other packages register as entry points of the
-group `confab.perceivers`.
+`BUILT_IN` lists them. `observe` returns the value that holds for the arguments, or None; `arrange` makes a value true in the draft
+of a new world; `code` is the failure code of a primitive whose expected value is not observed. The ontology states the perceiver of
+each situation type, its thresholds (metres, newtons, radians, numbers) and the individuals that stand for its special values.
+Perceivers of other packages register as entry points of the group `confab.perceivers`.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from sim.urdf import Array
 
 @dataclass
 class Draft:
-    """A world to be built: where bodies and robots stand, what vessels are filled with, which links are open."""
+    """The layout of a new world: places of bodies, contents and servings of vessels, open links, stands of robots."""
 
     places: dict[str, str] = field(default_factory=dict)
     contents: dict[str, list[str]] = field(default_factory=dict)
@@ -38,9 +37,9 @@ class Draft:
 
 @dataclass(frozen=True)
 class Perceiver:
-    """How a kind of situation type is read off the world and set up in it; whether its values say where something is.
+    """The functions that read a kind of situation type off the world and set it up, and its failure code.
 
-    `measure` tells the numbers that the value is read off, and those that it is held against.
+    `spatial` says that the values are positions. `measure` returns the numbers that determine the value, and their thresholds.
     """
 
     observe: Callable[[Engine, PerceiverUse, tuple[str, ...]], str | None]
@@ -55,11 +54,11 @@ def tilt_of(rotation: Array) -> float:
     return float(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
 
 
-# ------------------------------------------------------------------------------------------ where an object is
+# ------------------------------------------------------------------------------------------ places of objects
 
 
 def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the place on which the object stands, or `in_hand` if a hand carries it."""
+    """Return the place on which the object stands, or `in_hand` if a hand holds it."""
     body = arguments[0]
     if not world.knows(body):
         return None
@@ -74,17 +73,17 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Stand the object at a place; a world can't begin with an object in a hand."""
+    """Put the object at a place; a world can't begin with an object in a hand."""
     if value == use.values["in_hand"]:
         raise ValueError(f"a world cannot begin with {arguments[0]} in a hand: let it stand at a place")
     draft.places[arguments[0]] = value
 
 
-# ------------------------------------------------------------------------------------------ what a vessel contains
+# ------------------------------------------------------------------------------------------ contents of vessels
 
 
 def observe_content(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return which of the situation type's values the vessel contains at least `least` servings of (the most), or `empty`."""
+    """Return the value of which the vessel contains most, at least `least` servings, or `empty`."""
     if not world.knows(arguments[0]):
         return None
     amounts = {name: world.amount(arguments[0], name) for name in world.embodiment.fillings if name in use.choices}
@@ -99,7 +98,7 @@ def arrange_content(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...],
 
 
 def observe_servings(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return how many servings the vessel contains, to the nearest `grain`."""
+    """Return the number of servings in the vessel, rounded to a multiple of `grain`."""
     if not world.knows(arguments[0]):
         return None
     grain = Fraction(str(use.numbers["grain"]))
@@ -107,27 +106,28 @@ def observe_servings(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
 
 
 def arrange_servings(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Have what the vessel is filled with be so much."""
+    """Set the number of servings in the vessel."""
     draft.servings[arguments[0]] = float(Fraction(value))
 
 
-# ------------------------------------------------------------------------------------------ what a hand does
+# ------------------------------------------------------------------------------------------ hands
 
 
 def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return what both fingers press, or `nothing`."""
+    """Return the body that both fingers press, or `nothing`."""
     return world.held(arguments[0], use.numbers["force"]) or use.values["nothing"]
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return where a hand is: `raised`, at an object, or at a place.
+    """Return a hand's position: `raised`, an object, or a place.
 
-    What counts is the lowest point of the hand's load, or of its grip if it is empty, above the nearest place. Low enough, it
-    is at the object that it holds and that still stands on its place, at the vessel that the load is held over, at the object
-    between its open fingers, else at the place to which it points: an empty one may have drawn back from it.
+    The height is that of the lowest point of the load, or of the grip of an empty hand, above the nearest place. A low hand is at
+    the object that it holds if that still stands on its place, at the vessel below its load, or at the object between its open
+    fingers; else at the nearest place, which for an empty hand is the nearest to a point ahead of it, since it may have backed
+    off.
     """
     hand, numbers = arguments[0], use.numbers
-    if not world.embodiment.places:  # nothing to be low above
+    if not world.embodiment.places:  # no place to be low above
         return use.values["raised"]
     held = world.held(hand)
     point = top = world.hands[hand].frame()[1]
@@ -155,18 +155,18 @@ def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...
 
 
 def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a hand is `upright` or `tilted`, or None between the two."""
+    """Return whether a hand is `upright` or `tilted`, or None in between."""
     angle = tilt_of(world.hands[arguments[0]].frame()[0])
     if angle <= use.numbers["upright_angle"]:
         return use.values["upright"]
     return use.values["tilted"] if angle >= use.numbers["tilted_angle"] else None
 
 
-# ------------------------------------------------------------------------------------------ how a joint is
+# ------------------------------------------------------------------------------------------ joints
 
 
 def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a link's joint is `opened` or `shut`, or None between the two."""
+    """Return whether a link's joint is `opened` or `shut`, or None in between."""
     name = arguments[0]
     if name not in world.links:
         return None
@@ -177,7 +177,7 @@ def observe_joint(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def measure_joint(world: Engine, arguments: tuple[str, ...]) -> Mapping[str, float]:
-    """Return where a link's joint is now, from where on it counts as open, and up to where as shut."""
+    """Return a joint's present value and the thresholds from which on it is open and up to which it is shut."""
     if arguments[0] not in world.links:
         return {}
     name, mechanic = arguments[0], world.links[arguments[0]]
@@ -190,11 +190,11 @@ def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
     draft.opened[arguments[0]] = value == use.values.get("opened", "true")
 
 
-# ------------------------------------------------------------------------------------------ what is in view
+# ------------------------------------------------------------------------------------------ visibility
 
 
 def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether an object is known and hidden by something else than a robot."""
+    """Return whether a known object is hidden by anything but a robot."""
     name = arguments[0]
     if not world.knows(name):
         return None
@@ -203,14 +203,14 @@ def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]
 
 
 def arrange_nothing(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Leave it to where things are."""
+    """Do nothing: the value follows from the positions of objects."""
 
 
-# ------------------------------------------------------------------------------------------ where a robot stands
+# ------------------------------------------------------------------------------------------ stands of robots
 
 
 def observe_stand(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the stand at which the robot's base is, turned as it should be there."""
+    """Return the stand whose position and heading the robot's base has, or None."""
     if arguments[0] not in world.bases:
         return None
     for name, stand in world.embodiment.stands.items():
@@ -221,18 +221,18 @@ def observe_stand(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
 
 
 def arrange_stand(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-    """Let the robot begin at the stand."""
+    """Put the robot at the stand."""
     draft.stands[arguments[0]] = value
 
 
-# ------------------------------------------------------------------------------------------ at rest
+# ------------------------------------------------------------------------------------------ rest values
 
 
 def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...], str], None]:
-    """Return an arranger for hands: a world begins with them at rest, so only the special value can be set up."""
+    """Return an `arrange` function for hands: a world begins with them at rest, so that only the value `special` can be set up."""
 
     def arrange(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
-        """Accept the rest value and raise for any other."""
+        """Accept the rest value; raise `ValueError` for any other."""
         if value != use.values[special]:
             raise ValueError(
                 f"a world cannot begin with {use.situation} of {arguments[0]} {value}: only {use.values[special]}"
@@ -255,7 +255,7 @@ BUILT_IN: Mapping[str, Perceiver] = {
 
 
 def perceiver(name: str) -> Perceiver:
-    """Return the perceiver of that name, from this module or an entry point; raise `KeyError` that lists the built-in ones."""
+    """Return the perceiver of that name, built in or an entry point; raise `KeyError` with the built-in names if there is none."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     for point in entry_points(group="confab.perceivers", name=name):

@@ -1,20 +1,20 @@
-"""The interpreter of skills: carries out the phases that the ontology describes, one after another.
+"""The interpreter of skills: executes the phases that the ontology describes, one after another.
 
-A phase moves the fingers, then the hand, relative to a feature of a thing; then its checks must hold. A `free` motion chooses among
-all ways to be at its feature one that allows every phase up to the next free one, those that are only foreseen included: who opens
-a door chooses before the hand moves how the handle will be held when the door is open.
+A phase moves the fingers, then the hand relative to a feature of a thing; then its checks must hold. A `free` motion chooses a pose
+at its feature that allows every phase up to the next free one, including phases that are only foreseen: to open a door, the grasp
+of the handle is chosen such that it is still possible when the door is open.
 
 ============ ======================================================================================================
-motion       how the hand goes
+motion       path of the hand
 ============ ======================================================================================================
-free         planned around everything
+free         planned around all obstacles
 line         straight
-yielding     straight, giving way to the side to what a finger meets
-joint        as the thing's joint moves it, with what is felt corrected on the way
-rise         straight up to `above` the place below, the elbow turning as it must
-home         to the posture of rest
-drive        with the whole robot to a stand, the hands as they are
-over         with a vessel over another one, to where it can be tilted (`sim.pouring`)
+yielding     straight, and to the side when a finger touches the object
+joint        along the joint's path, with corrections by touch
+rise         straight up to `above` the place below, with the elbow free to turn
+home         to the posture at rest
+drive        the whole robot to a stand, with the arms at rest
+over         with a vessel to a pose above another one, from which it can be tilted (`sim.pouring`)
 ============ ======================================================================================================
 """
 
@@ -44,34 +44,36 @@ from sim.urdf import Array
 from sim.verdict import REFUTED, SkillError
 
 LOOKS = 3
-"""So often is looked, if things aren't seen exactly, before there is no way, or before what was met on it stops a hand."""
+"""Number of attempts at a motion with noisy perception, each after a new look, before its failure counts."""
 
 ANCHORS = 8
-"""So many times on a joint's path the hand looks where it and the joint have come to."""
+"""Number of stretches of a joint's path, each planned anew from the present positions of hand and joint."""
 
 ASIDE = sorted(
     product((0.0, -0.08), (0.0, -0.1, 0.1, -0.2, 0.2), (0.0, 0.1, 0.2)), key=lambda shift: sum(map(abs, shift))
 )
-"""Metres by which a hand may rest beside its home, the nearest first."""
+"""Shifts in metres of the home pose, tried in turn from the smallest on."""
 
 SLACK = 0.1
-"""Radians kept from the limits of the arm's joints in planning a joint's path, for what will have to be corrected on the way."""
+"""Margin in radians to the limits of the arm's joints in planning a joint's path, left for corrections on the way."""
 
 TURNED = 0.02
-"""Radians kept from them beside that where the hand may have to be elsewhere than where it is now seen that it must."""
+"""Margin in radians to the limits of the arm's joints where noise or a narrow grasp may require corrections."""
 
 NARROW = 0.02
-"""Metres by which each finger opens at a handle with little room beside it."""
+"""Opening in metres of each finger at a handle with little room beside it."""
 
 FAR = 1e3
-"""Metres at which nothing is reached: where a hand that can't be as it should is said to be."""
+"""Coordinate in metres that marks a pose as impossible, since it is out of reach."""
 
 
 def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping[str, float]:
-    """Carry out the phases of a skill; return what was measured, or raise `SkillError`."""
+    """Execute the phases of a skill; return the measured numbers, or raise `SkillError`."""
     for phase, word in (*unplayed(use), *unset(use), *endless(use)):
         raise SkillError(
-            "ill-defined", (), f"phase {phase.name} of the skill {use.skill}: '{word}' isn't told (confab validate)"
+            "ill-defined",
+            (),
+            f"phase {phase.name} of the skill {use.skill}: '{word}' is not stated; run confab validate",
         )
     world.look()
     run = Run(Attempt.begin(world, world.acting(roles)), roles, use.numbers)
@@ -85,7 +87,7 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
 
 
 def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
-    """Return what a hand has taken or let go, or a robot carries: it may have moved."""
+    """Return the bodies that the skill may have moved: its object if fingers moved, and the loads of a driving robot."""
     carried = [run.world.held(hand) for hand in run.world.hands] if "robot" in run.roles else []
     taken = [run.roles["object"] for phase in phases if phase.fingers and "object" in run.roles]
     return tuple(name for name in (*taken, *carried) if name)
@@ -103,7 +105,7 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
 
 
 def _looking(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
-    """Do a motion; where there is no way, or something stops it, and things aren't seen exactly, look again and do it anew."""
+    """Do a motion; with noisy perception, look again and repeat it if it was blocked or stopped by a known body."""
     world, hand = run.world, run.attempt.hand
     for looks in range(1, LOOKS + 1):
         try:
@@ -115,7 +117,7 @@ def _looking(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
             if looks == LOOKS or not world.noise or not (felt or failure.verdict.code in REFUTED):
                 raise
             world.look(looks)
-            hand.deadline = world.steps + hand.limit * world.rate  # each try has the time of the skill
+            hand.deadline = world.steps + hand.limit * world.rate  # each attempt has the skill's full time limit
         else:
             return
 
@@ -124,7 +126,7 @@ def _looking(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
 
 
 def _offset(run: Run, phase: Phase, turned: Array) -> Array:
-    """Return the shifts (n, 3) that a phase's offset is for hands of rotation (n, 3, 3)."""
+    """Return the shifts (n, 3) by a phase's offset of hands with rotations `turned` (n, 3, 3)."""
     local = np.array([run.number(part) for part in phase.offset])
     if phase.bring == "base":
         attempt = run.attempt
@@ -137,7 +139,7 @@ def _offset(run: Run, phase: Phase, turned: Array) -> Array:
 
 
 def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
-    """Return the poses (n, 6) to which a phase brings a hand that was at `previous` (n, 6) and holds on in some ways (n)."""
+    """Return the goal poses (n, 6) of a phase for hands at poses `previous` (n, 6), with grasps `way` (n) if given."""
     poses = previous.copy()
     if phase.to == "hand":
         poses[:, :3] += _offset(run, phase, rotations(previous))
@@ -156,9 +158,9 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
 
 
 def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
-    """Return the poses (n, 6) of hands that hold on to a feature while its joint goes from the first to each of the values.
+    """Return the poses (n, 6) of hands that hold a feature while its joint moves from the first value to each of the values.
 
-    The hand keeps its place in the feature's frame but for its turn about z: towards `way.last`, or so that it stays level.
+    The hand keeps its pose in the feature's frame except for its turn about z: towards `way.last`, or as needed to stay level.
     """
     mechanic, link = run.joint(phase.to)
     frames = [run.at(phase.to, {**mechanic.values(), link: value}) for value in values]
@@ -186,7 +188,7 @@ def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[floa
 
 
 def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways, list[int]]:
-    """Return the poses of a free motion's goal, the ways to be there, and which of them allow all that follows."""
+    """Return the candidate goal poses of a free motion, their grasps, and the numbers of those that allow all later phases."""
     chain = [phase]
     for one in later:
         if one.motion not in ("", "line", "yielding", "joint"):
@@ -214,10 +216,10 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
 
 
 def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
-    """Return the candidates that allow all stages; if possible those that leave the hand what it may need on the way."""
-    narrow = any(one.motion == "yielding" and room(run, run.who(one.to)[0]) < ROOM for one in chain)
+    """Return the candidates that allow all stages, if possible with room for corrections, else with narrower fingers."""
+    narrow = any(one.motion == "yielding" and room(run, run.feature_of(one.to)[0]) < ROOM for one in chain)
     if narrow or run.world.blur:
-        with suppress(SkillError):  # it will have to give way, or be corrected, which a stretched arm can't
+        with suppress(SkillError):  # corrections on the way are impossible with a stretched arm
             spare = [replace(stage, fold=FOLD, slack=max(stage.slack, TURNED)) for stage in stages]
             return run.attempt.choose(spare, run.things(), run.spread)
     try:
@@ -230,7 +232,7 @@ def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[
 
 
 def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:
-    """Return the stages of a joint's path, with the link where it is by then; raise if something stands in its way."""
+    """Return the stages of a joint's path, each with the link at its value; raise `SkillError` if a body blocks the link."""
     mechanic, link = run.joint(phase.to)
     values = np.linspace(mechanic.values()[link], run.number(phase.value, link), SAMPLES)
     held, name = run.attempt.held, run.attempt.hand.hand.name
@@ -244,8 +246,8 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
 
 
 def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
-    """Go to one of the poses that allow all that follows."""
-    goals, way, chosen = _choose(run, phase, later)  # whether there is a way is known before the fingers move
+    """Move to one of the poses that allow all later phases."""
+    goals, way, chosen = _choose(run, phase, later)  # fails, if at all, before the fingers move
     FINGERS[phase.fingers](run, phase)
     opening = run.spread if phase.fingers == "open" else None
     best = chosen[run.attempt.go([goals[i] for i in chosen], run.things(), *run.free_of(phase), opening=opening)]
@@ -258,7 +260,7 @@ def _line(run: Run, phase: Phase) -> None:
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
     enough = until(run, phase)
     speed = run.number(phase.speed)
-    if enough is not None:  # the guard ends it, and what isn't seen well may be farther
+    if enough is not None:  # the guard ends the motion, and with noise the object may be farther away
         ahead = goal[:3] - hand.pose[:3]
         goal[:3] += 2 * run.world.noise * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     run.attempt.straight(goal, run.things(), *run.free_of(phase), speed=speed, enough=enough)
@@ -268,17 +270,17 @@ def _line(run: Run, phase: Phase) -> None:
 
 def _yielding(run: Run, phase: Phase) -> None:
     now = run.attempt.hand.pose
-    go_around(run, phase, run.who(phase.to)[0], turned_near(now, _poses(run, phase, now[None], run.way)[0]))
+    go_around(run, phase, run.feature_of(phase.to)[0], turned_near(now, _poses(run, phase, now[None], run.way)[0]))
 
 
 def _joint(run: Run, phase: Phase) -> None:
-    """Move a joint along its path, starting anew from where hand and joint have come to several times on the way."""
+    """Move a joint along its path in stretches, each planned from the present positions of hand and joint."""
     mechanic, link = run.joint(phase.to)
     goal, enough, attempt = run.number(phase.value, link), until(run, phase), run.attempt
     way = run.way
     if way is None:
         raise SkillError(
-            "no grasp", (link,), f"a motion of the joint of {link} follows none that brought the hand there"
+            "no grasp", (link,), f"the skill moves the joint of {link} before the hand has been brought to it"
         )
     for left in range(ANCHORS, 0, -1):
         attempt.hand.command(attempt.hand.measured())
@@ -312,7 +314,7 @@ def _rise(run: Run, phase: Phase) -> None:
 
 
 def _home(run: Run, phase: Phase) -> None:
-    """Go to rest: home, or near it if something that has been opened is there."""
+    """Move to the home pose, or near it if an opened link is there."""
     hand = run.attempt.hand
     home = pose_of(hand.arm, np.array(hand.hand.home))
     run.attempt.go(
@@ -323,7 +325,7 @@ def _home(run: Run, phase: Phase) -> None:
 
 
 def _over(run: Run, phase: Phase) -> None:
-    run.measured |= reach_over(run.attempt, run.who(phase.to)[0], run.numbers)
+    run.measured |= reach_over(run.attempt, run.feature_of(phase.to)[0], run.numbers)
 
 
 MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
@@ -336,11 +338,11 @@ MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
     "over": _over,
     "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
-"""How a hand goes; ``free`` is done by `_free`."""
+"""The functions that execute motions; `_free` executes ``free``."""
 
 
 WITHDRAWING = ("free", "home")
-"""Motions from which a hand that was stopped comes back."""
+"""Motions from which a stopped hand withdraws."""
 
 
 CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
@@ -349,4 +351,4 @@ CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
     "place": lambda run: run.roles.get("target", "") in run.world.embodiment.places,
     "thing": lambda run: run.roles.get("target", "") not in run.world.embodiment.places,
 }
-"""When a phase is done: by what the hand holds when the skill begins, and by what its target is."""
+"""Conditions under which a phase is executed: on the load at the beginning of the skill, and on its target."""

@@ -1,8 +1,8 @@
-"""Pictures of the world without a screen or a graphics card: opaque bodies by PyBullet's own renderer, glass and drops by rays.
+"""Pictures of the world without a screen or graphics card: opaque bodies by PyBullet's renderer, vessels and drops by ray casting.
 
-PyBullet's software renderer knows no translucency, and hundreds of small spheres make it slow. So it draws the robot, furniture
-and solid objects; beverage (spheres) and vessels (surfaces of revolution) are cast on top, pixel by pixel, against its
-depth. Both look better and together take a fifth of the time. Metres; images are (height, width, 3) of uint8.
+PyBullet's software renderer has no translucency, and hundreds of small spheres make it slow. So it draws the robot, furniture
+and solid objects; drops (spheres) and vessels (surfaces of revolution) are then cast pixel by pixel against its depth image. That
+looks better and takes a fifth of the time. Metres; images are (height, width, 3) of uint8.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ FIELD = 40.0
 """Vertical field of view in degrees."""
 
 MARGIN = 22
-"""Pixels that are left free around."""
+"""Width in pixels of the picture's empty border."""
 
 TALL, LEGS = 0.30, 0.12
-"""How high what stands on a table may be, and how far below the places one has to see, in metres."""
+"""Metres above and below a place that a picture shows."""
 
 EDGE = 14.0
-"""Difference in brightness, of 255, from which on neighbouring pixels lie on an edge."""
+"""Minimum difference in brightness, of 255, between neighbouring pixels on an edge."""
 
 SKY, GROUND = np.array([236.0, 241.0, 247.0]), np.array([196.0, 205.0, 216.0])
 """Colours of the backdrop at the top and at the bottom."""
@@ -49,7 +49,7 @@ SKY, GROUND = np.array([236.0, 241.0, 247.0]), np.array([196.0, 205.0, 216.0])
 
 @dataclass(frozen=True)
 class Camera:
-    """Where a picture is taken from, in metres, its vertical field of view in degrees, and its size in pixels."""
+    """A camera: eye and target in metres, vertical field of view in degrees, size in pixels."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -82,7 +82,7 @@ class Camera:
 
     @cached_property
     def backdrop(self) -> Array:
-        """A gradient from sky to ground."""
+        """Image (height, width, 3) of the gradient from sky to ground."""
         part = np.linspace(0, 1, self.height)[:, None, None] ** 1.3
         whole = np.broadcast_to(SKY * (1 - part) + GROUND * part, (self.height, self.width, 3))
         return np.ascontiguousarray(whole, dtype=np.float32)
@@ -93,7 +93,7 @@ class Camera:
         return float(self.width / 2 + self.focal * x / z), float(self.height / 2 - self.focal * y / z)
 
     def window(self, center: Array, radius: float) -> tuple[slice, slice] | None:
-        """Return the rows and columns that a sphere can cover, or None if it's out of the picture."""
+        """Return the rows and columns that a sphere can cover, or None if it lies outside the picture."""
         x, y, z = self.axes @ (center - np.array(self.eye))
         if z < NEAR:
             return None
@@ -105,7 +105,7 @@ class Camera:
 
 
 def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: int = 0) -> Camera:
-    """Return a camera that looks at robot and table from the guest's side, as near as both are wholly in the picture.
+    """Return the nearest camera on the side opposite the robots that shows robots and tables completely.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
     width, height : int
         Pixels.
     below : int
-        Pixels at the bottom where something else will be.
+        Pixels at the bottom that are reserved for a caption.
     """
     places, _ = with_open_mechanisms(embodiment)
     middle = np.array([place.position for place in places.values()]).mean(0)
@@ -140,7 +140,7 @@ def view_of(embodiment: Embodiment, width: int = 960, height: int = 544, below: 
 
 
 def _seen(embodiment: Embodiment) -> Array:
-    """Return points (n, 3) that a picture shall show: corners of tables, what stands on places, robots at rest."""
+    """Return points (n, 3) that a picture has to show: corners of furniture, room above places, robots at rest."""
     places, around = with_open_mechanisms(embodiment)
     points: list[Array] = []
     for solid in around:
@@ -173,14 +173,14 @@ def _three(point: Array) -> tuple[float, float, float]:
 
 
 def hide_vessels(world: Engine) -> None:
-    """Leave vessels to `picture`: PyBullet's renderer shall leave them out."""
+    """Hide vessels from PyBullet's renderer, since `picture` draws them."""
     for thing in world.bodies.values():
         if thing.shape.kind == "vessel":
             pybullet.changeVisualShape(thing.body, -1, rgbaColor=[1, 1, 1, 0], physicsClientId=world.client)
 
 
 def picture(world: Engine, camera: Camera) -> Array:
-    """Return what the camera sees."""
+    """Return the camera's image (height, width, 3)."""
     image, depth = _opaque(world, camera)
     _cast_shadows(world, image, depth, camera)
     vessels = [(world.truth(name), thing.shape) for name, thing in world.bodies.items() if thing.shape.kind == "vessel"]
@@ -198,7 +198,7 @@ def picture(world: Engine, camera: Camera) -> Array:
 
 
 def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> None:
-    """Darken table tops where hands and bodies keep the light off, more softly the higher these are."""
+    """Darken table tops in the shadows of hands and bodies, which are softer for higher ones."""
     casters = list(_casters(world))
     for fixture in world.embodiment.fixtures:
         top = fixture.position[2] + fixture.size[2] / 2
@@ -223,7 +223,7 @@ def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> 
 
 @lru_cache(maxsize=8)
 def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
-    """Return for each pixel the distance at which its ray meets a level plane, and x and y there."""
+    """Return for each pixel the distance at which its ray meets the horizontal plane at `height`, and x and y of that point."""
     with np.errstate(divide="ignore"):
         distance = (height - camera.eye[2]) / camera.rays[..., 2]
     distance = np.where(np.isfinite(distance) & (distance > 0), distance, 1e6)
@@ -232,7 +232,7 @@ def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
 
 
 def _casters(world: Engine) -> Iterator[tuple[Array, float]]:
-    """Yield spheres (centre, radius) that cast shadows: those of the arms, and some up each body."""
+    """Yield spheres (centre, radius) that cast shadows: those of the arms, and a column of them for each body."""
     for hand in world.hands.values():
         mover = hand.mover()
         yield from zip(mover.at(hand.measured()[None])[0], mover.spheres.radii.tolist(), strict=True)
@@ -300,7 +300,7 @@ def _drops(world: Engine) -> Iterator[tuple[Array, float, Array]]:
 
 
 def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radius: float, color: Array) -> None:
-    """Draw a shaded sphere where nothing is before it."""
+    """Draw a shaded sphere where nothing nearer covers it."""
     window = camera.window(center, radius)
     if window is None:
         return
@@ -320,9 +320,9 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
 def _look(
     camera: Camera, rotation: Array, base: Array, shape: Shape
 ) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
-    """Return the part of a picture where a vessel is, the rays through it and the eye as seen from the vessel, and its profile.
+    """Return a vessel's window in the picture, the rays and the eye in the vessel's frame, and its outer heights and radii.
 
-    None where it is out of the picture. The profile is that of the outer wall: heights and radii.
+    None if the vessel lies outside the picture.
     """
     heights, radii = np.array(shape.profile).T
     radii = radii + wall(shape)
@@ -334,7 +334,7 @@ def _look(
 
 
 def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Draw a vessel of clay or tin where nothing is before it: the wall that a ray meets first, or the bottom inside."""
+    """Draw an opaque vessel where nothing nearer covers it: the wall that a ray meets first, or the bottom inside."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return
@@ -357,7 +357,7 @@ def _draw_opaque(image: Array, depth: Array, camera: Camera, rotation: Array, ba
 
 
 def _draw_glass(image: Array, depth: Array, camera: Camera, rotation: Array, base: Array, shape: Shape) -> None:
-    """Blend a vessel's far and near walls over the picture: clearer where one looks straight at them."""
+    """Blend a vessel's far and near walls over the picture, more transparent where the view is perpendicular."""
     look = _look(camera, rotation, base, shape)
     if look is None:
         return

@@ -1,7 +1,7 @@
-"""Pouring: a held vessel is rolled about its lip, which stays over the other vessel, until a serving has flown.
+"""Pouring: a held vessel is rolled about its lip, which stays over the other vessel, until a serving has left it.
 
-The robot watches the flow, as one who pours does: it turns on slowly while nothing comes, waits while it flows, and takes the
-vessel back when enough has left. What is left behind stays behind the vessel's shoulder.
+The controller watches the flow: it rolls on slowly while nothing flows, waits while the beverage flows, and rolls the vessel back
+when enough has left. The rest stays behind the vessel's shoulder.
 """
 
 from __future__ import annotations
@@ -26,33 +26,34 @@ SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""
 
 FOLD = 0.1
-"""Radians kept, if possible, from where the arm would be stretched: what is held slips a little on the way there."""
+"""Margin in radians to the stretched arm, kept if possible, since the load slips a little on the way."""
 
 SHARES = (1.0, 0.95, 0.9, 0.8)
-"""Of the way on which a lip stays where it is, what a hand goes that rolls back."""
+"""Shares, tried in turn, of the shift that keeps the lip in place while a hand rolls back."""
 
 LONGEST = 2400
-"""Steps after which turning gives up."""
+"""Maximum number of simulation steps of one roll."""
 
 PATIENCE = 6
-"""Steps between looks at the arm's lag."""
+"""Steps between checks of the arm's lag."""
 
 LOOK = 4
-"""Steps between looks at the flow."""
+"""Steps between measurements of the flow."""
 
 FLOWING = 0.1
-"""Seconds of which the flow is told."""
+"""Seconds over which the flow's rate is measured."""
 
 NEARLY = 0.9
-"""Of what is wanted, what a pour has to give."""
+"""Share of the wanted amount that suffices when the flow stops."""
 
 SPARE = 0.25
-"""Servings beyond whole ones that are meant to stay in a source: half of what rounding forgives. What was stuck in a neck comes all
-at once, and nothing can be put back; too little only means to tilt again."""
+"""Fraction of a serving beyond whole ones that should stay in the source: half of what rounding tolerates. Beads stuck in a neck
+come
+all at once and cannot be put back, whereas too little only takes another tilt."""
 
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
-    """Carry a vessel over another one, to where it can be tilted with its lip over the other's opening."""
+    """Carry the held vessel to a pose from which it can be tilted with its lip over the target's opening."""
     source = attempt.held or ""
     yaw, swivel = (np.tile(part, len(SIDES)) for part in fan())
     side = np.repeat(SIDES, len(yaw) // len(SIDES))
@@ -68,7 +69,7 @@ def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, flo
 
 
 def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
-    """Pour a serving: roll about the lip until it has left the source, then roll back so far that no more flows."""
+    """Pour a serving: roll about the lip until the serving has left the source, then roll back until nothing more flows."""
     attempt = Attempt.begin(world, roles["hand"])
     source, target = roles["source"], attempt.body(roles["target"])
     if attempt.held != source:
@@ -79,7 +80,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     had, got = world.inside(source), world.inside(target)
     enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
     enough += numbers["along"] * max(had / serving - round(had / serving) - SPARE, NEARLY - enough)
-    nearly = max(NEARLY * enough, numbers["least_poured"] + 1 / serving)  # a bead may go astray
+    nearly = max(NEARLY * enough, numbers["least_poured"] + 1 / serving)  # one bead may be lost
 
     def poured() -> float:
         return (had - world.inside(source)) / serving
@@ -93,7 +94,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
         steepest = max(steepest, servo.angle)
         servo.turn(numbers["hold_back"], numbers["fast"])
         world.run(round(numbers["settle"] * world.rate))
-        more = more and poured() < nearly  # less was on its way than it looked like
+        more = more and poured() < nearly  # less was in flight than estimated
     measured = {"steepest_rad": steepest, "tilt_rad": tilt_of(attempt.hand.frame()[0])} | attempt.check_grip(numbers)
     if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
         raise SkillError("tracking error", world.touching(attempt.hand), **measured)
@@ -109,7 +110,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
 
 
 def _check_pour(source: str, target: str, measured: Mapping[str, float], numbers: Numbers) -> None:
-    """Raise if too little arrived or too much went beside."""
+    """Raise `SkillError` if too little arrived or too much was spilled."""
     if measured["spilled"] > numbers["most_spilled"]:
         raise SkillError("spill", (source, target), **measured)
     if measured["poured"] < numbers["least_poured"]:
@@ -117,7 +118,7 @@ def _check_pour(source: str, target: str, measured: Mapping[str, float], numbers
 
 
 def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[str, float]:
-    """Roll a tilted hand back about the lip of what it holds."""
+    """Roll a tilted hand back about the lip of its load."""
     attempt = Attempt.begin(world, roles["hand"])
     hand, now = attempt.hand, attempt.hand.pose
     side, angle = float(np.sign(now[4])), abs(float(now[4]))
@@ -145,7 +146,7 @@ def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> 
 
 
 def _filling(world: Engine, vessel: str) -> str | None:
-    """Return what there is most of in a vessel, or None if it's empty."""
+    """Return the filling of which a vessel contains most, or None if it is empty."""
     amounts = {name: world.amount(vessel, name) for name in world.embodiment.fillings}
     best = max(amounts, key=amounts.__getitem__, default=None)
     return best if best is not None and amounts[best] > 0 else None
@@ -155,7 +156,7 @@ def _filling(world: Engine, vessel: str) -> str | None:
 
 
 def _lip(attempt: Attempt, vessel: str, side: Array) -> tuple[float, Array]:
-    """Return a held vessel's height, and for each `side` (n,) its lip (n, 3) in the hand's frame."""
+    """Return a held vessel's height, and its lip (n, 3) in the hand's frame for each `side` (n,)."""
     shape = attempt.world.bodies[vessel].shape
     rotation, base = attempt.world.in_hand(attempt.hand, vessel)
     height, radius = shape.profile[-1] if shape.profile else (height_of(shape), 0.0)
@@ -174,7 +175,7 @@ def _poses(
 ) -> Array:
     """Return hand poses (n, 6) that hold the source tilted by `angle` with its lip over the target.
 
-    The lip stays over the target, `clearance` above its rim, and so much higher that the source's base keeps above it as well.
+    The lip is `clearance` above the target's rim, and higher while the source is steep, so that its base clears the rim as well.
     """
     poses = poses_at(np.zeros(3), yaw, side * angle, swivel)
     height, lip = _lip(attempt, source, side)
@@ -202,7 +203,7 @@ class _Way:
 
 
 def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
-    """Plan the roll about the lip from where the hand is, to the side to which the hand has brought the lip."""
+    """Return the path of the roll about the lip from the present pose, to the side on which the lip is over the target."""
     now, angles = attempt.hand.pose, np.linspace(0.0, numbers["pour_angle"], 64)
     ways = []
     for side in SIDES:
@@ -211,12 +212,12 @@ def _plan(attempt: Attempt, source: str, target: str, numbers: Numbers) -> _Way:
         ways.append((float(np.linalg.norm(poses[0, :3] - now[:3])), side, poses))
     poses = min(ways, key=lambda way: way[0])[2]
     left = np.maximum(1 - angles / numbers["hold_back"], 0.0)
-    poses[:, :3] += left[:, None] * (now - poses[0])[:3]  # it comes to where it was seen now before anything flows
+    poses[:, :3] += left[:, None] * (now - poses[0])[:3]  # corrects the present error before anything flows
     return _way(attempt, angles, poses, (source, target))
 
 
 def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]) -> _Way:
-    """Return the postures of poses by angle; raise if they can't be followed."""
+    """Return the postures of poses by angle; raise `SkillError` if they can't be followed."""
     with attempt.planning():
         reacher = attempt.reacher(margin=CLOSE)
         q = reacher.follow(poses)
@@ -227,7 +228,7 @@ def _way(attempt: Attempt, angles: Array, poses: Array, objects: tuple[str, ...]
 
 
 def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _Way:
-    """Return the postures of a way back on which the lip stays where it is, or nearly so if the arm doesn't reach that far."""
+    """Return a path back on which the lip stays in place, or nearly so if the arm doesn't reach that far."""
     for share in SHARES:
         moved = poses.copy()
         moved[:, :3] += share * shifts
@@ -243,7 +244,7 @@ def _way_back(attempt: Attempt, angles: Array, poses: Array, shifts: Array) -> _
 
 
 class _Servo:
-    """Moves a hand along a way by its tilt angle, at a bounded rate and acceleration (radians, seconds)."""
+    """Controller that moves a hand along a path by its tilt angle, at bounded rate and acceleration (radians, seconds)."""
 
     ACCELERATION = 14.0
 
@@ -252,7 +253,7 @@ class _Servo:
         self.tick = 1 / world.rate
 
     def turn(self, goal: float, speed: float) -> None:
-        """Turn to an angle, braking in time."""
+        """Roll to an angle."""
         for step in range(LONGEST):
             if self.angle == goal:
                 return
@@ -262,10 +263,10 @@ class _Servo:
         raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
-        """Turn on slowly while nothing flows and wait while it does; return whether `enough` is `poured`, or patience ends.
+        """Roll on slowly while nothing flows, and wait while beverage flows; return whether `enough` is `poured`.
 
-        What flows while the hand turns back, `lag` seconds long, counts as poured. Where the flow stops, what is `nearly` enough
-        is enough: what was stuck in the neck comes all at once.
+        The flow of the `lag` seconds in which the hand rolls back counts as poured. If the flow stops, `nearly` suffices. The
+        result is False if nothing has flowed for a while at the steepest angle.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))
@@ -285,7 +286,7 @@ class _Servo:
         raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
 
     def _approach(self, goal: float, speed: float) -> None:
-        """Advance for one step towards an angle, at most at `speed`."""
+        """Advance for one simulation step towards an angle, at most at `speed`."""
         gap, most = goal - self.angle, self.ACCELERATION * self.tick
         wanted = math.copysign(min(speed, math.sqrt(2 * self.ACCELERATION * abs(gap))), gap)
         self.rate += max(-most, min(most, wanted - self.rate))

@@ -1,7 +1,7 @@
-"""Which places a hand reaches, from geometry alone: URDF, table and shapes, without a physics engine.
+"""The places within reach of each hand, computed from geometry alone: URDF, furniture and shapes, without a physics engine.
 
-A hand reaches a place if, for every height at which the scene's bodies are grasped, some posture takes it there, lets it come
-from before and go up, within all joints' limits and without touching furniture or the robot's own trunk.
+A hand reaches a place if, for every height at which bodies of the scene are grasped, there is a grasp pose whose approach, grasp
+and lift are all within the joints' limits and free of contact with furniture and the robot's trunk.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
 from sim.linkage import with_open_mechanisms
 from sim.motion import Reacher, beyond
 from sim.stages import MARGIN, Numbers, grip_stages
-from sim.urdf import Model
+from sim.urdf import UrdfModel
 
 VERSION = "1"
-"""Counts changes of the method, so that results of an older one aren't taken for current."""
+"""Version of the method, part of the fingerprint, so that stored results of an older one count as outdated."""
 
-STAGES = ("around what stands there", "before it", "when it is lifted")
-"""The stages of a grasp, in the order of `grip_stages`."""
+STAGES = ("when grasping", "when approaching", "when lifting")
+"""Names of the stages of a grasp, in the order of `grip_stages`."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Pairs of hand and place, and a hash of everything that they were computed from."""
+    """Pairs of hand and place within its reach, and a hash of the inputs."""
 
     pairs: frozenset[tuple[str, str]]
     inputs: str
 
 
 def reach(embodiment: Embodiment) -> Reach:
-    """Return which places each hand reaches.
+    """Return the pairs of hand and place within its reach.
 
     Raises
     ------
     ValueError
-        No behaviour uses the skill that reaches, so there are no settings to go by.
+        No behaviour uses the skill `reach`, which has the settings.
     """
     numbers, heights = _settings(embodiment)
     pairs = set()
@@ -64,17 +64,17 @@ def reach(embodiment: Embodiment) -> Reach:
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
-    """Return for each hand why it doesn't reach a place: what is in the way at which stage of a grasp, with every joint open.
+    """Return for each hand that does not reach a place the first failing stage of a grasp and its obstacle, with every joint open.
 
     Raises
     ------
     ValueError
-        No behaviour uses the skill that reaches, or nobody knows where the place is.
+        No behaviour uses the skill `reach`, or the position of the place is unknown.
     """
     numbers, heights = _settings(embodiment)
     places, solids = with_open_mechanisms(embodiment)
     if place not in places:
-        raise ValueError(f"nobody knows where {place} is: what carries it may be anywhere")
+        raise ValueError(f"the position of {place} is unknown: its carrier can move")
     found = []
     for robot in embodiment.robots:
         for stand, model in _standing(robot, embodiment):
@@ -89,7 +89,7 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
 
 
 def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str:
-    """Return why no posture at a grasp height above a place passes all stages: at the first that leaves none."""
+    """Return the reason of the first stage of a grasp at a height above a place that no posture passes."""
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     left = np.ones(1, dtype=bool)
     for name, stage in zip(STAGES, grip_stages(grip, numbers), strict=True):
@@ -98,9 +98,9 @@ def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str
         if not valid.any():
             missing = beyond(reacher.arm, stage.poses)
             return (
-                f"{missing * 100:.1f} cm too far {name}"
+                f"{missing * 100:.1f} cm out of reach {name}"
                 if missing > 0
-                else f"no posture {name} is within all joints' limits"
+                else f"no posture is within all joints' limits {name}"
             )
         free = reacher.free(q)
         if not (valid & free).any():
@@ -113,17 +113,17 @@ def _why(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> str
 
 
 def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
-    """Return the settings of the skill that reaches, and the heights at which the scene's bodies are grasped."""
+    """Return the settings of the skill `reach`, and the heights at which the scene's bodies are grasped."""
     settings = [use.numbers for use in embodiment.skills.values() if use.skill == "reach"]
     if not settings:
-        raise ValueError("no behaviour is carried out by the skill 'reach': what a hand reaches isn't defined")
+        raise ValueError("no behaviour uses the skill 'reach', so reach is undefined; give one behaviour that skill")
     numbers = {name: max(found[name] for found in settings) for name in ("approach", "raised")}
     grasped = sorted({body.shape.grasp_height for body in embodiment.bodies.values()})
     return numbers, grasped or [settings[0]["empty_height"]]
 
 
-def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, Model]]:
-    """Yield the robot at every stand that it can drive to, or where it stands fast."""
+def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, UrdfModel]]:
+    """Yield each stand of a mobile robot with the robot's model there; for a fixed robot an empty name and its model."""
     if not robot.driving:
         yield "", read_robot(robot)
         return
@@ -132,7 +132,7 @@ def _standing(robot: Robot, embodiment: Embodiment) -> Iterator[tuple[str, Model
 
 
 def fingerprint(embodiment: Embodiment) -> str:
-    """Return a SHA-256 hash of what reach depends on: files by content, numbers by value."""
+    """Return a SHA-256 hash of all inputs of reach: files by content, numbers by value."""
     parts = [VERSION]
     for robot in embodiment.robots:
         values = _told(asdict(robot), ("driving", "turning") if not robot.driving else ())
@@ -157,13 +157,13 @@ def fingerprint(embodiment: Embodiment) -> str:
 
 
 def _heights(embodiment: Embodiment, place: str, heights: Sequence[float]) -> Sequence[float]:
-    """Return the heights above a place at which hands take what stands there."""
+    """Return the grasp heights above a place."""
     said = embodiment.places[place].height
     return heights if said is None else (said,)
 
 
 def _content(file: Path | str) -> str:
-    """Return a hash of what is in a file, wherever that is."""
+    """Return a hash of a file's content."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
@@ -171,8 +171,8 @@ def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in without}
 
 
-def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, solids: Sequence[Solid]) -> Reacher:
-    """Return an open hand among the furniture and the robot's own trunk."""
+def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel, solids: Sequence[Solid]) -> Reacher:
+    """Return a hand with open fingers among furniture, mechanisms and the robot's trunk."""
     arms = [read_arm(model, other.arm, other.tip, other.turned, other.home) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
     around = Surroundings((*map(box, embodiment.fixtures), *solids))
@@ -181,7 +181,7 @@ def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: Model, sol
 
 
 def _reaches(reacher: Reacher, place: Place, height: float, numbers: Numbers) -> bool:
-    """Tell whether some posture at a grasp height above the place passes all stages."""
+    """Return whether some posture passes all stages of a grasp at a height above the place."""
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
     solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, numbers)]
     valid = np.all([ok for _, ok in solved], axis=0)

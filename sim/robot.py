@@ -15,33 +15,33 @@ from reasoner.embodiment.values import Hand, Robot
 from sim.arms import Arm, hand_frames, read_arm
 from sim.assembly import assembled, plain, read_robot
 from sim.collision import Mover, fixed_spheres, read_mover
-from sim.motion import Limits, pose_of
-from sim.urdf import Array, Model, Spheres
+from sim.motion import MotionLimits, pose_of
+from sim.urdf import Array, Spheres, UrdfModel
 
 CENTERING = 400.0
-"""Newtons per metre by which a finger that is ahead of the other one yields, as the gear of a parallel gripper does."""
+"""Newtons per metre by which a finger ahead of the other one yields, which simulates the gear of a parallel gripper."""
 
 POSITION_GAIN, VELOCITY_GAIN = 0.4, 1.0
 """Gains of an arm's motors."""
 
 CLOSING = 0.12
-"""Metres per second at which fingers close."""
+"""Speed in metres per second of closing fingers."""
 
 
 @dataclass
 class Manipulator:
     """One hand of a robot in a physics world.
 
-    `posture` is what the arm was last commanded; `grasp` is where the held object was in the hand when it was grasped
-    (position and rotation), which is what slip is measured against; `limit` how many seconds the skill that moves it
-    may take, and `deadline` the step of the simulation at which it must have ended; `pace` the share of its speeds that it uses.
+    `posture` is the arm's last command. `grasp` is the rotation and position of the held object in the hand at the grasp, the
+    reference for slip. `limit` is the time limit in seconds of the running skill, `deadline` the simulation step at which it
+    expires. `pace` is the share of its speeds that the arm uses.
     """
 
     client: int
     body: int
     robot: Robot
     hand: Hand
-    model: Model
+    model: UrdfModel
     arm: Arm
     joints: tuple[int, ...]
     fingers: tuple[int, ...]
@@ -57,10 +57,10 @@ class Manipulator:
     links: Mapping[int, str] = field(default_factory=dict)
 
     @property
-    def limits(self) -> Limits:
-        """How fast the arm moves when it holds nothing."""
+    def limits(self) -> MotionLimits:
+        """Limits of speed and acceleration of the arm without a load."""
         pace = self.pace
-        return Limits(self.arm.velocity * pace, self.robot.acceleration * pace**2, 1.6 * pace, 8.0 * pace**2)
+        return MotionLimits(self.arm.velocity * pace, self.robot.acceleration * pace**2, 1.6 * pace, 8.0 * pace**2)
 
     @property
     def pose(self) -> Array:
@@ -73,7 +73,7 @@ class Manipulator:
         return r[0], p[0]
 
     def measured(self) -> Array:
-        """Return the arm's joint angles (k,) as they are."""
+        """Return the arm's measured joint angles (k,)."""
         states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
         return np.array([state[0] for state in states])
 
@@ -83,7 +83,7 @@ class Manipulator:
         return tuple(state[0] for state in states)
 
     def mover(self, opening: float | None = None) -> Mover:
-        """Return the arm as spheres, its fingers as they are, or open by so many metres."""
+        """Return the arm as spheres, with its fingers at their present opening or at `opening` metres."""
         openings = self.openings() if opening is None else [opening] * len(self.fingers)
         return read_mover(self.model, self.arm, dict(zip(self.hand.fingers, openings, strict=True)))
 
@@ -103,16 +103,16 @@ class Manipulator:
         )
 
     def open(self, opening: float | None = None) -> None:
-        """Let the fingers go to their open position, or to another one."""
+        """Command the fingers to their open position, or to `opening` metres."""
         self.closing, self.grasp = False, None
         self._fingers_to(self.hand.opening if opening is None else opening)
 
     def close(self) -> None:
-        """Let the fingers press; `drive` must then run in every step."""
+        """Begin to close the fingers; `drive` must then run in every step."""
         self.closing = True
 
     def drive(self) -> None:
-        """Drive closing fingers for one step: equal force on both, with the one that is ahead giving way."""
+        """Drive closing fingers for one step with equal force, the one ahead yielding."""
         if not self.closing:
             return
         (first, *_), (second, *_) = pybullet.getJointStates(self.body, self.fingers, physicsClientId=self.client)
@@ -140,7 +140,7 @@ class Manipulator:
             )
 
     def pressing(self, other: int, part: int = -1) -> tuple[float, ...]:
-        """Return the normal force in newtons with which each finger presses a body, or the link of that number."""
+        """Return the normal force in newtons with which each finger presses a body, or its link `part`."""
         forces = []
         for link in self.fingers:
             contacts = pybullet.getContactPoints(self.body, other, link, part, physicsClientId=self.client)
@@ -148,18 +148,18 @@ class Manipulator:
         return tuple(forces)
 
     def meets(self, other: int) -> bool:
-        """Whether some part of the robot touches a body."""
+        """Return whether any part of the robot touches a body."""
         found = pybullet.getContactPoints(self.body, other, physicsClientId=self.client)
         return any(contact[9] > 0 for contact in found)
 
     @property
     def first_finger(self) -> Array:
-        """Where the first finger goes as the hand opens, in the hand's frame."""
+        """Direction of the first finger's motion as the hand opens, in the hand's frame."""
         axis: Array = self.arm.tip_rotation.T @ self.model.joints[self.hand.fingers[0]].axis
         return axis
 
     def push(self) -> float:
-        """Return the newtons with which the fingers press things ahead of the hand."""
+        """Return the force in newtons with which the fingers press bodies ahead of the hand."""
         ahead = self.frame()[0][:, 0]
         total = 0.0
         for link in self.fingers:
@@ -169,8 +169,8 @@ class Manipulator:
         return total
 
 
-def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
-    """Load a robot with its arms at home; return the body, its hands and the spheres of what no arm moves."""
+def load_robot(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
+    """Load a robot with its arms at home; return its body, its hands and the spheres of the links that no arm moves."""
     body = _load(client, robot)
     model = read_robot(robot)
     numbers, links, efforts = {}, {-1: robot.name}, {}
@@ -184,7 +184,7 @@ def load(client: int, robot: Robot) -> tuple[int, list[Manipulator], Spheres]:
 
 
 def _load(client: int, robot: Robot) -> int:
-    """Put a robot's body into a physics world."""
+    """Load a robot's body into a physics world."""
     flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
     place = {
         "basePosition": robot.position,
@@ -206,7 +206,7 @@ def _manipulator(
     body: int,
     robot: Robot,
     hand: Hand,
-    model: Model,
+    model: UrdfModel,
     numbers: Mapping[str, int],
     links: Mapping[int, str],
     efforts: Mapping[str, float],
@@ -235,7 +235,7 @@ def _look_up(numbers: Mapping[str, int], names: Sequence[str]) -> tuple[int, ...
 
 
 def _go_home(manipulator: Manipulator) -> None:
-    """Start at home: the only time that joints are set instead of driven."""
+    """Set the arm's joints to the home posture; later its motors drive them."""
     values = (*manipulator.hand.home, *[manipulator.hand.opening] * len(manipulator.fingers))
     for joint, value in zip((*manipulator.joints, *manipulator.fingers), values, strict=True):
         pybullet.resetJointState(manipulator.body, joint, value, physicsClientId=manipulator.client)

@@ -1,7 +1,7 @@
-"""Many rollouts of a plan: one after another, in processes of this machine, or on a Ray cluster.
+"""Many rollouts of a plan: in this process, in several processes, or on a Ray cluster.
 
-What a rollout does depends on its trial and seed alone, so where it runs makes no difference to it. Processes are spawned, not
-forked; one that dies costs the rollout that it was at, which another process then runs again.
+The result of a rollout depends only on its trial and seed, not on the place where it runs. Processes are spawned, not forked. If
+one dies, another process repeats its rollout.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from reasoner.symbols import State
 from sim.engine import Engine
 from sim.staging import Perturbation
 from sim.verify import Rollout, verify
-from sim.world import Step, World
+from sim.world import PrimitiveStep, World
 
 TRIES = 3
-"""So many processes may die at a rollout before it is given up."""
+"""Number of processes that die at the same rollout before it is given up."""
 
 RAY = "ray"
-"""Workers of this name, or whose address begins with ``ray://``, are a Ray cluster's."""
+"""Value of `workers`, or scheme of their address, that selects a Ray cluster."""
 
 Done = Callable[[Rollout], None]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What is rolled out: the arguments of `sim.verify.verify` without the seed."""
+    """The arguments of `sim.verify.verify` without the seed."""
 
     embodiment: Embodiment
     initial: State
-    steps: Sequence[Step]
+    steps: Sequence[PrimitiveStep]
     expected: Sequence[State]
     perturb: Perturbation | None = None
     beads: bool = True
@@ -50,10 +50,10 @@ class Trial:
         self,
         seed: int,
         watch: Callable[[Engine], None] | None = None,
-        progress: Callable[[int, Step], None] | None = None,
+        progress: Callable[[int, PrimitiveStep], None] | None = None,
         gui: bool = False,
     ) -> Rollout:
-        """Return the rollout of a seed, carried out here and now."""
+        """Execute the rollout of a seed in this process."""
         return verify(
             self.embodiment,
             self.initial,
@@ -71,7 +71,7 @@ class Trial:
 
 
 def wilson(good: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return Wilson's confidence interval of a share, by default at 95 %.
+    """Return Wilson's confidence interval of the share `good` of `of`, by default at 95 %.
 
     >>> low, high = wilson(98, 100)
     >>> print(f"{low:.3f} {high:.3f}")
@@ -89,13 +89,13 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     Parameters
     ----------
     trial : Trial
-        With more than one worker it is pickled, so its `prepare` must be a function or a `functools.partial` of one.
+        Pickled if there is more than one worker, so `prepare` must be a function or a `functools.partial` of one.
     seeds : sequence of int
     workers : int or str
-        How many processes, 1 for this one; or ``ray`` for the Ray cluster that this machine belongs to (one is started if there
-        is none), or a cluster's address, ``ray://HOST:PORT``.
+        Number of processes (1: this one); or ``ray`` for the Ray cluster of this machine, which is started if need be; or a
+        cluster's address, ``ray://HOST:PORT``.
     done : callable, optional
-        Called with each rollout when it is done, in whatever order that happens.
+        Called with each rollout as soon as it is finished, in the order of completion.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
 
 
 def _stream(trial: Trial, seeds: Sequence[int], workers: int | str) -> Iterator[Rollout]:
-    """Choose where to run, and yield rollouts as they are done."""
+    """Yield rollouts in the order of completion from the workers that `workers` selects."""
     name = str(workers)
     if name == RAY or name.startswith(f"{RAY}://"):
         return _on_ray(trial, seeds, name)
@@ -128,8 +128,8 @@ def _stream(trial: Trial, seeds: Sequence[int], workers: int | str) -> Iterator[
 
 
 def _work(connection: Connection, trial: Trial) -> None:
-    """Run the seeds that come through the connection, until it closes; what is raised is sent in place of a rollout."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started this process ends it
+    """Run the seeds received through the connection until it closes; send each rollout, or the exception that it raised."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     try:
         while True:
             seed = connection.recv()
@@ -143,7 +143,7 @@ def _work(connection: Connection, trial: Trial) -> None:
 
 @dataclass
 class _Pool:
-    """Processes at work on seeds."""
+    """A pool of processes that run the rollouts of seeds."""
 
     trial: Trial
     seeds: Sequence[int]
@@ -156,7 +156,7 @@ class _Pool:
         self.waiting = deque(self.seeds)
 
     def stream(self) -> Iterator[Rollout]:
-        """Yield rollouts as they are done; end all processes in any case."""
+        """Yield rollouts in the order of completion; end all processes afterwards, also after an exception."""
         try:
             for _ in range(min(self.size, len(self.seeds))):
                 self._start()
@@ -173,7 +173,7 @@ class _Pool:
                 process.kill()
 
     def _start(self) -> None:
-        """Start a process at the seed that waits longest."""
+        """Start a process with the next seed."""
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
         process = context.Process(target=_work, args=(there, self.trial), daemon=True)
@@ -182,7 +182,7 @@ class _Pool:
         self._give(here, process)
 
     def _give(self, connection: Connection, process: BaseProcess) -> None:
-        """Give a process its next seed, or let it go."""
+        """Send a process its next seed, or close its connection if none is left."""
         if not self.waiting:
             connection.close()
             return
@@ -191,7 +191,7 @@ class _Pool:
         connection.send(seed)
 
     def _receive(self, connection: Connection) -> Rollout | None:
-        """Return what a process has done; None if it died, and another one begins where it left off."""
+        """Return the rollout of a process, or None if the process died; its seed then goes to a new process."""
         process, seed = self.busy.pop(connection)
         try:
             result: Rollout | Exception = connection.recv()
@@ -205,7 +205,7 @@ class _Pool:
         return result
 
     def _replace(self, process: BaseProcess, seed: int) -> None:
-        """Start a new process for the seed at which one died."""
+        """Start a new process for the seed of a dead one, or raise `RuntimeError` after `TRIES` deaths."""
         process.join()
         self.deaths[seed] += 1
         if self.deaths[seed] >= TRIES:
@@ -220,7 +220,7 @@ class _Pool:
 
 
 def _on_ray(trial: Trial, seeds: Sequence[int], address: str) -> Iterator[Rollout]:
-    """Yield rollouts as a Ray cluster has done them; one whose worker died is run again by Ray."""
+    """Yield rollouts of a Ray cluster in the order of completion; Ray repeats those whose worker died."""
     try:
         import ray
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""A skill that is being carried out: who takes part, what was measured, where things were seen, the way that was chosen."""
+"""The state of a running skill: participants, measured numbers, perceived features, chosen grasp."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from reasoner.embodiment.skills import TERM
 from reasoner.embodiment.values import Phase
 from sim.attempt import Attempt
 from sim.engine import Engine
-from sim.features import Frame, Ways, locate, touched
+from sim.features import FeatureFrame, Ways, locate, touched
 from sim.linkage import wide
 from sim.mechanisms import Mechanic
 from sim.stages import Numbers
@@ -17,12 +17,12 @@ from sim.urdf import Array
 from sim.verdict import SkillError, named
 
 TOLD = ("object", "source", "target", "place")
-"""The order in which a failure names who takes part."""
+"""The order in which a failure names the participants' roles."""
 
 
 @dataclass
 class Run:
-    """One execution of a skill: who takes part, what was measured, the way chosen, what is held and where things were seen."""
+    """A running skill: its participants by role, measured numbers, chosen grasp, gripped link or body, and perceived features."""
 
     attempt: Attempt
     roles: Mapping[str, str]
@@ -30,7 +30,7 @@ class Run:
     measured: dict[str, float] = field(default_factory=dict)
     way: Ways | None = None
     gripped: str = ""
-    seen: dict[tuple[str, str], Frame] = field(default_factory=dict)
+    seen: dict[tuple[str, str], FeatureFrame] = field(default_factory=dict)
 
     @property
     def world(self) -> Engine:
@@ -39,10 +39,10 @@ class Run:
 
     @property
     def spread(self) -> float:
-        """Metres by which each finger of an open hand is open."""
+        """Opening in metres of each finger of an open hand."""
         return self.numbers.get("spread", self.attempt.hand.hand.opening)
 
-    def who(self, target: str) -> tuple[str, str]:
+    def feature_of(self, target: str) -> tuple[str, str]:
         """Return the individual and the feature of ``role.feature``."""
         role, _, feature = target.partition(".")
         name = self.roles[role]
@@ -50,9 +50,9 @@ class Run:
             self.attempt.body(name)
         return name, feature
 
-    def at(self, target: str, values: Mapping[str, float] | None = None) -> Frame:
-        """Return where ``role.feature`` is perceived to be: looked at once in a skill, so that noise doesn't make it jump."""
-        name, feature = self.who(target)
+    def at(self, target: str, values: Mapping[str, float] | None = None) -> FeatureFrame:
+        """Return the perceived frame of ``role.feature``; an object's is measured once per skill, so that noise doesn't move it."""
+        name, feature = self.feature_of(target)
         if name in self.world.links:
             frame = locate(self.world, name, feature, values)
             return replace(frame, point=frame.point + self.world.shift(self.world.links[name]))
@@ -62,13 +62,13 @@ class Run:
 
     def joint(self, target: str) -> tuple[Mechanic, str]:
         """Return the mechanism and the link of ``role.feature``."""
-        name, _ = self.who(target)
+        name, _ = self.feature_of(target)
         if name not in self.world.links or name not in self.world.links[name].joints:
             raise SkillError("no grasp", (name,), f"{name} has no joint that could be moved")
         return self.world.links[name], name
 
     def number(self, expression: str, link: str = "") -> float:
-        """Return the value of an expression: settings, and what is said of the joint of a `link`, with signs between them."""
+        """Return the value of a sum of settings, numbers and, with `link`, the named values of its joint (opened, shut, …)."""
         known = dict(self.numbers)
         if link:
             one = self.world.links[link].link(link)
@@ -77,18 +77,18 @@ class Run:
         return evaluate(expression, known)
 
     def things(self) -> tuple[str, ...]:
-        """Return what takes part, what is held included and the hand excepted."""
+        """Return the participants and the held body, without the hand."""
         held = self.attempt.held
         ordered = sorted(self.roles.items(), key=lambda pair: TOLD.index(pair[0]) if pair[0] in TOLD else len(TOLD))
         return named(*(name for role, name in ordered if role != "hand"), *([] if held is None else [held]))
 
     def arrived(self, goal: Array) -> None:
-        """Check that the hand is where it should be, if the skill says how exactly."""
+        """Check that the hand is at its goal, if the skill states a tolerance."""
         if "tolerance" in self.numbers:
             self.measured |= self.attempt.check_arrival(goal, self.numbers)
 
     def free_of(self, phase: Phase) -> tuple[str, ...]:
-        """Return the names of what a phase may touch: of a link the parts at the feature, of a place what carries it."""
+        """Return the names that a phase may touch: objects, the parts of a link at a feature, fixtures and carriers of a place."""
         found: list[str] = []
         for word in phase.touches:
             if word == "supports":
@@ -96,14 +96,14 @@ class Run:
                 below = self.world.nearest_place(self.attempt.hand.frame()[1])[0]
                 found.append(self.world.embodiment.places[self.roles.get("place", below)].carrier)
             elif "." in word:
-                found += touched(self.world, *self.who(word))
+                found += touched(self.world, *self.feature_of(word))
             elif word in self.roles:
                 found.append(self.roles[word])
         return tuple(found)
 
 
 def evaluate(expression: str, known: Mapping[str, float]) -> float:
-    """Return the sum that an expression names.
+    """Return the value of a sum of numbers and names.
 
     >>> round(evaluate("raised-0.03", {"raised": 0.19}), 2)
     0.16

@@ -1,6 +1,6 @@
-"""The world on a screen, for people who have one: PyBullet's own window, which doesn't run faster than the simulated time.
+"""The world in PyBullet's window, at the pace of the simulated time.
 
-What is shown changes nothing: a rollout on a screen gives what it gives without one.
+The window does not change the results of a rollout.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from sim.engine import Engine
 from sim.picture import view_of
 
 OFTEN = 4
-"""Steps between two looks at the clock."""
+"""Simulation steps between comparisons with the clock."""
 
 
 def require_screen() -> None:
-    """Raise `RuntimeError` if there is no display to open a window on: PyBullet itself would end the process.
+    """Raise `RuntimeError` if no display is available, since PyBullet itself would end the process.
 
     Raises
     ------
     RuntimeError
-        There is none; the message says what to do.
+        No display is available; the message says what to do.
     """
     if sys.platform != "linux":
         return
@@ -48,14 +48,14 @@ def require_screen() -> None:
 
 
 class Screen:
-    """Shows a world that it watches: give it to `sim.verify.verify` as `watch`, with ``gui=True``.
+    """A window's camera, caption and pace: pass it to `sim.verify.verify` as `watch`, with ``gui=True``.
 
     Parameters
     ----------
     titles : sequence of str
-        What to write above the table for each primitive.
+        Caption of each primitive.
     speed : float
-        How much faster than the simulated time it may run.
+        Maximum ratio of simulated time to real time.
     """
 
     def __init__(self, titles: tuple[str, ...] = (), speed: float = 1.0) -> None:
@@ -64,7 +64,7 @@ class Screen:
         self._current, self._caption = -1, -1
 
     def __call__(self, world: Engine) -> None:
-        """Keep pace with the clock, and write what is done."""
+        """Wait for the clock, and update the caption."""
         if self._begin is None:
             self._begin = time.monotonic(), world.steps
             self._look(world)
@@ -78,7 +78,7 @@ class Screen:
                 time.sleep(ahead)
 
     def _look(self, world: Engine) -> None:
-        """Turn the window's camera to where films are taken from."""
+        """Set the window's camera to the view of films."""
         camera = view_of(world.embodiment)
         x, y, z = np.array(camera.target) - np.array(camera.eye)
         distance = float(np.linalg.norm([x, y, z]))
@@ -89,7 +89,7 @@ class Screen:
         pybullet.resetDebugVisualizerCamera(distance, yaw, pitch, camera.target, physicsClientId=client)
 
     def _write(self, world: Engine) -> None:
-        """Write the primitive that is done now above the middle of the places."""
+        """Write the present primitive's caption above the middle of the places."""
         if not 0 <= self._current < len(self.titles):
             return
         x, y, z = np.mean([place.position for place in world.embodiment.places.values()], axis=0)

@@ -1,6 +1,6 @@
-"""What cameras see: a body of which other things leave too little in view is hidden, and only believed to be where it was.
+"""Visibility: a body of which a camera sees too small a share is hidden, and its last known position is believed.
 
-Rays go from each camera to points all over a body; beads don't count as bodies. Furniture, links and robots are always known.
+Rays are cast from each camera to points on the body's surface. Beads are not checked; furniture, links and robots are always known.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from sim.bodies import outline
 from sim.urdf import Array
 
 SHARE = 0.1
-"""Share of the points of a body that a camera must see for the body to be seen: less is a crack."""
+"""Minimum share of a body's points that a camera has to see for the body to count as seen."""
 
 BARED = 0.5
-"""Share of the points at which a body is believed to be that are seen to be empty where it is gone."""
+"""Minimum share of points at a body's believed pose that a camera has to see empty for the body to count as gone."""
 
 BEHIND, ABOVE, ASIDE = 0.1, 0.8, 0.5
-"""Metres from the middle of a robot's shoulders, against its heading, up and to either side, of its cameras if none are stated."""
+"""Position in metres of a robot's default cameras relative to the middle of its shoulders: back, up and to either side."""
 
 ROUND = 8
-"""Points around a body at each height."""
+"""Number of points around a body at each height."""
 
 HEIGHTS = (0.3, 0.65, 0.95)
-"""Shares of a body's height at which its points are."""
+"""Heights of the points, as shares of the body's height."""
 
 BEYOND = 0.01
-"""Metres by which a ray goes on behind a point on a surface."""
+"""Metres by which a ray continues behind a point on the surface."""
 
 WITHIN = 0.8
-"""By how much nearer to a body's middle the points are that are seen to be empty: beside them may be a wall."""
+"""Share of the radius at which points must be empty for a body to count as gone; full radius might meet a wall beside it."""
 
 
 @dataclass(frozen=True)
 class Sight:
-    """Which bodies are seen, which aren't where they are believed to be, and what is before most of one that isn't seen."""
+    """The seen bodies, those gone from their believed pose, and for each hidden body the number of the one that covers it most."""
 
     seen: frozenset[str] = frozenset()
     gone: frozenset[str] = frozenset()
@@ -48,7 +48,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Sought:
-    """A body that is looked for: its number (-1 if it is there no more), its shape, where it is, and is believed to be."""
+    """A body to look for: its number (-1 if it was removed), its shape, its true pose and its believed pose."""
 
     name: str
     body: int
@@ -58,7 +58,7 @@ class Sought:
 
 
 def over_the_shoulders(shoulders: Array, yaw: float) -> Array:
-    """Return the cameras (2, 3) of a robot of which none are stated, from its shoulders (n, 3) and heading."""
+    """Return the default cameras (2, 3) of a robot, given its shoulders (n, 3) and heading."""
     ahead, left = np.array([np.cos(yaw), np.sin(yaw), 0.0]), np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     middle = np.array([*shoulders[:, :2].mean(0), shoulders[:, 2].max()]) - BEHIND * ahead
     middle[2] += ABOVE
@@ -67,7 +67,7 @@ def over_the_shoulders(shoulders: Array, yaw: float) -> Array:
 
 
 def look(client: int, cameras: Array, things: Sequence[Sought]) -> Sight:
-    """Return what is seen from cameras (n, 3)."""
+    """Return which bodies are seen, gone or covered from cameras (n, 3)."""
     seen, gone, covers = set[str](), set[str](), dict[str, int]()
     for thing in things:
         there = thing.pose is not None and _in_view(client, cameras, thing, thing.pose, covers)
@@ -79,7 +79,7 @@ def look(client: int, cameras: Array, things: Sequence[Sought]) -> Sight:
 
 
 def _in_view(client: int, cameras: Array, thing: Sought, pose: tuple[Array, Array], covers: dict[str, int]) -> bool:
-    """Tell whether enough of a body is seen, and note what is before most of it."""
+    """Return whether enough of a body is seen; add the body that covers most of it to `covers`."""
     points = pose[1] + _points(thing.shape) @ pose[0].T
     for camera in cameras:
         hits = [hit[0] for hit in _cast(client, camera, points, BEYOND)]
@@ -92,14 +92,14 @@ def _in_view(client: int, cameras: Array, thing: Sought, pose: tuple[Array, Arra
 
 
 def _bare(client: int, cameras: Array, thing: Sought, pose: tuple[Array, Array]) -> bool:
-    """Tell whether a camera sees that nothing is where a body is believed to be."""
+    """Return whether a camera sees that a body's believed pose is empty."""
     points = pose[1] + _points(thing.shape, WITHIN) @ pose[0].T
     hits = ([hit[0] for hit in _cast(client, camera, points, 0.0)] for camera in cameras)
     return any(each.count(-1) >= BARED * len(points) for each in hits)
 
 
 def _points(shape: Shape, share: float = 1.0) -> Array:
-    """Return points (n, 3) on a body's outline, or nearer to its axis, in its own frame."""
+    """Return points (n, 3) at a share of the radius of a body, in its own frame."""
     heights, radii = outline(shape)
     angle = np.linspace(0.0, 2 * np.pi, ROUND, endpoint=False)
     rings = []
@@ -111,7 +111,7 @@ def _points(shape: Shape, share: float = 1.0) -> Array:
 
 
 def _cast(client: int, camera: Array, points: Array, beyond: float) -> Sequence[tuple[int, ...]]:
-    """Return what rays from a camera to points meet first."""
+    """Return the first hits of rays from a camera to points."""
     ways = points - camera
     ends = points + beyond * ways / np.linalg.norm(ways, axis=1)[:, None]
     starts = np.broadcast_to(camera, ends.shape)

@@ -1,14 +1,14 @@
-"""Who carries out a primitive: a skill that the ontology describes in phases, or a Python function.
+"""The skills that execute primitives: phases described in the ontology, or Python functions.
 
-Skills in phases are interpreted by `sim.phases`. A Python skill is a function of (engine, roles, numbers): `roles` are the
-individuals that take part (`hand`, `target`, `object`, `place`, `source`), `numbers` its settings from the ontology in metres,
-radians, seconds and newtons. It returns what it measured, or raises `SkillError`. Two are built in, since the path of a lip and
-watching a flow are physics of their own; those of other packages register as entry points of the group `confab.skills`.
+`sim.phases` interprets skills in phases. A Python skill is a function of (engine, roles, numbers): `roles` maps role names (`hand`,
+`target`, `object`, `place`, `source`) to individuals, `numbers` has its settings from the ontology in metres, radians, seconds and
+newtons. It returns its measured numbers, or raises `SkillError`. Two are built in, since phases can express neither the path of a
+lip nor the control of a flow. Skills of other packages register as entry points of the group `confab.skills`.
 
 ============== =============================================================== =======================================
 Python skill   motion                                                          checked in the world
 ============== =============================================================== =======================================
-tilt           roll about the lip until a serving has left, then hold back     a serving arrived; little spilled
+tilt           roll about the lip until a serving has left, then back          a serving arrived; little spilled
 stand_upright  roll back                                                       upright, not slipped
 ============== =============================================================== =======================================
 """
@@ -31,18 +31,18 @@ BUILT_IN: Mapping[str, Skill] = {"tilt": tilt, "stand_upright": stand_upright}
 
 
 def perform(engine: Engine, use: SkillUse, roles: Roles) -> Mapping[str, float]:
-    """Let the robot do what a behaviour's skill says; return what was measured, or raise `SkillError`."""
+    """Execute a behaviour's skill with individuals in its roles; return the measured numbers, or raise `SkillError`."""
     return carry_out(engine, use, roles) if use.phases else skill(use.skill)(engine, roles, use.numbers)
 
 
 def skill(name: str) -> Skill:
-    """Return the Python skill of that name, built in or an entry point; raise `KeyError` that lists the built-in ones."""
+    """Return the Python skill of that name, built in or an entry point; raise `KeyError` with the built-in names if none exists."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     for point in entry_points(group="confab.skills", name=name):
         found: Skill = point.load()
         return found
     raise KeyError(
-        f"skill '{name}' has no e:phase and no function of that name is known (built in: {', '.join(BUILT_IN)}; others "
-        "register in the group confab.skills)"
+        f"skill '{name}' has no e:phase, and there is no Python skill of that name (built in: {', '.join(BUILT_IN)}; "
+        "others register in the group confab.skills)"
     )

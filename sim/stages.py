@@ -1,4 +1,4 @@
-"""The poses in which a hand can be at a point, and the stages of a grasp: geometry alone."""
+"""The candidate poses of a hand at a point, and the stages of a grasp: geometry alone."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from sim.urdf import Array
 Numbers = Mapping[str, float]
 
 MARGIN = 0.008
-"""Metres kept off everything."""
+"""Margin in metres to all obstacles."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Poses (n, 6) that all candidates must allow, what may be touched there, and what else there is around by then.
+    """One stage of a motion: a pose (n, 6) for each candidate, `ignored` obstacles, and the surroundings by then if they differ.
 
-    The fingers have by then `closed` around something, or are as the others' are. At a handle, which is `near` what it is on,
-    a hand keeps off other things by little. Every joint keeps `slack` radians more than usual from its limits, and
-    `fold` from where the arm would be stretched.
-    What the hand holds now is `released` by then. The joint that is moved is at `joint`.
+    The fingers are `closed` around something. The hand is `near` the thing whose handle it holds, so its margin is small. Every
+    joint keeps `slack` radians more than usual from its limits, and `fold` radians from the stretched arm. The present load is
+    `released`. The moved joint of furniture has the value `joint`.
     """
 
     poses: Array
@@ -39,13 +38,13 @@ class Stage:
 
 
 def fan() -> tuple[Array, Array]:
-    """Return yaws and swivels (n,) of all the ways to be at a point that are considered."""
+    """Return the yaws and swivels (n,) of all candidate poses at a point."""
     yaw, swivel = np.meshgrid(YAWS, SWIVELS)
     return yaw.ravel(), swivel.ravel()
 
 
 def grip_stages(grip: Array, numbers: Numbers, ignored: tuple[str, ...] = ()) -> tuple[Stage, Stage, Stage]:
-    """Return the stages of a grasp at point `grip` (3,): around it, before it, and raised above it, for the whole `fan`."""
+    """Return the stages of a grasp at point `grip` (3,) for the whole `fan`: grasp, approach before it, lift after it."""
     yaw, swivel = fan()
     heading = np.stack([np.cos(yaw), np.sin(yaw), 0 * yaw], -1)
     raised = np.array([0.0, 0.0, numbers["raised"]])

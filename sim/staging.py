@@ -1,4 +1,4 @@
-"""Setting the stage: furniture, robots, and the bodies and beads that a draft speaks of, put into an engine."""
+"""Set up a new world: furniture, robots, and the bodies and beads of a draft."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from sim.driving import take_up
 from sim.engine import Bead, Engine, Thing
 from sim.mechanisms import load_mechanism
 from sim.perception import Draft
-from sim.robot import load
+from sim.robot import load_robot
 from sim.urdf import Array
 
 SETTLING = 120
-"""Steps in which bodies and beads come to rest before anything is done."""
+"""Simulation steps in which bodies and beads come to rest before the first primitive."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
-"""A triangle too small to see: `sim.picture` draws the beads, PyBullet would draw them at great cost."""
+"""An invisibly small triangle, the visual shape of beads: `sim.picture` draws them, since PyBullet would be slow."""
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """How a rollout may differ from the nominal world: each range is drawn from evenly, per body.
+    """Ranges of random deviations from the nominal world, drawn uniformly for each body.
 
-    Mechanisms are shifted as bodies are, turned by `turn`, and their joints' friction and damping vary by `resistance`. A base
-    that drives stops by up to `stop` metres and radians beside where it should.
+    Mechanisms are shifted by `position` and turned by `turn`, and their joints' friction and damping are multiplied by
+    `resistance`. A mobile base stops up to `stop` metres and radians off its goal.
     """
 
     position: float = 0.010
@@ -53,7 +53,7 @@ def furnish(engine: Engine, perturb: Perturbation | None) -> None:
         engine.names[mechanic.body] = mechanism.name
         engine.links |= dict.fromkeys((mechanism.name, *mechanic.joints), mechanic)
     for robot in engine.embodiment.robots:
-        number, hands, still = load(engine.client, robot)
+        number, hands, still = load_robot(engine.client, robot)
         engine.names[number], engine.standing[robot.name] = robot.name, still
         engine.hands |= {hand.hand.name: hand for hand in hands}
         if robot.driving:
@@ -61,7 +61,7 @@ def furnish(engine: Engine, perturb: Perturbation | None) -> None:
 
 
 def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None) -> Mechanism:
-    """Return a mechanism as it stands in this world."""
+    """Return a mechanism with its random deviations."""
     if perturb is None:
         return mechanism
     (x, y, z), limit = mechanism.position, perturb.position
@@ -76,7 +76,7 @@ def _shifted(engine: Engine, mechanism: Mechanism, perturb: Perturbation | None)
 
 
 def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: bool) -> None:
-    """Put the bodies of a draft, and what fills them, into an engine; let all come to rest."""
+    """Put the bodies of a draft and their contents into an engine, and let them come to rest."""
     for name, opened in draft.opened.items():
         if name not in engine.links:
             raise ValueError(f"'{name}' is open or shut, but is no e:Link of a mechanism")
@@ -112,7 +112,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
 
 
 def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None) -> tuple[Shape, Array, float]:
-    """Return shape, position and yaw of a body at a place, perturbed if that is wanted."""
+    """Return shape, position and yaw of a body at a place, with random deviations if `perturb` is given."""
     position, yaw = engine.place(place), 0.0
     if perturb is not None:
         limit = perturb.position
@@ -132,7 +132,7 @@ def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None
 
 
 def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | None = None) -> None:
-    """Let a vessel's beads go just above its bottom; PyBullet shows them only in a window."""
+    """Fill a vessel with beads, released just above its bottom. PyBullet draws them only in a window."""
     kind = engine.embodiment.fillings[filling]
     share = 1.0 if perturb is None else float(engine.rng.uniform(*perturb.fill))
     count = round(kind.serving * engine.filled.get(name, engine.embodiment.bodies[name].servings) * share)
@@ -164,14 +164,14 @@ def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | Non
 
 
 def doze(engine: Engine) -> None:
-    """Let what has come to rest sleep until something touches it: beads at rest cost nothing then."""
+    """Put bodies and beads to sleep until something touches them, so that beads at rest cost no time."""
     for body in [*[thing.body for thing in engine.bodies.values()], *[bead.body for bead in engine.beads]]:
         for state in (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_SLEEP):
             pybullet.changeDynamics(body, -1, activationState=state, physicsClientId=engine.client)
 
 
 def _make_fixture(client: int, fixture: Fixture) -> int:
-    """Make a piece of furniture that does not move."""
+    """Create a fixture, which does not move; return its body."""
     half = [extent / 2 for extent in fixture.size]
     body = pybullet.createMultiBody(
         0,

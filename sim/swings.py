@@ -1,7 +1,7 @@
-"""What stands in the way of a link that moves with its joint: now, and wherever else it would.
+"""Bodies that block the motion of a link, at their present places and at all other places.
 
-Whoever moves the link, and whichever way: a body that the link would meet between `shut` and `opened` stops it. So one motion
-that is found blocked tells of all that would be blocked likewise.
+A body that the link would touch between `shut` and `opened` blocks it for every hand and in both directions. So one blocked motion
+refutes all similar ones.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from sim.urdf import Array
 from sim.verdict import SkillError
 
 SAMPLES = 9
-"""Values of a joint at which its link is looked at on its way."""
+"""Number of values of a joint at which its link is checked."""
 
 
 def gap(world: Engine, link: str, values: Sequence[float], body: str, pose: tuple[Array, Array]) -> float:
-    """Return the metres that a link keeps from a body at a pose, on its way through some values of its joint."""
+    """Return the smallest distance in metres between a link and a body at a pose, over some values of the link's joint."""
     mechanic, shape = world.links[link], world.bodies[body].shape
     spheres = column(*outline(shape), bottom=height_of(shape) / 10)
     points = pose[1] + spheres.centers @ pose[0].T
@@ -41,7 +41,7 @@ def gap(world: Engine, link: str, values: Sequence[float], body: str, pose: tupl
 
 
 def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
-    """Raise `SkillError` if a body stands where a link passes on its way through some values of its joint."""
+    """Raise `SkillError` if a body blocks a link at one of some values of its joint."""
     for name in world.bodies:
         if not world.knows(name):
             continue
@@ -56,7 +56,7 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
 
 
 def refuted(world: Engine, symbols: Iterable[Symbol], link: str) -> tuple[Refutation, ...]:
-    """Return what can't be done as long as something stands in the way of a link, wherever that would be, whoever does it."""
+    """Return the refutations of moving a link, by any hand, while a body is at a place where it blocks the link."""
     found = [fact for symbol in symbols for fact in _in_the_way(world, symbol, link)]
     return tuple(
         Refutation(
@@ -73,7 +73,7 @@ def _why(link: str, fact: Fact) -> str:
 
 
 def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
-    """Yield the role of a link that a skill moves all the way between shut and opened."""
+    """Yield the role of a link in a skill that moves it all the way to shut or opened."""
     one = world.links[link].link(link)
     known = {"opened": one.opened, "shut": one.shut, "lower": one.lower, "upper": one.upper, "wide": wide(one)}
     for phase in use.phases:
@@ -85,7 +85,7 @@ def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
 
 
 def _in_the_way(world: Engine, symbol: Symbol, link: str) -> Iterator[Fact]:
-    """Yield where a body would be in the way: at which places, and in a hand that has taken it from where it is."""
+    """Yield the facts under which a body blocks the link: its places, and a hand that has lifted it from its present place."""
     use, body = world.embodiment.perceivers[symbol.situation], symbol.arguments[0]
     if use.perceiver != "perceive_place" or body not in world.bodies or not world.knows(body):
         return
@@ -100,7 +100,7 @@ def _in_the_way(world: Engine, symbol: Symbol, link: str) -> Iterator[Fact]:
 
 
 def _lifted_into(world: Engine, use: PerceiverUse, link: str, body: str, place: str, values: Sequence[float]) -> bool:
-    """Tell whether a body that stands at a place is in the way, too, where a hand has lifted it from there."""
+    """Return whether a body that stands at a place still blocks the link after a hand has lifted it from there."""
     point = world.place(place)
     rotation, base = world.sense(body)
     if float(np.linalg.norm(base - point)) > use.numbers["nearness"]:

@@ -1,8 +1,8 @@
-"""Both hands at once: several skills run at the same time in one world, each as if it were alone.
+"""Several hands at once: skills run concurrently in one world, each as if it were alone.
 
-A skill asks the world to go on by some steps. Here every skill has a thread of its own that waits for each step; when all that
-are at work wait, the world makes one step for all of them. Only one thread runs at any time, always in the same order, so that
-the same call gives the same course of events.
+A skill asks the world to simulate some steps. Here every skill runs in a thread of its own that waits for each step; when all
+running skills wait, the world makes one step for all of them. Only one thread runs at any time, in a fixed order, so that equal
+calls give equal results.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from sim.verdict import Verdict
 from sim.world import World
 
 ROOM = 0.25
-"""Metres between the places at which two hands may work at the same time."""
+"""Minimum distance in metres between the places at which two hands work at the same time."""
 
 FLOWING = {"tilt", "stand_upright"}
-"""Skills that watch what goes beside: two of them at once would see each other's drops, so they take turns."""
+"""Skills that count spilled beads; they run one at a time, since each would count the other's."""
 
 LOOKING = 6
-"""So many steps lie between two looks for contact between the arms."""
+"""Simulation steps between checks for contact between the arms."""
 
 
 @dataclass(frozen=True)
 class Performance:
-    """What came of a schedule: when each primitive was done, its verdict, and seconds in which the arms touched."""
+    """The result of concurrent execution: slots and verdicts of the primitives, and seconds in which the arms touched."""
 
     slots: tuple[Slot, ...]
     verdicts: tuple[Verdict, ...]
@@ -45,7 +45,7 @@ class Performance:
 
 
 class _Job:
-    """One primitive at work in a thread of its own."""
+    """A primitive that runs in a thread of its own."""
 
     def __init__(self, world: World, step: Step, position: int, worker: str) -> None:
         self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
@@ -65,22 +65,22 @@ class _Job:
         self.paused.release()
 
     def advance(self) -> None:
-        """Let the thread run until it wants a step, or ends."""
+        """Let the thread run until it asks for a step, or ends."""
         self.go.release()
         self.paused.acquire()
         if self.error is not None:
             raise self.error
 
     def wait(self) -> None:
-        """Wait for a step of the world; called in the thread."""
+        """Wait for a step of the world; called in the job's thread."""
         self.paused.release()
         self.go.acquire()
 
 
-def perform(
+def perform_together(
     world: World, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
 ) -> Performance:
-    """Carry out primitives with all hands at once, each as soon as what it needs is done and there is room.
+    """Execute primitives with all hands at once, each as soon as its predecessors are done and there is room.
 
     Parameters
     ----------
@@ -89,9 +89,9 @@ def perform(
         Its initial state is the world's.
     primitives : sequence of Step
     room : float
-        Metres between the places at which two hands may work at the same time.
+        Minimum distance in metres between the places at which two hands work at the same time.
     most : float
-        Simulated seconds after which it is given up.
+        Simulated seconds after which the execution is given up.
     """
     order, workers = partial_order(problem, primitives), workers_of(problem)
     urgency = urgency_of(order)
@@ -148,7 +148,7 @@ def perform(
 
 
 def arms_touch(world: World) -> bool:
-    """Whether two hands of the world, arms included, are in contact with each other."""
+    """Return whether two hands of the world, including their arms, touch each other."""
     owner: dict[tuple[int, int], str] = {}
     for name, hand in world.hands.items():
         owner |= {(hand.body, link): name for link in (*hand.joints, *hand.fingers, hand.tip)}
@@ -161,14 +161,14 @@ def arms_touch(world: World) -> bool:
 
 
 def _seen_to(world: World, step: Step) -> set[str]:
-    """Return the bodies that a primitive moves or may move: those that it names, and what its hand holds."""
+    """Return the bodies that a primitive may move: those that it names, and the loads of its hands."""
     named = {*step.arguments, *step.bindings.values()}
     held = {world.held(hand) for hand in named & world.hands.keys()}
     return {name for name in named | held if name is not None and name in world.bodies}
 
 
 def _where(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
-    """Return a function that says where a primitive is at work now: at its last place or body, else where its hand is."""
+    """Return a function that returns a primitive's present place of work (2,): its last body or place, else its hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 

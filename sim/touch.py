@@ -1,4 +1,4 @@
-"""Touch: fingers that open and close around something, and a hand that gives way to what they feel."""
+"""Touch: fingers that open and close, and corrections of the hand by the forces that they feel."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from sim.urdf import Array
 from sim.verdict import SkillError
 
 CLOSING = 360
-"""Steps within which fingers must have got hold of something."""
+"""Maximum number of steps of a grasp."""
 
 GROPING = 120
-"""Steps after which a hand that has met a handle with one finger only takes hold anew."""
+"""Steps after which a hand that touches a handle with one finger only grasps anew."""
 
 YIELDS, ASIDE_BY = 6, 0.002
-"""So often a hand gives way to what a finger meets, and the metres by which it does."""
+"""Maximum number of times a hand gives way to contact, and the metres by which it does each time."""
 
 ROOM = 0.01
-"""Metres between an open finger and what it shall go around, below which the hand goes as slowly as there is less of it."""
+"""Metres between an open finger and the object below which the hand slows down in proportion."""
 
 SLOWEST = 0.1
-"""The least share of its speed at which it goes."""
+"""Minimum share of its speed to which the hand slows down."""
 
 LOOKING = 6
-"""Steps between looks at what the fingers feel."""
+"""Steps between checks of the fingers' forces."""
 
 CENTRED = 0.001
-"""Metres by which one finger may be ahead of the other for a hand to be centred on what it holds."""
+"""Maximum difference in metres between the fingers' openings of a centred hand."""
 
 
 def _open(run: Run, phase: Phase) -> None:
@@ -50,7 +50,7 @@ def _shut(run: Run, phase: Phase) -> None:
 
 
 def _grasp(run: Run, phase: Phase) -> None:
-    """Close until both fingers have pressed for a while; then centre the hand on what doesn't give way."""
+    """Close until both fingers have pressed for a while; then centre the hand if it holds a link."""
     world, hand, name = run.world, run.attempt.hand, run.roles["object"]
     hand.close()
     pressed, waited = 0, 0
@@ -73,7 +73,7 @@ def _grasp(run: Run, phase: Phase) -> None:
 
 
 def _grope(run: Run) -> None:
-    """Take hold anew of what one finger has met and the other closed beside: around where it was met."""
+    """Grasp anew, centred on a handle that only one finger has touched."""
     hand, shift = run.attempt.hand, off_centre(run)
     hand.open(run.spread)
     run.world.run(CLOSING // 6)
@@ -82,7 +82,7 @@ def _grope(run: Run) -> None:
 
 
 def _centre(run: Run) -> None:
-    """Shift the hand until both fingers have closed equally far: what they hold stands fast, so the hand gives way."""
+    """Shift the hand until both fingers are closed equally far, since the link that they hold does not yield."""
     hand = run.attempt.hand
     for _ in range(3):
         first, second = hand.openings()
@@ -103,7 +103,7 @@ def _shift(run: Run, shift: Array) -> bool:
 
 
 def off_centre(run: Run) -> Array:
-    """Return by how much the middle of the fingers is beside that of what they hold, which is what they feel of it."""
+    """Return the shift (3,) that centres the hand between its fingers, from the difference of their openings."""
     hand = run.attempt.hand
     first, second = hand.openings()
     shift: Array = hand.frame()[0] @ hand.first_finger * (first - second) / 2
@@ -111,7 +111,7 @@ def off_centre(run: Run) -> Array:
 
 
 def draw_back(run: Run) -> None:
-    """Draw the hand back while its fingers press something ahead of it, beside what they hold."""
+    """Draw the hand back while its fingers press something ahead of it."""
     hand = run.attempt.hand
     for _ in range(YIELDS):
         if hand.push() < run.numbers["force"] or not _shift(run, -ASIDE_BY * hand.frame()[0][:, 0]):
@@ -127,10 +127,11 @@ FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
 
 
 def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
-    """Go around something: what a finger meets on the way is farther on its side than it was seen, so the hand gives way.
+    """Move the open fingers around an object; on contact with one finger, shift the hand to that finger's side and continue.
 
-    What the palm meets has come far enough into the hand, which draws back a little. So does a hand that meets a link on its way
-    around a handle: there is room beside a handle, so what it meets is ahead of it, what the handle is on, say.
+    On contact with the palm, the object is far enough inside the hand, which draws back a little and stops. So does a hand in
+    contact with a link on its way around a handle: there is room beside a handle, so the contact is ahead, for example with the
+    door.
     """
     hand = run.attempt.hand
     still = name in run.world.links
@@ -154,14 +155,14 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
         again = hand.pose + beside - goal
         again[:3] += back
         if (first and second) or not run.attempt.reacher(margin=-np.inf).solve(line(again, beside))[1].all():
-            patience = 0  # between both there is no side to give way to
+            patience = 0  # both fingers touch: there is no side to shift to
         elif _shift(run, (again - hand.pose)[:3]):
             goal = beside
     run.arrived(goal)
 
 
 def room(run: Run, name: str) -> float:
-    """Return the metres on either side of an object between the open fingers."""
+    """Return the metres between an object and each open finger."""
     if name not in run.world.bodies:
         return np.inf
     shape = run.world.bodies[name].shape

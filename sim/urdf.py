@@ -1,6 +1,6 @@
-"""The part of a URDF file that kinematics and collision checks need, placed in the world at the zero posture.
+"""The parts of a URDF file that kinematics and collision checks need, placed in the world at the zero posture.
 
-Lengths in metres, angles in radians. Visual geometry and inertia are PyBullet's business, which loads the same file.
+Lengths in metres, angles in radians. Visual geometry and inertia are read by PyBullet, which loads the same file.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sim.meshes import bounds, covered_mesh
 
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
-"""So many links may hang on one another, and so many spheres cover one shape: more is a mistake."""
+"""Maximum depth of a chain of links, and maximum number of spheres that cover one shape; more is refused as a mistake."""
 FARTHEST = 1e6
-"""Metres: no robot is larger, and squares of what is larger by far have no number."""
+"""Maximum absolute value of a number in metres; squares of far larger ones overflow."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint at the zero posture: a point on its axis and the axis' direction in the world, its parent and child links."""
+    """A joint at the zero posture: its parent and child links, a point on its axis and the axis's direction in the world."""
 
     name: str
     kind: str
@@ -61,7 +61,7 @@ class Primitive:
 
 
 @dataclass(frozen=True)
-class Model:
+class UrdfModel:
     """A robot or mechanism at the zero posture: joints by name; by link its frame, the spheres that cover it, and its solids."""
 
     joints: Mapping[str, Joint]
@@ -96,7 +96,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
-def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> Model:
+def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0), yaw: float = 0.0) -> UrdfModel:
     """Read a robot whose base stands at `position` (metres), turned by `yaw` (radians).
 
     Raises
@@ -111,10 +111,12 @@ def read_urdf(path: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0),
     return read_model(text, path, position, yaw)
 
 
-def read_model(text: str, path: str, position: tuple[float, float, float], yaw: float, covered: bool = True) -> Model:
-    """Read a robot or mechanism from the text of a URDF file, `path` being where it is from; raises as `read_urdf` does.
+def read_model(
+    text: str, path: str, position: tuple[float, float, float], yaw: float, covered: bool = True
+) -> UrdfModel:
+    """Read a robot or mechanism from the text of a URDF file at `path`; raises as `read_urdf` does.
 
-    Only what is `covered` by spheres can be moved by a motion planner.
+    With `covered`, its links are covered by spheres, which motion planning needs for an arm.
     """
     try:
         root = ET.fromstring(text)
@@ -149,7 +151,7 @@ def read_model(text: str, path: str, position: tuple[float, float, float], yaw: 
         primitives = {name: tuple(_primitives(link, *frames[name], folder)) for name, link in links.items()}
     except ValueError as problem:
         raise ValueError(f"the robot's URDF {path} can't be used: {problem}") from problem
-    return Model({joint.name: joint for joint in parents.values()}, frames, spheres, parents, primitives)
+    return UrdfModel({joint.name: joint for joint in parents.values()}, frames, spheres, parents, primitives)
 
 
 def _end(joint: ET.Element, which: str) -> str:
@@ -160,7 +162,7 @@ def _end(joint: ET.Element, which: str) -> str:
 
 def _numbers(text: str | None, default: str = "0 0 0") -> Array:
     numbers = np.array([float(word) for word in (text or default).split()])
-    if len(numbers) != 3 or not (np.abs(numbers) <= FARTHEST).all():  # as nan isn't
+    if len(numbers) != 3 or not (np.abs(numbers) <= FARTHEST).all():  # also refuses nan
         raise ValueError(f"'{text}' where three numbers of at most {FARTHEST:,.0f} belong")
     return numbers
 
@@ -243,17 +245,19 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
 
 
 def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, float]]:
-    """Return where a mesh's file is, beside the URDF, above it or among PyBullet's data, and its scale."""
+    """Return the path of a mesh's file, and its scale."""
     x, y, z = _numbers(shape.get("scale"), "1 1 1")
     return mesh_file(shape.get("filename", ""), folder), (float(x), float(y), float(z))
 
 
 def mesh_file(name: str, folder: Path) -> Path:
-    """Return where the file of a mesh is that a URDF in a folder names: beside it, above it, or among PyBullet's data."""
+    """Return the path of a mesh named by a URDF in `folder`: in that folder, in its parent, or among PyBullet's data."""
     name = name.removeprefix("package://")
     places = [place for place in (folder, folder.parent, pybullet_data()) if place and (place / name).is_file()]
     if not name or not places:
-        raise ValueError(f"the mesh '{name}' is neither beside the URDF nor among PyBullet's data")
+        raise ValueError(
+            f"the mesh '{name}' is neither beside the URDF, nor in the folder above, nor among PyBullet's data"
+        )
     return places[0] / name
 
 
@@ -270,11 +274,11 @@ def _primitive(shape: ET.Element) -> tuple[Array, float]:
         radius = float(np.sort(size)[1])
         axes = [_spread(max(half - radius * 0.8, 0.0), radius) for half in size]
         return np.array([[x, y, z] for x in axes[0] for y in axes[1] for z in axes[2]]), radius
-    raise ValueError(f"collision shape '{shape.tag}' is none of box, cylinder, capsule, sphere and mesh")
+    raise ValueError(f"collision shape '{shape.tag}' is unknown; wanted box, cylinder, capsule, sphere or mesh")
 
 
 def _spread(half: float, radius: float) -> Array:
-    """Return positions from -half to half no further apart than the radius."""
+    """Return positions from -half to half that are at most the radius apart."""
     if half <= 0:
         return np.zeros(1)
     if radius * MOST_SPHERES <= 2 * half:

@@ -1,4 +1,4 @@
-"""What physics says about a step: it did what it should, or how it failed, with the objects and the measured number."""
+"""The verdict of physics about a step: success, or a failure code with the objects and the measured numbers."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from reasoner.symbols import Fact
 
 CODES = {
     "unreachable": "no posture of the arm takes the hand there",
-    "goal in collision": "the hand, or what it holds, would touch something there",
+    "goal in collision": "the hand or its load would touch something there",
     "no path": "the hand cannot get there without touching something",
     "tracking error": "the arm did not follow its motion: something stopped it",
     "object disturbed": "something moved that should have stayed where it was",
     "no grasp": "the fingers did not get hold of the object",
     "slip or drop": "the object moved in the hand or fell from it",
     "under-pour": "too little reached the target",
-    "spill": "too much went beside the target",
+    "spill": "too much was spilled beside the target",
     "toppled": "something fell over",
     "misplaced": "the object is not where it should be",
-    "stuck": "the joint did not come to where it should be, or resists too much",
-    "too slow": "the skill did not end in its time",
+    "stuck": "the joint did not reach its target value, or resists too much",
+    "too slow": "the skill exceeded its time limit",
     "ill-defined": "the skill can't be carried out as the ontology describes it",
-    "unexpected": "what is perceived afterwards is not what the behaviour promises",
+    "unexpected": "the perceived facts differ from the behaviour's effects",
 }
-"""Failure codes and what they mean. `Verdict.code` is one of them, or None for success."""
+"""Failure codes and their meanings. `Verdict.code` is one of them, or None for success."""
 
 
 REFUTED = ("no path", "goal in collision")
-"""With these codes a planner of motions says that something can't be done as things stand."""
+"""Codes of failed motion planning, which refute a step in the present state of the world."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a step went in the world. `measured` has numbers by name; the name ends with the unit.
+    """The result of a step in the world. `measured` has numbers by name; the name ends with the unit.
 
-    `facts` say where everything was that took part, if a planner of motions found no way: as long as they hold there is none.
-    If it is the joint of a link that `swings` into something, `likewise` has what else is refuted by that, whoever does it.
+    After failed motion planning, `facts` has the positions of the objects that took part; the step is refuted while they hold. If
+    the cause is a body that blocks the link `swings`, `likewise` has the other steps that it refutes, by any hand.
     """
 
     ok: bool
@@ -57,14 +57,14 @@ class Verdict:
         return head + (f" ({numbers})" if numbers else "")
 
     def _what(self) -> str:
-        """Return the objects, and the message where it says more than the code and names not all of them."""
+        """Return the objects, and the message if it says more than the code; without the objects if it names them all."""
         if self.message in CODES.values():
             return ", ".join(self.objects) or self.message
         unnamed = not all(name in self.message for name in self.objects)
         return ", ".join([*(self.objects if unnamed else ()), *([self.message] if self.message else [])])
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as `confab verify --json` prints it."""
+        """Return the verdict as `confab verify --json` prints it."""
         return {
             "ok": self.ok,
             "code": self.code,
@@ -76,7 +76,7 @@ class Verdict:
 
 
 class SkillError(Exception):
-    """Raised inside a skill when it cannot go on; `World.execute` turns it into a `Verdict`."""
+    """Raised by a skill that fails; `World.execute` turns it into a `Verdict`."""
 
     def __init__(self, code: str, objects: tuple[str, ...] = (), message: str = "", /, **measured: float) -> None:
         super().__init__(message or CODES[code])

@@ -1,4 +1,4 @@
-"""Does a plan work in the world? Its primitives are carried out one by one; what is perceived is held against expectations."""
+"""Verification of a plan in the world: execute its primitives one by one, and compare the perceived with the expected facts."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from sim.engine import Clock, Engine
 from sim.perception import perceiver
 from sim.staging import Perturbation
 from sim.verdict import Verdict
-from sim.world import Step, World
+from sim.world import PrimitiveStep, World
 
 LOOKS = 3
-"""So often is looked, if things aren't seen exactly, before something isn't as expected."""
+"""Maximum number of looks with noisy perception before a difference from the expected state counts."""
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """A primitive and what physics said about it; `seconds` is the simulated time that it took."""
+    """A primitive, its verdict, and the simulated seconds that it took."""
 
-    step: Step
+    step: PrimitiveStep
     verdict: Verdict
     seconds: float
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as `confab verify --json` prints it."""
+        """Return the report as `confab verify --json` prints it."""
         return {"path": list(self.step.path), "id": self.step.id, **self.verdict.as_json()}
 
 
@@ -37,8 +37,8 @@ class StepReport:
 class Rollout:
     """One execution of a plan.
 
-    `poured` is the share of a serving that arrived, per pour; `state` what was perceived last, `believed` what of that rests on
-    belief since it is hidden; `cpu_seconds` leaves out what filming took (`clock.rendering`).
+    `poured` has the share of a serving that arrived for each pour. `state` has the facts perceived last, `believed` those of them
+    about hidden objects. `cpu_seconds` excludes filming (`clock.rendering`).
     """
 
     seed: int
@@ -53,11 +53,11 @@ class Rollout:
 
     @property
     def failure(self) -> StepReport | None:
-        """The step that failed, if one did."""
+        """The failed step, or None."""
         return next((report for report in self.steps if not report.verdict.ok), None)
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as `confab verify --json` prints it."""
+        """Return the rollout as `confab verify --json` prints it."""
         return {
             "seed": self.seed,
             "ok": self.ok,
@@ -69,13 +69,13 @@ class Rollout:
         }
 
 
-def expectations(problem: Problem, steps: Sequence[Step]) -> list[State]:
-    """Return the states that the behaviours of a plan promise, one after each step.
+def expectations(problem: Problem, steps: Sequence[PrimitiveStep]) -> list[State]:
+    """Return the expected state after each step of a plan, computed from the behaviours' effects.
 
     Raises
     ------
     ValueError
-        A step's preconditions don't hold where it is done; the message names it.
+        A step's preconditions don't hold in the state before it; the message names the step.
     """
     state = problem.initial
     states: list[State] = []
@@ -93,7 +93,7 @@ def expectations(problem: Problem, steps: Sequence[Step]) -> list[State]:
 def verify(
     embodiment: Embodiment,
     initial: State,
-    steps: Sequence[Step],
+    steps: Sequence[PrimitiveStep],
     expected: Sequence[State],
     *,
     seed: int = 0,
@@ -102,34 +102,34 @@ def verify(
     noise: float = 0.0,
     prepare: Callable[[World], None] | None = None,
     watch: Callable[[Engine], None] | None = None,
-    progress: Callable[[int, Step], None] | None = None,
+    progress: Callable[[int, PrimitiveStep], None] | None = None,
     gui: bool = False,
 ) -> Rollout:
-    """Carry out the primitives of a plan in a new world until one fails.
+    """Execute the primitives of a plan in a new world until one fails.
 
     Parameters
     ----------
     embodiment, initial
-        What the world is made of, and the facts that it begins with.
-    steps : sequence of Step
+        The world's robots, furniture and bodies, and its initial facts.
+    steps : sequence of PrimitiveStep
         Primitives in the order of execution.
     expected : sequence of State
-        The state after each of them, as `expectations` computes it; symbols without perceiver are not looked at.
+        The state after each of them, as `expectations` computes it; symbols without a perceiver are not compared.
     seed, perturb, beads, noise
         As in `World`.
     prepare : callable, optional
-        Called with the world before the first step: plants a fault, say.
+        Called with the world before the first step, for example a planted fault (`sim.faults`).
     watch : callable, optional
-        Called with the world after every simulation step: a `sim.film.Film`, say.
+        Called with the world after every simulation step, for example a `sim.film.Film`.
     progress : callable, optional
-        Called with the number of steps done and the step that is done next.
+        Called with the number of finished steps and the next step.
     gui : bool
         Show the world in PyBullet's window.
 
     Returns
     -------
     Rollout
-        The same arguments give the same rollout, bit by bit, CPU seconds apart.
+        Equal arguments give equal rollouts, bit by bit, except for CPU seconds.
     """
     begin = time.process_time()
     reports: list[StepReport] = []
@@ -155,9 +155,9 @@ def verify(
 
 
 def compare(world: World, expected: State, verdict: Verdict) -> Verdict:
-    """Return the verdict if what is perceived is what is expected, else one that names the first fact that isn't.
+    """Return the verdict if the perceived facts are as expected, else a failure that names the first different fact.
 
-    Where things aren't seen exactly, what isn't expected is looked at again, and the mean of all looks counts.
+    With noisy perception a difference is looked at again, and the mean of all looks counts.
     """
     for looks in range(1, LOOKS + 1):
         found = _compared(world, expected, verdict)
@@ -176,7 +176,7 @@ def _compared(world: World, expected: State, verdict: Verdict) -> Verdict:
             how = perceiver(world.embodiment.perceivers[symbol.situation].perceiver)
             measured = {**verdict.measured, **(how.measure(world, symbol.arguments) if how.measure else {})}
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
-            who = f"{symbol.situation} of {' '.join(symbol.arguments)}"
-            message = f"{who}: expected {wanted}, seen {got or 'nothing that can be told'}"
+            name = f"{symbol.situation} of {' '.join(symbol.arguments)}"
+            message = f"{name}: expected {wanted}, perceived {got or 'no value'}"
             return Verdict(False, how.code, objects, measured, message)
     return verdict

@@ -1,4 +1,4 @@
-"""The physical world that a plan is carried out in: set up from facts, `observe`, `execute`."""
+"""The physical world in which a plan is executed: set up from facts, `observe`, `execute`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sim.swings import refuted
 from sim.verdict import REFUTED, SkillError, Verdict
 
 
-class Step(Protocol):
+class PrimitiveStep(Protocol):
     """A primitive of a plan, as `planner.plan.Step` is one."""
 
     @property
@@ -46,26 +46,26 @@ class Step(Protocol):
 
 
 class World(Engine):
-    """A physics world with the objects of a scene; close it, or use it in a ``with`` statement.
+    """A physics world with the objects of a scene. Close it after use, or use it in a ``with`` statement.
 
     Parameters
     ----------
     embodiment : Embodiment
         Robots, furniture, places, shapes, skills and perceivers.
     initial : State
-        Facts that the world is set up with, those of situation types that have a perceiver.
+        Initial facts; those of situation types without a perceiver are ignored.
     seed : int
-        Of everything random: perturbation, sampling in motion planning, sensor noise.
+        Seed of all random numbers: perturbation, sampling in motion planning, sensor noise.
     perturb : Perturbation, optional
         Vary poses, friction, masses and fill.
     beads : bool
-        False leaves the beverage out: faster, but nothing can be poured, so contents are taken from `initial` for ever.
+        False leaves the beverage out: faster, but contents are counted from `initial` instead of simulated.
     noise : float
         Standard deviation in metres of perceived positions.
     watch : callable, optional
-        Called with the world after every step of the simulation, for filming.
+        Called with the world after every simulation step, for example a `sim.film.Film`.
     gui : bool
-        Open PyBullet's window (`sim.screen.require_screen` first: where there is no screen PyBullet ends the process).
+        Open PyBullet's window. Call `sim.screen.require_screen` first: without a screen PyBullet ends the process.
     """
 
     def __init__(
@@ -82,12 +82,12 @@ class World(Engine):
         super().__init__(embodiment, seed, noise, gui)
         self.symbols = [symbol for symbol in initial if symbol.situation in embodiment.perceivers]
         joints = [Symbol(use.situation, (link,)) for use in embodiment.perceivers.values() for link in use.links]
-        self.symbols += [symbol for symbol in joints if symbol not in initial]  # what isn't said to be open is shut
+        self.symbols += [symbol for symbol in joints if symbol not in initial]  # joints without a fact are shut
         self.perturb = perturb
         furnish(self, perturb)
         draft = self._draft(initial)
         stage(self, draft, perturb, beads)
-        for name, place in draft.places.items():  # what isn't seen is believed to be where the scene says
+        for name, place in draft.places.items():  # hidden bodies are believed to be where the scene states
             self.remember(name, np.eye(3), self.place(place))
         self.watch = watch
 
@@ -100,7 +100,7 @@ class World(Engine):
         self.close()
 
     def _draft(self, initial: State) -> Draft:
-        """Collect what the facts say about where things are."""
+        """Return the layout of the new world, collected from the facts."""
         draft = Draft()
         for symbol in self.symbols:
             use = self.embodiment.perceivers[symbol.situation]
@@ -109,7 +109,7 @@ class World(Engine):
         return draft
 
     def observe(self) -> State:
-        """Return the facts that are perceived now; a symbol of which nothing can be perceived is left out."""
+        """Return the facts perceived now, without the symbols whose value cannot be perceived."""
         state: dict[Symbol, str] = {}
         for symbol in self.symbols:
             use = self.embodiment.perceivers[symbol.situation]
@@ -119,12 +119,12 @@ class World(Engine):
         return state
 
     def believed(self, state: State) -> tuple[Fact, ...]:
-        """Return the facts of a state that is perceived now which are believed and not seen: of what is hidden."""
+        """Return the facts of a perceived state that rest on belief, since their object is hidden."""
         hidden = {name for name in self.known if not self.perceives(name)}
         return tuple(Fact(symbol, value) for symbol, value in state.items() if symbol.arguments[0] in hidden)
 
-    def execute(self, step: Step) -> Verdict:
-        """Let the robot carry out a primitive; return whether its postcondition holds in the world.
+    def execute(self, step: PrimitiveStep) -> Verdict:
+        """Execute a primitive; return success with the measured numbers, or the skill's failure.
 
         Raises
         ------
@@ -153,8 +153,8 @@ class World(Engine):
                 hand.deadline = math.inf
         return Verdict(True, measured=measured)
 
-    def _with_facts(self, verdict: Verdict, step: Step) -> Verdict:
-        """Return a verdict with where all is that it names, if it found no motion for something that could be elsewhere."""
+    def _with_facts(self, verdict: Verdict, step: PrimitiveStep) -> Verdict:
+        """Return a verdict of failed motion planning with the facts under which it holds: the positions of the objects it names."""
         if verdict.code not in REFUTED:
             return verdict
         spatial = {name for name, use in self.embodiment.perceivers.items() if perceiver(use.perceiver).spatial}

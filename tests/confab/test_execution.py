@@ -72,7 +72,7 @@ def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
         (["--intervene", "at=nan remove cup2"], "seconds from 0 on"),
         (["--intervene", "after=28 goal cup2 COLOUR red"], "unknown situation type 'COLOUR'"),
         (["--intervene", "at=1 cup2 LOCATION in_hand", "--world", "pybullet"], "can't be put at 'in_hand'"),
-        (["--intervene", "after=28 left_hand HOLDS cup2", "--world", "pybullet"], "nobody can make"),
+        (["--intervene", "after=28 left_hand HOLDS cup2", "--world", "pybullet"], "an intervention cannot make"),
         (["--both-hands"], "only in the world pybullet"),
         (["--intervene", "after=28 cup9 LOCATION location8"], "did you mean 'cup"),
         (["--intervene", "after=28 remove cup9"], "did you mean 'cup"),

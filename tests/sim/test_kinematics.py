@@ -159,7 +159,7 @@ def test_numeric_postures_of_neighbouring_poses_are_neighbours_and_always_the_sa
 
 
 def test_an_arm_of_too_few_joints_is_refused() -> None:
-    with pytest.raises(ValueError, match="has 5 joints; 6 or 7 are needed"):
+    with pytest.raises(ValueError, match="has 5 joints; an arm needs 6 or 7"):
         read_arm(read_urdf(URDF), [f"left_{joint}" for joint in JOINTS[:5]], "left_tool")
 
 
@@ -175,7 +175,7 @@ def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:
         ('xyz="0 0 1"', 'xyz="0 1"', "'0 1' where three numbers of at most 1,000,000 belong"),
         ('xyz="0 0 1"', 'xyz="1e300 0 1"', "'1e300 0 1' where three numbers"),
         ('lower="', 'lower="99" was="', "wanted the lower limit first"),
-        ('type="revolute"', 'type="prismatic"', "is prismatic; wanted one that turns"),
+        ('type="revolute"', 'type="prismatic"', "is prismatic; wanted a revolute or continuous joint"),
         ('lower="', 'lower="nan" was="', "'lower' is nan"),
         ('radius="', 'radius="1e-9" was="', "give a thicker one"),
         ('<link name="left_tool"', '<link name="left_tol"', "no link 'left_tool', which the arm"),

@@ -249,7 +249,7 @@ def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
     unset = replace(operate, phases=(replace(operate.phases[0], above="hover"),))
     with World(scene.embodiment, scene.problem.initial, beads=False) as world:
         for use, word in ((wrong, "thing"), (unset, "hover")):
-            with pytest.raises(SkillError, match=f"'{word}' isn't told") as failure:
+            with pytest.raises(SkillError, match=f"'{word}' is not stated") as failure:
                 perform(world, use, {"hand": "left_hand", "object": "door"})
             assert failure.value.verdict.code == "ill-defined"
 

@@ -8,7 +8,7 @@ from sim.arms import read_arm
 from sim.attempt import Attempt, rounding
 from sim.bodies import outline
 from sim.collision import Solid, Surroundings, box, free, read_mover
-from sim.motion import Limits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
+from sim.motion import MotionLimits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from sim.stages import MARGIN, Stage
 from sim.urdf import Array, Spheres, read_urdf
 from sim.verdict import SkillError
@@ -70,7 +70,7 @@ def test_timing_keeps_the_limits_and_ends_at_rest(serving: Case, rate: float) ->
     free = reacher(serving.embodiment)
     q = free.follow(line(START, GOAL))
     assert q is not None
-    limits = Limits(free.arm.velocity, 8.0, 1.0, 4.0)
+    limits = MotionLimits(free.arm.velocity, 8.0, 1.0, 4.0)
     positions, velocities = timed(free.arm, smooth(q), limits, rate)
     np.testing.assert_allclose(positions[-1], q[-1])
     assert np.all(velocities[-1] == 0)
@@ -84,7 +84,7 @@ def test_a_move_too_short_for_a_third_sample_is_timed_like_a_longer_one(serving:
         q = free.follow(line(START, START + np.array([step, 0, 0, 0, 0, 0])))
         assert q is not None
         assert len(q) == 2
-        positions, _ = timed(free.arm, q, Limits(free.arm.velocity, 8.0, 1.0, 4.0), 240.0)
+        positions, _ = timed(free.arm, q, MotionLimits(free.arm.velocity, 8.0, 1.0, 4.0), 240.0)
         np.testing.assert_allclose(positions[-1], q[-1])
         assert len(positions) < 60
 

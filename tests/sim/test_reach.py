@@ -32,7 +32,7 @@ def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_els
 def test_what_keeps_a_hand_from_a_place_is_named_with_the_stage_of_the_grasp(serving: Case) -> None:
     name = "location5"
     place = serving.embodiment.places[name]
-    assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm too far around what stands there",)
+    assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm out of reach when grasping",)
     above = Fixture("lamp", (0.5, 0.5, 0.02), (*place.position[:2], place.position[2] + 0.25))
     hung = replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, above))
     assert hindrance(hung, name)[0] == "left_hand: lamp is in the way when it is lifted"
