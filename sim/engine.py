@@ -329,7 +329,7 @@ class Engine:
 
     @property
     def blur(self) -> float:
-        """Standard deviation in metres of what `sense` returns."""
+        """Standard deviation in metres of the positions that `sense` returns."""
         return self.noise / float(np.sqrt(LOOKS))
 
     def look(self, before: int = 0) -> None:

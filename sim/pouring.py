@@ -47,7 +47,7 @@ NEARLY = 0.9
 """Share of the wanted amount that suffices when the flow stops."""
 
 SPARE = 0.25
-"""Fraction of a serving beyond whole ones that should stay in the source: half of what rounding tolerates. Beads stuck in a neck
+"""Fraction of a serving beyond whole ones that should stay in the source: half of the tolerance of rounding. Beads stuck in a neck
 come
 all at once and cannot be put back, whereas too little only takes another tilt."""
 

@@ -177,6 +177,6 @@ def _compared(world: World, expected: State, verdict: Verdict) -> Verdict:
             measured = {**verdict.measured, **(how.measure(world, symbol.arguments) if how.measure else {})}
             objects = tuple(dict.fromkeys((*symbol.arguments, wanted, *([got] if got else []))))
             name = f"{symbol.situation} of {' '.join(symbol.arguments)}"
-            message = f"{name}: expected {wanted}, perceived {got or 'no value'}"
+            message = f"{name}: expected {wanted}, seen {got or 'no value'}"
             return Verdict(False, how.code, objects, measured, message)
     return verdict

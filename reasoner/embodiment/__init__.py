@@ -1,1 +1,1 @@
-"""What the ontology says about bodies, as values for `sim/`."""
+"""The embodiment: what the ontology states about robots, furniture and objects, as values for `sim/`."""

@@ -1,7 +1,7 @@
-"""What the graph says about bodies, looked up: attributes, links, classes and indices by node.
+"""The graph's statements about bodies as tables: attributes, links, classes and indices by node.
 
-The vocabulary is that of ``ontology/embodiment.ttl``. Attributes are read in one query (every data property below
-``:attribute``), links in another; the rest is looking them up.
+The vocabulary is that of ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``),
+another one the links; all further access is by lookup.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ GREY = "0.7 0.7 0.7 1"
 
 
 class EmbodimentError(KnowledgeError):
-    """What the ontology says about bodies can't be used; the message says what, where, and what to do."""
+    """The ontology's description of a body is unusable; the message says what is wrong, where, and what to do."""
 
 
 @dataclass(frozen=True)
-class Facts:
+class BodyFacts:
     """Attributes, links, classes and indices by node (an IRI)."""
 
     attributes: Mapping[str, Mapping[str, str]]
@@ -65,8 +65,8 @@ class Facts:
     indices: Mapping[str, int]
 
     @classmethod
-    def read(cls, store: ox.Store) -> Facts:
-        """Ask a store."""
+    def read(cls, store: ox.Store) -> BodyFacts:
+        """Return the facts in a store."""
         attributes: dict[str, dict[str, str]] = defaultdict(dict)
         links: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
         for node, name, value in rows(store, ATTRIBUTES):
@@ -77,7 +77,7 @@ class Facts:
         return cls(attributes, links, grouped(rows(store, TYPES)), grouped(rows(store, SUPERS)), indices)
 
     def text(self, node: str, name: str, default: str | None = None) -> str:
-        """Return an attribute's text, or raise that it's missing."""
+        """Return an attribute's text, or `default`; raise `EmbodimentError` if both are missing."""
         value = self.attributes.get(node, {}).get(name, default)
         if value is None:
             raise EmbodimentError(f"{node} has no :{camel(name)} (see ontology/embodiment.ttl)", node)
@@ -88,7 +88,7 @@ class Facts:
         return self.numbers(node, name, None if default is None else str(default))[0]
 
     def numbers(self, node: str, name: str, default: str | None = None) -> tuple[float, ...]:
-        """Return the numbers of an attribute that lists some."""
+        """Return the numbers that an attribute lists."""
         value = self.text(node, name, default)
         try:
             return tuple(float(word) for word in value.split())
@@ -101,7 +101,7 @@ class Facts:
         return (x, y, z)
 
     def turned(self, node: str) -> Vector:
-        """Return a node's roll, pitch and yaw, 0 if nothing is said."""
+        """Return a node's roll, pitch and yaw, each 0 by default."""
         return (self.number(node, "roll", 0.0), self.number(node, "pitch", 0.0), self.number(node, "yaw", 0.0))
 
     def color(self, node: str, default: str = GREY) -> Color:
@@ -112,7 +112,7 @@ class Facts:
         return (numbers[0], numbers[1], numbers[2], numbers[3])
 
     def file(self, node: str, name: str, folders: Sequence[Path]) -> str:
-        """Return where the file is that an attribute names."""
+        """Return the path of the file that an attribute names, from the folders or PyBullet's data."""
         file = self.text(node, name)
         installed = [place.parent for place in [pybullet_data()] if place]
         for folder in (*folders, *installed):
@@ -124,7 +124,7 @@ class Facts:
         )
 
     def all_numbers(self, node: str) -> dict[str, float]:
-        """Return all of a node's attributes that are numbers."""
+        """Return all numeric attributes of a node."""
         found = {}
         for name, value in self.attributes.get(node, {}).items():
             try:
@@ -134,7 +134,7 @@ class Facts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the numbers of a skill or perceiver, those of who uses it before them, adjustments before both."""
+        """Return the numbers of a skill or perceiver, overridden by those of its user, overridden by adjustments."""
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):
             settings |= self.all_numbers(node)
@@ -145,15 +145,15 @@ class Facts:
         return [node for node, values in self.attributes.items() if attribute in values]
 
     def linked(self, node: str, name: str) -> Sequence[str]:
-        """Return what a node is linked to."""
+        """Return the nodes to which a property links a node."""
         return self.links.get(node, {}).get(name, ())
 
     def ordered(self, nodes: Iterable[str]) -> list[str]:
-        """Return nodes by index, those without one last, then by IRI."""
+        """Return nodes ordered by index, those without one last, then by IRI."""
         return sorted(nodes, key=lambda node: (self.indices.get(node, 10**9), node))
 
     def members(self, class_name: str) -> list[str]:
-        """Return the individuals of a class of the vocabulary, or of one below it."""
+        """Return the individuals of a class of the vocabulary and of its subclasses."""
         known, layer = {PREFIXES[""] + class_name}, {PREFIXES[""] + class_name}
         while layer:
             layer = {sub for sub, ups in self.supers.items() if layer & {*ups}} - known
@@ -179,7 +179,7 @@ def rows(store: ox.Store, query: str) -> list[tuple[str, ...]]:
 
 
 def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
-    """Return pairs as lists of second ones by the first."""
+    """Return the second elements of pairs, grouped by the first."""
     groups: dict[str, list[str]] = defaultdict(list)
     for key, value in rows:
         groups[key].append(value)
@@ -198,6 +198,6 @@ def camel(name: str) -> str:
 
 
 def pybullet_data() -> Path | None:
-    """Return the folder of robots and meshes that comes with PyBullet, if that is installed."""
+    """Return the folder of robots and meshes that PyBullet brings, or None if it isn't installed."""
     found = find_spec("pybullet_data")
     return Path(found.origin).parent if found and found.origin else None

@@ -1,6 +1,6 @@
 """Rules of validation on joints and features of links, their solids, and the places that they carry: see `RULES` at the end.
 
-A mechanism with a URDF file has its joints from there; nothing is said of those.
+Mechanisms with a URDF file of their own are not checked.
 """
 
 from __future__ import annotations
@@ -8,21 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part
+from reasoner.embodiment.values import Embodiment, Feature, Flaw, Link, Mechanism, Part
 
 JOINT = "perceive_joint"
-"""The perceiver that tells open from shut."""
-
-Fault = tuple[str, str, str, str]
-"""Short name of the link or part, what, why, remedy."""
+"""The perceiver that distinguishes open from shut."""
 
 
 def _links(embodiment: Embodiment) -> Iterator[Link]:
     return (link for mechanism in embodiment.mechanisms if not mechanism.urdf for link in mechanism.links)
 
 
-def joint_that_stays(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find links that are said to move and can't."""
+def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield links whose joint is stated to move, but cannot."""
     for link in _links(embodiment):
         reach = f"from {link.lower:g} to {link.upper:g}"
         if link.kind == "fixed" and (link.lower or link.upper):
@@ -36,13 +33,13 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Fault]:
             yield (
                 link.name,
                 f"the joint of {link.name} goes {reach}",
-                "it moves from e:lower (0 if nothing is said) up to e:upper",
-                f"state an e:upper of {link.name} above its e:lower; swap the two if they are the wrong way round",
+                "a joint moves from e:lower (0 by default) up to e:upper",
+                f"state an e:upper of {link.name} above its e:lower; swap the two if they are reversed",
             )
 
 
-def threshold_outside(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find joints that are perceived and never count as open or shut, always do, or count as both."""
+def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield perceived joints that never count as open or shut, always do, or count as both."""
     uses = [use for use in embodiment.perceivers.values() if use.perceiver == JOINT]
     perceived = {name for use in uses for name in use.links}
     for link in _links(embodiment):
@@ -59,13 +56,13 @@ def threshold_outside(embodiment: Embodiment) -> Iterator[Fault]:
             yield (
                 link.name,
                 f"the joint of {link.name} goes from {link.lower:g} to {link.upper:g}, and counts as {said}",
-                "where the joint is has to tell open from shut",
+                "the joint's value has to distinguish open from shut",
                 f"state numbers of {link.name} so that e:lower <= e:shut < e:opened <= e:upper",
             )
 
 
-def feature_off_its_part(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find features whose part is further away than the widest hand opens."""
+def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield features whose part is farther away than the widest hand opens."""
     openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
     for link in _links(embodiment) if openings else ():
         own = {part.name: part for part in link.parts if part.kind != "mesh"}
@@ -83,12 +80,12 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Fault]:
 
 
 def _apart(feature: Feature, part: Part) -> float:
-    """Return how far a feature is from a part at least: from the ball around it."""
+    """Return the distance of a feature from the sphere around a part, a lower bound of that from the part."""
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
 
-def part_of_two(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find solids that two links, or a link and its furniture, have in common."""
+def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield solids that two links, or a link and its furniture, share."""
     owners: dict[str, str] = {}
     for name, parts in _bodies(embodiment):
         for part in parts:
@@ -97,13 +94,13 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Fault]:
                 yield (
                     part.name,
                     f"{part.name} is part of {first} and of {name}",
-                    "a solid moves with one of them; it would be there twice",
+                    "a solid moves with one link; a shared one would exist twice",
                     f"give {name} a part of its own",
                 )
 
 
-def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find places on furniture or links that nothing bears, or inside a solid; near meshes or turned solids nothing is said."""
+def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield places on furniture or links without a supporting surface, or inside a solid; near meshes and tilted solids none."""
     bodies = dict(_bodies(embodiment))
     grounds = {mechanism.name: mechanism for mechanism in embodiment.mechanisms}
     for place in embodiment.places.values():
@@ -120,17 +117,17 @@ def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Fault]:
             yield (
                 place.name,
                 f"{place.name} is {where}: it is at ({x:g}, {y:g}, {z:g}) in the frame of {place.carrier}",
-                "what is put down there would fall, or doesn't fit",
-                f"give {place.name} the height of the surface that bears it: e:z of that part plus half its sizeZ or height",
+                "an object put down there would fall, or doesn't fit",
+                f"give {place.name} the height of its supporting surface: e:z of that part plus half its sizeZ or height",
             )
 
 
 SURFACE = 0.005
-"""Metres by which a place may be above or below what bears it."""
+"""Maximum distance in metres between a place and its supporting surface."""
 
 
 def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
-    """Yield what has solids, with them: furniture and its links."""
+    """Yield pieces of furniture and links with their solids."""
     for mechanism in embodiment.mechanisms:
         if not mechanism.urdf:
             yield mechanism.name, mechanism.parts
@@ -138,12 +135,12 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
 
 
 def _odd(part: Part) -> bool:
-    """Tell whether a solid has no flat top, or none that is easily told."""
+    """Return whether a solid has no horizontal top, or one that is not computed here."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 
 def _beside(part: Part, point: tuple[float, float, float]) -> float:
-    """Return how far a point is beside an upright solid, horizontally; not above 0 if it is above, below or in it."""
+    """Return the horizontal distance of a point from an upright solid; at most 0 if it is above, below or inside."""
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":
         return math.hypot(dx, dy) - part.size[0] / 2
@@ -152,7 +149,7 @@ def _beside(part: Part, point: tuple[float, float, float]) -> float:
 
 
 def _on_ground(embodiment: Embodiment, mechanism: Mechanism, point: tuple[float, float, float]) -> bool:
-    """Tell whether a point in the frame of furniture is on top of a fixture."""
+    """Return whether a point in the frame of a mechanism is on top of a fixture."""
     cos, sin = math.cos(mechanism.yaw), math.sin(mechanism.yaw)
     x = mechanism.position[0] + cos * point[0] - sin * point[1]
     y = mechanism.position[1] + sin * point[0] + cos * point[1]
@@ -164,7 +161,7 @@ def _on_ground(embodiment: Embodiment, mechanism: Mechanism, point: tuple[float,
     )
 
 
-RULES: dict[str, Callable[[Embodiment], Iterator[Fault]]] = {
+RULES: dict[str, Callable[[Embodiment], Iterator[Flaw]]] = {
     "joint-that-stays": joint_that_stays,
     "threshold-outside": threshold_outside,
     "feature-off-its-part": feature_off_its_part,

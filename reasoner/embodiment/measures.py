@@ -1,6 +1,6 @@
-"""Rules of validation on the measures of bodies, which a query can't work out: see `RULES` at the end.
+"""Rules of validation on the dimensions of bodies, which queries cannot compute: see `RULES` at the end.
 
-Each rule is a function from an `Embodiment` to findings without the node's IRI: short name, what, why, remedy.
+Each rule is a function from an `Embodiment` to flaws.
 """
 
 from __future__ import annotations
@@ -8,41 +8,38 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
-from reasoner.embodiment.values import Embodiment, Shape
-
-Measured = tuple[str, str, str, str]
-"""Short name of the object, what, why, remedy."""
+from reasoner.embodiment.values import Embodiment, Flaw, Shape
 
 
-def too_wide(embodiment: Embodiment) -> Iterator[Measured]:
-    """Find objects that no hand opens wide enough for."""
+def too_wide(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield objects that are too wide for every hand."""
     openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
     for name, body in embodiment.bodies.items():
         width = _width(body.shape)
         if openings and width >= max(openings):
             yield (
                 name,
-                f"{name} is {width * 100:.1f} cm wide where a hand takes it; the widest hand opens {max(openings) * 100:.1f} cm",
-                "a hand takes things from the side, between two fingers",
-                "make the shape narrower at e:graspHeight, or take it where it is",
+                f"{name} is {width * 100:.1f} cm wide at its grasp height; the widest hand opens {max(openings) * 100:.1f} cm",
+                "a hand grasps objects from the side, between two fingers",
+                "make the shape narrower at e:graspHeight, or state another e:graspHeight where it is narrower",
             )
 
 
-def grasped_outside(embodiment: Embodiment) -> Iterator[Measured]:
-    """Find objects whose grasp height is above their top."""
+def grasped_outside(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield objects whose grasp height is not between their base and their top."""
     for name, body in embodiment.bodies.items():
         top = body.shape.profile[-1][0] if body.shape.profile else body.shape.numbers.get("height", 0.0)
         if not 0 < body.shape.grasp_height < top:
             yield (
                 name,
-                f"{name} is taken {body.shape.grasp_height * 100:.1f} cm above its base, but is {top * 100:.1f} cm high",
+                f"{name} is grasped {body.shape.grasp_height * 100:.1f} cm above its base, but is {top * 100:.1f} cm high",
                 "the fingers would close on nothing",
                 "state an e:graspHeight of its shape that is less than its height",
             )
 
 
 def _width(shape: Shape) -> float:
-    """Return how far apart the fingers have to be at the grasp height."""
+    """Return the width of a shape between the fingers at its grasp height."""
     if not shape.profile:
         return min(shape.numbers.get("width", 0.0), shape.numbers.get("depth", 0.0)) or 2 * shape.numbers["radius"]
     radius = shape.profile[-1][1]
@@ -52,7 +49,7 @@ def _width(shape: Shape) -> float:
     return 2 * (radius + (shape.numbers.get("wall", 0.004) if shape.kind == "vessel" else 0.0))
 
 
-RULES: dict[str, Callable[[Embodiment], Iterator[Measured]]] = {
+RULES: dict[str, Callable[[Embodiment], Iterator[Flaw]]] = {
     "too-wide": too_wide,
     "grasped-outside": grasped_outside,
 }

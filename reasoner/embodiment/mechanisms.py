@@ -1,26 +1,26 @@
-"""Furniture with moving links, as the graph describes it."""
+"""Read mechanisms, which are furniture with moving links, from the graph."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from reasoner.embodiment.facts import EmbodimentError, Facts
+from reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that give a part's extent; a radius counts twice."""
+"""The attributes that state a part's extent; a radius counts twice."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 
 
-def mechanisms(facts: Facts, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Mechanism, ...]:
-    """Return the mechanisms of a scene, each with the links that are part of it."""
+def mechanisms(facts: BodyFacts, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Mechanism, ...]:
+    """Return the mechanisms of a scene, each with its links."""
     _all_hang(facts)
     return tuple(_mechanism(facts, node, names, folders) for node in facts.members("Mechanism"))
 
 
-def _mechanism(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Mechanism:
+def _mechanism(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Mechanism:
     return Mechanism(
         names(node),
         facts.position(node),
@@ -32,8 +32,8 @@ def _mechanism(facts: Facts, node: str, names: Callable[[str], str], folders: Se
     )
 
 
-def _all_hang(facts: Facts) -> None:
-    """Raise that a link hangs on no mechanism, or on itself."""
+def _all_hang(facts: BodyFacts) -> None:
+    """Raise `EmbodimentError` if a link is part of no mechanism, or of itself."""
     mechanisms = {*facts.members("Mechanism")}
     for node in facts.ordered(node for node, links in facts.links.items() if "part_of" in links):
         above = [node]
@@ -45,18 +45,18 @@ def _all_hang(facts: Facts) -> None:
 
 
 def _unhung(above: Sequence[str], parents: Sequence[str]) -> str:
-    """Say why what is above a link, itself first, doesn't lead to a mechanism."""
+    """Return the message for a link whose chain of parents, `above`, does not end at a mechanism."""
     if not parents:
         why = f"{above[-1]} is neither an e:Mechanism nor part of one"
     elif len(parents) > 1:
         why = f"{above[-1]} has {len(parents)} values of :partOf: {', '.join(parents)}"
     else:
         why = f"{above[-1]} is :partOf {parents[0]} in turn" if len(above) > 1 else "it is :partOf itself"
-    return f"{above[0]} hangs on no mechanism: {why}; state one :partOf, a mechanism or a link that hangs on one"
+    return f"{above[0]} is part of no mechanism: {why}; state one :partOf, a mechanism or a link of one"
 
 
-def _links(facts: Facts, mechanism: str) -> list[str]:
-    """Return the links of a mechanism, parents before what hangs on them."""
+def _links(facts: BodyFacts, mechanism: str) -> list[str]:
+    """Return the links of a mechanism, parents before children."""
     ordered: list[str] = []
     waiting = [mechanism]
     while waiting:
@@ -67,7 +67,7 @@ def _links(facts: Facts, mechanism: str) -> list[str]:
     return ordered
 
 
-def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
+def _link(facts: BodyFacts, node: str, mechanism: str, names: Callable[[str], str], folders: Sequence[Path]) -> Link:
     kind, parent = facts.text(node, "joint", "fixed"), facts.linked(node, "part_of")[0]
     if kind not in JOINTS:
         raise EmbodimentError(f"{node} has :joint '{kind}'; wanted one of {', '.join(JOINTS)}", node)
@@ -97,11 +97,11 @@ def _link(facts: Facts, node: str, mechanism: str, names: Callable[[str], str], 
     )
 
 
-def _parts(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Part, ...]:
+def _parts(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Part, ...]:
     return tuple(_part(facts, one, names, folders) for one in facts.ordered(facts.linked(node, "part")))
 
 
-def _part(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Part:
+def _part(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Part:
     kind = facts.text(node, "kind")
     if kind not in KINDS and kind != "mesh":
         raise EmbodimentError(f"{node} has :kind '{kind}'; wanted one of {', '.join([*KINDS, 'mesh'])}", node)
@@ -111,8 +111,8 @@ def _part(facts: Facts, node: str, names: Callable[[str], str], folders: Sequenc
     return Part(names(node), kind, (x, y, z), place, facts.turned(node), facts.color(node), file)
 
 
-def _feature(facts: Facts, node: str, names: Callable[[str], str]) -> Feature:
-    """Return a feature; its name is what stands behind the last dot of its IRI."""
+def _feature(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Feature:
+    """Return a feature, named by the part of its IRI after the last dot."""
     return Feature(
         names(node).rsplit(".", 1)[-1],
         facts.position(node, "0"),

@@ -1,4 +1,4 @@
-"""Reach facts: computed elsewhere from the robot's geometry, asserted in a file of their own beside the scene."""
+"""Reach facts: computed from the robot's geometry by `sim.reach`, stored in a file beside the scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HASHES = "SELECT DISTINCT ?hash WHERE { ?ontology :inputsHash ?hash }"
 
 
 def reach_relation(graph: KnowledgeGraph) -> str:
-    """Return the IRI of the relation that reach facts are stated with.
+    """Return the IRI of the relation of reach facts.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def reach_relation(graph: KnowledgeGraph) -> str:
 
 
 def reach_hash(graph: KnowledgeGraph) -> str | None:
-    """Return the hash of the inputs from which the scene's reach file was computed, if it has one."""
+    """Return the hash of the inputs of the scene's reach file, or None if there is no such file."""
     rows = graph.select(HASHES, ("reach",))
     return rows[0][0].value if rows and isinstance(rows[0][0], ox.Literal) else None
 
@@ -39,7 +39,7 @@ def reach_hash(graph: KnowledgeGraph) -> str | None:
 def save_reach(
     path: Path, graph: KnowledgeGraph, names: Names, pairs: Iterable[tuple[str, str]], inputs_hash: str
 ) -> None:
-    """Write reach facts beside the scene, with what they were computed from.
+    """Write reach facts and the hash of their inputs to a file beside the scene.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def save_reach(
     pairs : iterable of (hand, place)
         Short names.
     inputs_hash : str
-        Identifies the geometry and the settings; another hash means that the file is stale.
+        Hash of the geometry and the settings; a different one means that the file is outdated.
     """
     relation = ox.NamedNode(reach_relation(graph))
     iri = ox.NamedNode(f"{graph.scene.rstrip('#/')}.reach")
@@ -73,7 +73,7 @@ def save_reach(
 
 
 def add_to_reach(path: Path, graph: KnowledgeGraph, triples: Iterable[ox.Triple]) -> None:
-    """Add to what a reach file says of a scene's geometry."""
+    """Add triples to a scene's reach file."""
     with alone(path):
         there = [quad.triple for quad in ox.parse(path.read_bytes(), format=ox.RdfFormat.TURTLE)]
         _write(path, graph, dict.fromkeys((*there, *triples)))

@@ -1,8 +1,4 @@
-"""From the knowledge graph to `reasoner.embodiment.values`: bodies, places, robots, and who carries out and perceives what.
-
-The vocabulary is that of ``ontology/embodiment.ttl``. Attributes are read in one query (every data property below
-``:attribute``), links in another; the rest is looking them up.
-"""
+"""Read an `Embodiment` from the knowledge graph: bodies, places, robots, skills and perceivers."""
 
 from __future__ import annotations
 
@@ -12,7 +8,7 @@ from pathlib import Path
 import pyoxigraph as ox
 
 import ontology
-from reasoner.embodiment.facts import EmbodimentError, Facts
+from reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from reasoner.embodiment.mechanisms import mechanisms
 from reasoner.embodiment.skills import skill_uses
 from reasoner.embodiment.values import (
@@ -38,29 +34,29 @@ PALETTE: tuple[Color, ...] = (
     (0.20, 0.55, 0.90, 1.0),
     (0.55, 0.75, 0.20, 1.0),
 )
-"""Colours of beverages that declare none, in their order."""
+"""Colours of the fillings that declare none, in declared order."""
 
 
 def read_embodiment(
     store: ox.Store, names: Callable[[str], str], folders: Sequence[Path] = (ontology.ROOT,)
 ) -> Embodiment:
-    """Return what the graph says about bodies.
+    """Return the embodiment that the graph describes.
 
     Parameters
     ----------
     store : pyoxigraph.Store
-        The scene with all that it imports; named graphs are read as one.
+        The scene with its imports; all named graphs are read as one.
     names : callable
-        From an IRI to the short name that plans use.
+        Function from an IRI to the short name that plans use.
     folders : sequence of Path
-        Where a robot's URDF file is looked for.
+        Folders in which URDF files and meshes are searched.
 
     Raises
     ------
     EmbodimentError
-        An attribute is missing or of the wrong kind, or a file isn't there.
+        An attribute is missing or of the wrong kind, or a file is missing.
     """
-    facts = Facts.read(store)
+    facts = BodyFacts.read(store)
     return Embodiment(
         robots=tuple(_robot(facts, node, names, folders) for node in facts.ordered(_robots(facts))),
         fixtures=tuple(_fixture(facts, node, names) for node in facts.members("Fixture")),
@@ -78,14 +74,14 @@ def read_embodiment(
 # ----------------------------------------------------------------------------------------------- bodies
 
 
-def _fixture(facts: Facts, node: str, names: Callable[[str], str]) -> Fixture:
+def _fixture(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Fixture:
     size = (facts.number(node, "size_x"), facts.number(node, "size_y"), facts.number(node, "size_z"))
     yaw, friction = facts.number(node, "yaw", 0.0), facts.number(node, "friction", 0.8)
     return Fixture(names(node), size, facts.position(node), yaw, facts.color(node), friction)
 
 
-def _places(facts: Facts) -> list[str]:
-    """Return what has coordinates and is neither robot nor furniture, nor anything of a mechanism."""
+def _places(facts: BodyFacts) -> list[str]:
+    """Return the nodes with coordinates that are neither robots, stands nor furniture, nor belong to a mechanism."""
     other = {
         node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
     }
@@ -93,7 +89,7 @@ def _places(facts: Facts) -> list[str]:
     return facts.ordered(node for node in facts.having("x") if node not in other)
 
 
-def _place(facts: Facts, node: str, names: Callable[[str], str]) -> Place:
+def _place(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Place:
     carriers, stands = facts.linked(node, "carried_by"), facts.linked(node, "reached_from")
     return Place(
         names(node),
@@ -104,12 +100,12 @@ def _place(facts: Facts, node: str, names: Callable[[str], str]) -> Place:
     )
 
 
-def _stand(facts: Facts, node: str, names: Callable[[str], str]) -> Stand:
+def _stand(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Stand:
     return Stand(names(node), facts.position(node, "0"), facts.number(node, "yaw", 0.0))
 
 
-def _shaped(facts: Facts) -> list[tuple[str, str]]:
-    """Return individuals that have a shape, by themselves or by their nearest class that has one."""
+def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
+    """Return individuals with their shapes, their own or that of the nearest class with one."""
     found = []
     for node in facts.ordered(facts.classes):
         if node in facts.supers or any(node in kinds for kinds in facts.classes.values()):
@@ -120,7 +116,7 @@ def _shaped(facts: Facts) -> list[tuple[str, str]]:
     return found
 
 
-def _body(facts: Facts, node: str, shape: str, names: Callable[[str], str]) -> Body:
+def _body(facts: BodyFacts, node: str, shape: str, names: Callable[[str], str]) -> Body:
     numbers = facts.all_numbers(shape)
     profile = sorted(
         (facts.number(point, "height"), facts.number(point, "inner_radius"))
@@ -141,8 +137,8 @@ def _body(facts: Facts, node: str, shape: str, names: Callable[[str], str]) -> B
     )
 
 
-def _fillings(facts: Facts, names: Callable[[str], str]) -> dict[str, Filling]:
-    """Return how each beverage looks: what its nearest class says, or it itself."""
+def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Filling]:
+    """Return the fillings: individuals that have beads by themselves or by their nearest class."""
     found: dict[str, Filling] = {}
     for node in facts.ordered(facts.classes):
         kinds = [kind for kind in facts.nearest_first(node) if "serving_beads" in facts.attributes.get(kind, {})]
@@ -165,12 +161,12 @@ def _fillings(facts: Facts, names: Callable[[str], str]) -> dict[str, Filling]:
 # ----------------------------------------------------------------------------------------------- robots
 
 
-def _robots(facts: Facts) -> list[str]:
-    """Return what has a URDF and is no mechanism."""
+def _robots(facts: BodyFacts) -> list[str]:
+    """Return the nodes with a URDF that are no mechanisms."""
     return [node for node in facts.having("urdf") if node not in facts.members("Mechanism")]
 
 
-def _robot(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Robot:
+def _robot(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Robot:
     hands = facts.ordered(hand for hand, links in facts.links.items() if node in links.get("hand_of", ()))
     return Robot(
         names(node),
@@ -184,7 +180,7 @@ def _robot(facts: Facts, node: str, names: Callable[[str], str], folders: Sequen
     )
 
 
-def _hand(facts: Facts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Hand:
+def _hand(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Hand:
     arm, home = tuple(facts.text(node, "arm_joints").split()), facts.numbers(node, "home_posture")
     if len(arm) != len(home):
         raise EmbodimentError(f"{node} has {len(arm)} :armJoints and {len(home)} angles in :homePosture", node)
@@ -210,7 +206,7 @@ def _hand(facts: Facts, node: str, names: Callable[[str], str], folders: Sequenc
 # ----------------------------------------------------------------------------------------------- perceivers
 
 
-def _perceivers(facts: Facts, names: Callable[[str], str]) -> dict[str, PerceiverUse]:
+def _perceivers(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, PerceiverUse]:
     found = {}
     for situation in facts.ordered(node for node, links in facts.links.items() if "perceiver" in links):
         perceiver = facts.linked(situation, "perceiver")[0]

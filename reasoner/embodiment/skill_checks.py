@@ -1,6 +1,6 @@
 """Rules of validation on skills that are described in phases: see `RULES` at the end.
 
-`unplayed`, `unset` and `endless` ask of one skill what physics asks, too, before it begins.
+`sim.phases` also calls `unplayed`, `unset` and `endless` before it executes a skill.
 """
 
 from __future__ import annotations
@@ -9,25 +9,22 @@ from collections.abc import Callable, Iterator
 
 from reasoner.embodiment.facts import camel
 from reasoner.embodiment.skills import TERM
-from reasoner.embodiment.values import Embodiment, Phase, SkillUse
+from reasoner.embodiment.values import Embodiment, Flaw, Phase, SkillUse
 
 JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
-"""What an expression may name of a joint."""
+"""Numbers of a joint that an expression may name."""
 
 WITHOUT_ROLE = {"hand", "supports"}
-"""Words in the place of a role that name none."""
-
-Fault = tuple[str, str, str, str]
-"""IRI of the phase or short name of the link, what, why, remedy."""
+"""Words that stand in the place of a role and need no term."""
 
 
 def roles_of(use: SkillUse) -> set[str]:
-    """Return the roles that a behaviour's terms play."""
+    """Return the roles of a behaviour's parameters and variables."""
     return {role for role in (*use.parameters, *use.variables.values()) if role}
 
 
 def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases with a role that no term of the behaviour plays."""
+    """Yield phases that name a role without a term of the behaviour, and the role."""
     for phase in use.phases:
         for word in (*phase.to.split(), *phase.touches):
             role = word.partition(".")[0]
@@ -36,7 +33,7 @@ def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases with a word in an expression that is neither a number nor a setting."""
+    """Yield phases with an expression that names neither a number nor a setting, and the name."""
     for phase in use.phases:
         bounds = [guard.bound for guard in (*phase.until, *phase.checks)]
         for expression in (*phase.offset, phase.above, phase.value, phase.speed, phase.wait, *bounds):
@@ -46,7 +43,7 @@ def unset(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield phases of which nobody says where they end, with what is missing."""
+    """Yield phases whose motion has no stated end, and the missing attribute."""
     for phase in use.phases:
         if phase.motion in ("free", "line", "yielding", "joint", "over", "drive") and not phase.to:
             yield phase, "to"
@@ -56,45 +53,45 @@ def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
             yield phase, "above"
 
 
-def role_not_played(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find phases with a role that nobody plays."""
+def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield phases that name a role without a term of the behaviour."""
     for use in embodiment.skills.values():
         for phase, role in unplayed(use):
             yield (
                 phase.iri,
-                f"phase {phase.name} speaks of the role {role}, which no term of {use.behavior} plays",
-                f"the skill {use.skill} has to know who that is",
+                f"phase {phase.name} names the role {role}, which no term of {use.behavior} plays",
+                f"the skill {use.skill} needs an individual in that role",
                 f"state e:role e:{role} of one of its parameters or variables, and :asksFor e:{role} of the skill",
             )
 
 
-def unknown_setting(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find expressions that can't be worked out."""
+def unknown_setting(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield phases with an expression that cannot be evaluated."""
     for use in embodiment.skills.values():
         for phase, term in unset(use):
             yield (
                 phase.iri,
                 f"phase {phase.name} of {use.skill} has '{camel(term)}', which is neither a number nor a setting of the skill",
-                "nobody can tell how much that is",
+                "an expression is a sum of numbers and settings",
                 f"state e:{camel(term)} of the skill, or mend the spelling; one of your own is declared first: "
                 f":{camel(term)} a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting",
             )
 
 
-def phase_without_end(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find motions that nothing stops."""
+def phase_without_end(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield phases whose motion has no stated end."""
     for use in embodiment.skills.values():
         for phase, missing in endless(use):
             yield (
                 phase.iri,
                 f"phase {phase.name} of {use.skill} moves ({phase.motion}), and nothing says how far",
-                "a motion ends where it leads, or before when a guard of e:until holds",
+                "a motion ends at its goal, or earlier when a guard of e:until holds",
                 f"state e:{missing} of the phase",
             )
 
 
-def unknown_feature(embodiment: Embodiment) -> Iterator[Fault]:
-    """Find features to which a phase leads and that a link which can play the role hasn't."""
+def unknown_feature(embodiment: Embodiment) -> Iterator[Flaw]:
+    """Yield links that can play the role of a phase's goal but lack the feature that the phase names."""
     links = {link.name: link for mechanism in embodiment.mechanisms for link in mechanism.links}
     for use in embodiment.skills.values():
         needed = {tuple(word.split(".")): phase for phase in use.phases for word in phase.to.split() if "." in word}
@@ -104,12 +101,12 @@ def unknown_feature(embodiment: Embodiment) -> Iterator[Fault]:
                     yield (
                         name,
                         f"{name} has no feature '{feature}', to which phase {phase.name} of {use.skill} brings the hand",
-                        f"{use.behavior} can be done with {name}, and the hand has to know where",
+                        f"{use.behavior} is applicable to {name}, and the hand needs that feature",
                         f"give {name} an e:feature whose IRI ends with .{feature}, or mend the spelling",
                     )
 
 
-RULES: dict[str, Callable[[Embodiment], Iterator[Fault]]] = {
+RULES: dict[str, Callable[[Embodiment], Iterator[Flaw]]] = {
     "role-not-played": role_not_played,
     "unknown-setting": unknown_setting,
     "phase-without-end": phase_without_end,

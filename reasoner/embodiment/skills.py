@@ -1,4 +1,4 @@
-"""Skills as the graph describes them: who carries out a primitive, with which roles and numbers, in which phases."""
+"""Read skills from the graph: the skill of each primitive behaviour, its roles, numbers and phases."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import pyoxigraph as ox
 
-from reasoner.embodiment.facts import EmbodimentError, Facts, grouped, rows, snake
+from reasoner.embodiment.facts import BodyFacts, EmbodimentError, grouped, rows, snake
 from reasoner.embodiment.values import Guard, Phase, SkillUse
 from reasoner.names import local_name
 
@@ -21,7 +21,7 @@ FINGERS = ("", "open", "shut", "grasp")
 BROUGHT = ("", "base")
 CONDITIONS = ("empty", "holding", "place", "thing")
 QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
-"""What phases may say: `sim.phases` has a table for each."""
+"""The words that phases may use; `sim.phases`, `sim.touch` and `sim.measuring` have a table for each kind."""
 VERDICTS = (
     "unreachable",
     "goal in collision",
@@ -39,14 +39,14 @@ VERDICTS = (
     "ill-defined",
     "unexpected",
 )
-"""What a guard may say behind ``else``: `sim.verdict.CODES` says what each means."""
+"""The failure codes that a guard may name after ``else``; `sim.verdict.CODES` explains them."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
 TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")
 
 
-def skill_uses(facts: Facts, names: Callable[[str], str], store: ox.Store) -> dict[str, SkillUse]:
-    """Return by behaviour which skill carries it out."""
+def skill_uses(facts: BodyFacts, names: Callable[[str], str], store: ox.Store) -> dict[str, SkillUse]:
+    """Return the skill of each primitive behaviour that has one."""
     variables = grouped(rows(store, VARIABLES))
     roles = {term: local_name(links["role"][0]) for term, links in facts.links.items() if "role" in links}
     found = {}
@@ -65,8 +65,8 @@ def skill_uses(facts: Facts, names: Callable[[str], str], store: ox.Store) -> di
     return found
 
 
-def _links(facts: Facts, terms: Sequence[str], names: Callable[[str], str]) -> dict[str, tuple[str, ...]]:
-    """Return by role the links that the terms which play it can stand for."""
+def _links(facts: BodyFacts, terms: Sequence[str], names: Callable[[str], str]) -> dict[str, tuple[str, ...]]:
+    """Return for each role the links that can take the place of its terms."""
     found = {}
     links = facts.ordered(node for node, linked in facts.links.items() if "part_of" in linked)
     for term in terms:
@@ -76,12 +76,12 @@ def _links(facts: Facts, terms: Sequence[str], names: Callable[[str], str]) -> d
     return found
 
 
-def phases(facts: Facts, skill: str) -> tuple[Phase, ...]:
-    """Return the phases of a skill in their order; none if it is a Python function."""
+def phases(facts: BodyFacts, skill: str) -> tuple[Phase, ...]:
+    """Return the phases of a skill in order; none if it is a Python function."""
     return tuple(_phase(facts, node) for node in facts.ordered(facts.linked(skill, "phase")))
 
 
-def _phase(facts: Facts, node: str) -> Phase:
+def _phase(facts: BodyFacts, node: str) -> Phase:
     def text(name: str, default: str = "") -> str:
         return facts.text(node, name, default)
 
@@ -128,19 +128,20 @@ def _phase(facts: Facts, node: str) -> Phase:
     for expression in (*found.offset, found.above, found.value, found.speed, found.wait):
         if expression != "".join(match[0] for match in TERM.finditer(expression)):
             raise EmbodimentError(
-                f"{node} has '{expression}'; wanted numbers and settings with signs between them", node
+                f"{node} has '{expression}'; wanted a sum of numbers and settings, like raised-0.03", node
             )
     return found
 
 
 def _guards(node: str, text: str) -> tuple[Guard, ...]:
-    """Read ``force >= 30; slip <= slip else slip or drop``."""
+    """Return the guards of a text such as ``force >= 30; slip <= slip else slip or drop``."""
     guards = []
     for piece in (piece.strip() for piece in text.split(";")):
         match = GUARD.fullmatch(piece)
         if piece and match is None:
             raise EmbodimentError(
-                f"{node} has the guard '{piece}'; wanted QUANTITY >= VALUE, or <=, maybe else CODE", node
+                f"{node} has the guard '{piece}'; wanted QUANTITY >= VALUE or QUANTITY <= VALUE, optionally else CODE",
+                node,
             )
         if match is not None:
             guards.append(Guard(match[1], 1 if match[2] == ">=" else -1, snake(match[3]), match[4] or ""))

@@ -1,8 +1,8 @@
-"""What the ontology tells `sim/` about bodies: robots, fixtures, places, objects, skills and perceivers.
+"""The embodiment that the ontology describes for `sim/`: robots, fixtures, places, objects, skills and perceivers.
 
 Frozen values without RDF. Lengths are in metres, masses in kilograms, angles in radians, forces in newtons; frames are the
-world's (z up). `reasoner.embodiment.reading` reads them from the graph; `sim/` turns them into a physical world.
-Every name of the domain (an object, a behaviour, a situation type) that `sim/` handles comes from here or from the plan.
+world's (z up). `reasoner.embodiment.reading` reads them from the graph; `sim/` builds a physical world from them.
+Every name of the domain (an object, a behaviour, a situation type) that `sim/` uses comes from here or from the plan.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import TypeAlias
 
 Vector: TypeAlias = tuple[float, float, float]
 Color: TypeAlias = tuple[float, float, float, float]
+Flaw: TypeAlias = tuple[str, str, str, str]
+"""A finding of validation: IRI or short name of the node, what is wrong, why it matters, remedy."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class Hand:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot: its URDF file, where its base stands, how fast it accelerates (rad/s²), and its hands in declared order.
+    """A robot: its URDF file, the position of its base, the acceleration of its joints (rad/s²), and its hands in declared order.
 
-    A base that drives does so at `driving` metres and `turning` radians per second.
+    A mobile base drives at `driving` metres and turns at `turning` radians per second; `driving` 0 means a fixed base.
     """
 
     name: str
@@ -58,7 +60,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Stand:
-    """Where the base of a robot that drives can stand, to reach the places that are reached from there; `yaw` is its heading."""
+    """A position and heading (`yaw`) of a mobile robot's base, from which it reaches some places."""
 
     name: str
     position: Vector
@@ -79,10 +81,10 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Place:
-    """A location where things stand: the point on the supporting surface, in the frame of the `carrier` if it has one.
+    """A location for objects: a point on the supporting surface, in the frame of the `carrier` if it has one.
 
-    The carrier is a link or an object: a place in a drawer moves with the drawer. A robot that drives reaches it from the `stand`.
-    What stands there is grasped at a height, if one is said.
+    The carrier is a link or an object: a place in a drawer moves with the drawer. A mobile robot reaches the place from the
+    `stand`. `height` is the grasp height of objects at the place, if the scene states one.
     """
 
     name: str
@@ -94,7 +96,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Part:
-    """A solid of a link: its kind (box, cylinder, sphere or mesh), extent along its axes, and where it is in the link's frame.
+    """A solid of a link: its kind (box, cylinder, sphere or mesh), extent along its axes, and position in the link's frame.
 
     `turned` is roll, pitch and yaw. A mesh is a `file` with one convex shape per object in it.
     """
@@ -110,9 +112,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Feature:
-    """A frame on a link at which a hand does something: x where the fingers point, y from finger to finger, z along a bar.
+    """A frame on a link at which a hand acts: x is the fingers' direction, y leads from finger to finger, z along a bar.
 
-    The hand may turn about z from `low` to `high` radians. `parts` are what the fingers touch.
+    The hand may turn about z from `low` to `high` radians. `parts` are the solids that the fingers touch.
     """
 
     name: str
@@ -125,12 +127,12 @@ class Feature:
 
 @dataclass(frozen=True)
 class Link:
-    """What a joint moves: its solids, its features, and the joint, by which it hangs on its parent ("": on the base).
+    """A link of a mechanism: its solids, its features, and the joint that connects it to its parent ("": the base).
 
-    `kind` is revolute, prismatic or fixed; `position` and `turned` say where the joint is in the parent's frame, which is the
+    `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame, which is the
     link's own frame when the joint's value is 0. From `opened` on the joint counts as open or switched on, up to `shut` as shut.
-    `friction` (newtons or newton metres) and `damping` resist; a `spring` pushes back to 0 with a force; a joint that `latches`
-    stays at `opened` once it was pushed beyond, until it is pushed there again. `urdf_link` is its name in a URDF of the mechanism.
+    `friction` (newtons or newton metres) and `damping` resist; a `spring` pushes back to 0 with a force. A joint that `latches`
+    stays at `opened` after a push beyond it, until the next push. `urdf_link` is the link's name in a URDF of the mechanism.
     """
 
     name: str
@@ -155,7 +157,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Furniture with moving links: where it stands, the solids of its base, its links; from a file if `urdf` names one."""
+    """Furniture with moving links: its position, the solids of its base, and its links; or a URDF file if `urdf` names one."""
 
     name: str
     position: Vector
@@ -168,11 +170,11 @@ class Mechanism:
 
 @dataclass(frozen=True)
 class Shape:
-    """How an object looks and weighs.
+    """The shape, mass and colour of an object.
 
     `kind` is `vessel` (a wall of revolution around `profile`, open at the top), `cylinder`, `box` or a kind that another
     package registers. `profile` lists (height, inner radius) from the bottom up; `numbers` are the kind's other parameters,
-    such as `wall` or `height`. `grasp_height` is where the hand takes it, above its base.
+    such as `wall` or `height`. `grasp_height` is the height above the base at which a hand grasps the object.
     """
 
     kind: str
@@ -186,7 +188,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Body:
-    """An object of the scene with its shape. `servings` is how much a filled one is filled with."""
+    """An object of the scene with its shape. `servings` is the initial content of a filled vessel."""
 
     name: str
     shape: Shape
@@ -195,7 +197,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Filling:
-    """What a vessel is filled with, as beads. `serving` is the number of beads that one serving has."""
+    """A content of vessels, simulated by beads. `serving` is the number of beads in one serving."""
 
     name: str
     serving: int
@@ -207,9 +209,9 @@ class Filling:
 
 @dataclass(frozen=True)
 class Guard:
-    """A bound on a measured quantity, ``force >= 30``: where a motion stops, or what must hold after it, else `code`.
+    """A bound on a measured quantity, ``force >= 30``, that ends a motion or must hold after it, else the skill fails with `code`.
 
-    `sign` is 1 if the quantity must reach the `bound` from below, -1 from above; the bound is an expression (see `Phase`).
+    `sign` is 1 for ``>=`` and -1 for ``<=``; the bound is an expression (see `Phase`).
     """
 
     quantity: str
@@ -225,14 +227,14 @@ class Guard:
 class Phase:
     """One motion of a skill, relative to a feature of a thing.
 
-    `motion` is how the hand goes: free (planned around everything), line (straight), joint (as the thing's joint moves it), or
-    one that `sim.phases.MOTIONS` has besides. `to` is a role with a feature, ``target.grip``, that the hand's tip is brought
-    to, or what is named by `bring`; `offset` is a shift from there in the hand's frame, and `above` one upwards. These and
-    the others of type str are expressions: numbers and settings with signs between them, ``raised-slip``.
+    `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
+    key of `sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or for the point that
+    `bring` names. `offset` is a shift from the goal in the hand's frame, `above` a shift upwards. `offset`, `above`, `value`,
+    `speed` and `wait` are expressions: sums of numbers and settings, ``raised-slip``.
 
-    `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles, or features, that may be touched. The motion
-    ends early `until` one of the guards holds, and afterwards all `checks` must. A phase is done only `when` all of its words
-    say so, and one that is `foreseen` isn't done, but must be possible before the hand moves at all.
+    `fingers` (open, shut, or grasp) move before the hand does. `touches` are roles or features that the hand may touch. The motion
+    ends early when one of the guards in `until` holds; after it all `checks` must hold. A phase is executed only if all conditions
+    in `when` hold. A `foreseen` phase is not executed, but has to be possible before the hand moves at all.
     """
 
     name: str
@@ -255,11 +257,11 @@ class Phase:
 
 @dataclass(frozen=True)
 class SkillUse:
-    """Which skill executes a primitive behaviour.
+    """The skill that executes a primitive behaviour.
 
-    `parameters` are the roles that the behaviour's parameters play, in their order; `variables` maps its determined variables
-    to theirs. `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python
-    function. `links` has by role the links of the scene that can play it.
+    `parameters` has the roles of the behaviour's parameters, in their order; `variables` those of its determined variables.
+    `numbers` are the skill's settings in metres, seconds, radians and newtons. A skill without `phases` is a Python
+    function. `links` has for each role the links of the scene that can play it.
     """
 
     behavior: str
@@ -273,9 +275,9 @@ class SkillUse:
 
 @dataclass(frozen=True)
 class PerceiverUse:
-    """Which perceiver reads a situation type off the world, with its thresholds and the values that mean something special.
+    """The perceiver that reads a situation type off the world, its thresholds, and the individuals that stand for special values.
 
-    `choices` are the values that the situation type has, in declared order; `links` the links that it is a situation of.
+    `choices` are the situation type's values in declared order; `links` are the links that have this situation type.
     """
 
     situation: str
@@ -288,7 +290,7 @@ class PerceiverUse:
 
 @dataclass(frozen=True)
 class Embodiment:
-    """Everything that a scene's bodies need: each mapping goes from the name to the value, in declared order."""
+    """The robots, furniture, objects, skills and perceivers of a scene. The mappings are by name, in declared order."""
 
     robots: tuple[Robot, ...]
     fixtures: tuple[Fixture, ...]
@@ -302,7 +304,7 @@ class Embodiment:
     cameras: tuple[Vector, ...] = ()
 
     def hand(self, name: str) -> tuple[Robot, Hand]:
-        """Return the hand of that name with its robot; raise `KeyError` that lists the hands there are."""
+        """Return the robot and the hand of that name; raise `KeyError` with the known hands if there is none."""
         for robot in self.robots:
             for hand in robot.hands:
                 if hand.name == name:

@@ -1,1 +1,1 @@
-"""The memory's home: knowledge links, counts and episodes, as values and as files."""
+"""The memory: knowledge links, counts and episodes, as values and as files."""

@@ -1,18 +1,18 @@
-"""Experience as values that people can read: rules, orders of goals, refinements, and how often each proved good.
+"""Learned experience as readable values: rules, orders of goals, methods, and the tallies of their use.
 
 ==========  ===================================================================================================
-Rule        a goal of this kind is brought about by this behaviour, where this is so
-Order       a goal of one kind is achieved before one of another kind, where both speak of the same individual
-Method      a behaviour is refined by these steps, over its roles and others
+Rule        a behaviour that achieves a kind of goal under some conditions
+Order       a kind of goal that is achieved before another kind, where both share individuals
+Method      steps that refine a behaviour, over its roles and further ones
 GoalKind    the goals of one situation type about individuals of one class
-Tally       how often something was chosen and did what it should, passed over for another, and in vain
-Experience  what was learned, with tallies by replica and epoch: grow-only, so that memories merge
+Tally       numbers of times that an item was chosen and worked, was passed over, and failed
+Experience  the learned items, with tallies by replica and epoch: grow-only, so that memories merge
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of what they say: replicas that learned the same mean the same, and
-merging them is a union. Beside each of them its tallies are kept by facts (`Fact`): the empty fact counts the thing itself, others
-what held of the individuals in its roles. Epoch 0 holds what never ages. The later epochs, one for each episode of a replica, hold
-who was preferred to somebody else (this hand, not that one); their weight decays when they are read.
+Rules, orders, methods and kinds of goals are named by a hash of their content: equal items of two replicas have equal names, and
+merging them is a union. The tallies of an item are kept by lifted facts (`Fact`): the empty fact counts the item itself, others
+count what held of the individuals in its roles. Epoch 0 has the tallies that never age. The later epochs, one for each episode of a
+replica, have preferences between individuals (this hand, not that one), whose weight decays with the number of later episodes.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from reasoner.symbols import Fact as Goal
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its terms."""
 Fact: TypeAlias = "tuple[str, str]"
-"""What is asked of the individuals in the roles of a rule, and the answer; both empty for the thing itself."""
+"""A question about the individuals in the roles of an item, and the answer; both empty for the item itself."""
 ITSELF: Fact = ("", "")
 
 
 def _named(kind: str, said: object) -> str:
-    import hashlib  # only where something is named: planning without memory needs the values alone
+    import hashlib  # imported on use: planning without memory needs no names
 
     return f"{kind}_{hashlib.sha1(repr(said).encode(), usedforsecurity=False).hexdigest()[:16]}"
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What to do for a goal, over roles; different roles are different individuals.
+    """A behaviour that achieves a goal, over roles; different roles stand for different individuals.
 
     Attributes
     ----------
     goal : ValueCondition
-        Its terms are roles (``?cup``) or individuals that the domain names.
+        Its terms are roles (``?cup``) or individuals of the domain.
     asks : tuple of Condition
-        What must hold now.
+        Conditions under which the rule applies.
     does : behaviour and terms
     kinds : tuple of (role, class)
     """
@@ -64,17 +64,17 @@ class Rule:
 
     @property
     def goals(self) -> GoalKind:
-        """The kind of goal that the rule is for."""
+        """The kind of goal that the rule achieves."""
         kinds = dict(self.kinds)
         return GoalKind(self.goal.situation, tuple(kinds.get(term, term) for term in self.goal.arguments))
 
 
 @dataclass(frozen=True)
 class Order:
-    """Two kinds of goals of which one comes first.
+    """An order between two kinds of goals.
 
-    `first` and `then` are situation types, `shared` the places (0 the first argument, … and last the value) of `first` and `then`
-    at which both name the same individual; none where they share none.
+    `first` and `then` are situation types. `shared` has the pairs of positions (0 for the first argument, …, last for the value) at
+    which both goals have the same individual.
     """
 
     first: str
@@ -88,23 +88,23 @@ class Order:
 
     @classmethod
     def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
-        """Return the order of two goals, by what they share."""
+        """Return the order of two goals, with the positions of shared individuals that are no constants."""
         one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
         shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
         return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
 
     @property
     def reversed(self) -> Order:
-        """The opposite."""
+        """The opposite order."""
         return Order(self.then, self.first, tuple(sorted((j, i) for i, j in self.shared)))
 
 
 @dataclass(frozen=True)
 class OpenRole:
-    """A role of a method that the refined behaviour doesn't name.
+    """A role of a method that is no parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that it filled; `source` the symbol whose value it is where it is needed first: situation
-    type and places of the arguments; `becomes` the situation type of which it becomes a value, so that a free one is wanted.
+    `kind` is the class of the parameter that it filled. `source` is the symbol whose value it is at its first use: situation type
+    and positions of the arguments. `becomes` is the situation type whose value it becomes, so that a free individual is preferred.
     """
 
     kind: str
@@ -114,7 +114,7 @@ class OpenRole:
 
 @dataclass(frozen=True)
 class Method:
-    """Steps that refine a behaviour, over roles: places below the number of its own individuals, then `open` ones."""
+    """Steps that refine a behaviour, over numbered roles: first the `roles` of the behaviour itself, then the `open` ones."""
 
     behavior: str
     roles: int
@@ -145,18 +145,18 @@ Said: TypeAlias = "Rule | Order | Method | GoalKind"
 
 @dataclass(frozen=True)
 class Tally:
-    """How often something was chosen (and worked), passed over for another, and chosen in vain."""
+    """Numbers of times that a candidate was chosen and worked, was passed over for another one, and was chosen but failed."""
 
     chosen: int = 0
     passed_over: int = 0
     failed: int = 0
 
     def __add__(self, other: Tally) -> Tally:
-        """Return the sum: both happened."""
+        """Return the sum, for different events."""
         return Tally(self.chosen + other.chosen, self.passed_over + other.passed_over, self.failed + other.failed)
 
     def __or__(self, other: Tally) -> Tally:
-        """Return the greater of each: both tell of the same happenings, one perhaps later."""
+        """Return the maximum of each number, for two copies of one counter."""
         return Tally(
             max(self.chosen, other.chosen), max(self.passed_over, other.passed_over), max(self.failed, other.failed)
         )
@@ -164,14 +164,14 @@ class Tally:
 
 @dataclass
 class Lesson:
-    """What one episode teaches: what it says, and what is to be counted; `personal` is who was preferred."""
+    """The lesson of one episode: learned items, and tallies to add; `personal` has the preferences between individuals."""
 
     said: list[Said] = field(default_factory=list)
     counted: list[tuple[Said, Fact, Tally]] = field(default_factory=list)
     personal: list[tuple[Said, Fact, Tally]] = field(default_factory=list)
 
     def __iadd__(self, other: Lesson) -> Lesson:
-        """Take in another lesson of the same episode."""
+        """Add another lesson of the same episode."""
         self.said += other.said
         self.counted += other.counted
         self.personal += other.personal
@@ -183,20 +183,20 @@ Counts: TypeAlias = "dict[str, dict[Fact, Tally]]"
 
 @dataclass
 class Experience:
-    """What was learned, with counts that only grow, kept apart by who counted.
+    """Learned items, with grow-only counters for each replica.
 
     Parameters
     ----------
     replica : str
-        Who counts here: an ID minted with the memory, never used by two writers.
+        ID of the replica that counts here, unique to one writer.
     episodes : mapping of replica to number
-        How many episodes each replica has lived.
+        Number of episodes of each replica.
     said : mapping of name to rule, order, method or kind of goal
     counts : mapping of (replica, epoch) to name to fact to tally
     trusts : set of replica
-        Whose experience may lead beside this replica's own.
+        Other replicas whose experience is used for planning.
     disabled : set of name
-        What isn't to be followed, though it was learned.
+        Learned items that are not used for planning.
 
     Examples
     --------
@@ -216,7 +216,7 @@ class Experience:
     disabled: set[str] = field(default_factory=set)
 
     def learn(self, lesson: Lesson) -> None:
-        """Take in the lesson of one episode."""
+        """Add the lesson of one episode."""
         self.episodes[self.replica] = epoch = self.episodes.get(self.replica, 0) + 1
         self.said.update((one.name, one) for one in lesson.said)
         for at, counted in ((0, lesson.counted), (epoch, lesson.personal)):
@@ -226,7 +226,7 @@ class Experience:
                 table[fact] = table.get(fact, Tally()) + tally
 
     def merge(self, other: Experience) -> None:
-        """Take in another memory: of counters that both have, the greater; of the rest, all. In any order, any number of times."""
+        """Merge another memory, with the maximum of common counters; the result does not depend on order or repetition."""
         self.said.update(other.said)
         for replica, number in other.episodes.items():
             self.episodes[replica] = max(self.episodes.get(replica, 0), number)
@@ -235,7 +235,7 @@ class Experience:
             table[fact] = table.get(fact, Tally()) | tally
 
     def totals(self) -> Counts:
-        """Return the sums over all replicas of what doesn't age, by name and fact."""
+        """Return the tallies of epoch 0, summed over all replicas, by name and fact."""
         found: Counts = {}
         for (_, epoch), name, fact, tally in self:
             if epoch == 0:
@@ -244,7 +244,7 @@ class Experience:
         return found
 
     def preferences(self, decay: float) -> dict[str, dict[Fact, tuple[float, float]]]:
-        """Return how often somebody was preferred and not, by name and fact, each episode since weighing `decay` less."""
+        """Return the numbers of choices and rejections by name and fact; each later episode multiplies them by `decay`."""
         found: dict[str, dict[Fact, tuple[float, float]]] = {}
         for (replica, epoch), name, fact, tally in self:
             if epoch:
@@ -255,7 +255,7 @@ class Experience:
         return found
 
     def __iter__(self) -> Iterator[tuple[tuple[str, int], str, Fact, Tally]]:
-        """Yield every counter: who counted (replica and epoch), of what, of which fact, and how often."""
+        """Yield every counter: replica and epoch, name of the item, fact, and tally."""
         for who, counts in self.counts.items():
             for name, facts in counts.items():
                 for fact, tally in facts.items():

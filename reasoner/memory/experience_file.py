@@ -1,12 +1,12 @@
 """Experience on disk and in stores: rules and methods as triples, counts as annotated axioms, in Turtle that Protégé opens.
 
-What was learned is written once (`reasoner.memory.rules_file`). Each counter is an individual per replica, epoch and thing that it
-`:countsFor`, `:associatedWith` that thing itself and the lifted facts that held; an ``owl:Axiom`` on each of these links has
-`:chosen`, `:passedOver`, `:failed` and the `:probability` that they amount to. Writers never share a counter, all else is named by
-its content: the union of two files is a file of both memories. A rule that was edited keeps its counts.
+`reasoner.memory.rules_file` writes each learned item once. There is a counter for each replica, epoch and item (`:countsFor`),
+which is `:associatedWith` the item itself and the lifted facts that held. An ``owl:Axiom`` on each of these links has `:chosen`,
+`:passedOver`, `:failed` and the resulting `:probability`. Writers never share a counter, and all else is named by its content, so
+the union of two files is a file of both memories. An edited rule keeps its counts.
 
-A file is written one link a line, and such lines are read by a regular expression; in any other layout (Protégé's, say) the
-triples themselves are read.
+Each link is written on one line, and such lines are read by a regular expression. Files in another layout, such as Protégé's, are
+read by the Turtle parser.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import pyoxigraph as ox
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.experience import ITSELF, Experience, Fact, Said, Tally
-from reasoner.memory.rules_file import Reader, Words, Writer, label
+from reasoner.memory.rules_file import RuleReader, RuleWriter, Words, label
 from reasoner.names import Names
 from reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
 
@@ -45,7 +45,7 @@ LINK = (
     "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
     ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
 )
-MOST = 2**53  # so far counts are exact as floating-point numbers
+MOST = 2**53  # counts up to here are exact as floating-point numbers
 COUNTS = re.compile(
     r"^m:(?:(fact_\w+) a owl:NamedIndividual, :LiftedFact ; :asks \"([^\"\\\n]*)\" ; :answer \"([^\"\\\n]*)\" ; "
     r"rdfs:label [^\n]* \.\n|"
@@ -54,16 +54,16 @@ COUNTS = re.compile(
     r":chosen (\d+) ; :passedOver (\d+) ; :failed (\d+) ; :probability [\d.]+ \.\n)",
     re.MULTILINE,
 )
-"""Most of a file are such lines: lifted facts, or counts of a link. The rest, in any layout, is left to the Turtle parser."""
+"""Lines of lifted facts and of counts, which make up most of a file. The Turtle parser reads the rest, in any layout."""
 
 
 PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+)", re.MULTILINE)
-"""Lines of the paper's links, which the paper's mode alone reads; after small tables nearly all of a file."""
+"""Lines of the paper's links, which only the paper's mode reads and which can be nearly all of a file."""
 
 
 @dataclass(frozen=True)
 class Lines:
-    """A memory file taken apart: the links with their counts, the lifted facts by name, the rest as Turtle, the paper's links."""
+    """The parts of a memory file: links with counts, lifted facts by name, the paper's links, and the rest as Turtle."""
 
     links: list[tuple[str, str, Tally]] = field(default_factory=list)
     facts: dict[str, Fact] = field(default_factory=dict)
@@ -72,12 +72,12 @@ class Lines:
 
     @cached_property
     def triples(self) -> list[ox.Triple]:
-        """The rest, parsed; raises `SyntaxError`."""
+        """The triples of `rest`; raises `SyntaxError`."""
         return [q.triple for q in ox.parse(self.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
 
 
 def lines(text: str) -> Lines:
-    """Take a memory file apart."""
+    """Split the text of a memory file into its parts."""
     links, facts, rest, at = [], {}, list[str](), 0
     parts = PAPER.split(text)
     text = "".join(parts[::2])
@@ -94,12 +94,12 @@ def lines(text: str) -> Lines:
 
 
 def new_replica() -> str:
-    """Return an ID for a new memory, which no other has."""
+    """Return a unique ID for a new memory."""
     return str(uuid.uuid4())
 
 
 def probability(tally: Tally) -> float:
-    """Return how probable it is that such a candidate is chosen and works, with half a choice and half a pass as prior.
+    """Return the probability that a candidate is chosen and works, with half a choice and half a pass as prior.
 
     >>> probability(Tally(chosen=3, passed_over=0))
     0.875
@@ -112,14 +112,14 @@ def probability(tally: Tally) -> float:
 
 
 def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
-    """Write a memory file, whole or not at all.
+    """Write a memory file atomically.
 
     Parameters
     ----------
     path : Path
     experience : Experience
     names : Names
-        Lead the behaviours' and classes' names back to IRIs.
+        Give the IRIs of behaviours and classes.
     domain : str
         IRI of the ontology that the file imports, for Protégé.
     """
@@ -129,7 +129,7 @@ def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
 def turtle(
     experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
 ) -> Iterator[str]:
-    """Yield a memory as Turtle, thing by thing; `only` what one replica counted. `words` say what something is called."""
+    """Yield a memory as Turtle, item by item; with `only`, the counts of one replica. `words` returns an item's label."""
     iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}
     replica = _text(experience.replica)
@@ -140,7 +140,7 @@ def turtle(
         if only in (None, replica):
             node = _node(MEMORY, "replica_" + replica)
             yield f"{node} a owl:NamedIndividual, :Replica ; :replica {_text(replica)} ; :episodes {episodes} .\n"
-    writer = Writer(names, words)
+    writer = RuleWriter(names, words)
     for name, one in sorted(experience.said.items()):
         yield writer.said(one, name not in experience.disabled)
     facts: dict[Fact, str] = {}
@@ -170,7 +170,7 @@ def _digest(text: str) -> str:
 
 
 def _node(space: str, name: str) -> str:
-    """Return the IRI of any name in a namespace, as Turtle and SPARQL write it."""
+    """Return the IRI of a name in a namespace as a term of Turtle and SPARQL."""
     return str(ox.NamedNode(space + quote(name, safe="")))
 
 
@@ -187,7 +187,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
     Raises
     ------
     KnowledgeError
-        The file is missing, broken, of a newer format or no memory of this kind; the message says which, and what to do.
+        The file is missing, broken, of another format or no memory of this kind; the message says which, and what to do.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -199,7 +199,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
 
 
 def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
-    """Read a memory; `source` names it in messages."""
+    """Return the experience in a memory file's parts; messages name it by `source`."""
     try:
         triples = found.triples
     except SyntaxError as error:
@@ -217,7 +217,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
     heads = {iri: node for iri, node in nodes.items() if "memoryFormat" in node}
     if not heads:
         raise KnowledgeError(
-            f"{source}: no memory of counts: it says no :memoryFormat; a memory of the paper's mode has none"
+            f"{source}: no memory of counts: :memoryFormat is missing, as in a memory of the paper's mode"
         )
     head = next(iter(heads.values()))
     if head["memoryFormat"] != [str(FORMAT)]:
@@ -226,11 +226,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             "learn anew, or use the version of Confab that wrote it"
         )
     if "learnsAs" not in head:
-        raise KnowledgeError(f"{source}: broken memory: it doesn't say who learns into it (:learnsAs); restore a copy")
+        raise KnowledgeError(f"{source}: broken memory: :learnsAs, the ID of its replica, is missing; restore a copy")
     experience = Experience(head["learnsAs"][0], trusts=set(head.get("trusts", ())))
-    reader = Reader(nodes, names)
+    reader = RuleReader(nodes, names)
     try:
-        named: dict[str, str] = {}  # an edited rule has another name, and the counts of its node
+        named: dict[str, str] = {}  # an edited rule has another name, but keeps the counts of its node
         for subject, node in nodes.items():
             one: Said | None = reader.said(subject)
             if one is not None:
@@ -239,9 +239,11 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 if "false" in node.get("enabled", ()):
                     experience.disabled.add(one.name)
             if "episodes" in node:
-                several = [_count(text, "episodes") for text in node["episodes"]]  # of an older and a newer copy
+                several = [
+                    _count(text, "episodes") for text in node["episodes"]
+                ]  # two after a union of an older and a newer copy
                 experience.episodes[node["replica"][0]] = max(several)
-            if "chosen" in node:  # the paper's links have a probability alone
+            if "chosen" in node:  # the paper's links have only a probability
                 counter, target = (
                     _local(reader.one(subject, OWL + end)) for end in ("annotatedSource", "annotatedTarget")
                 )
@@ -256,7 +258,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 if about in named:
                     tallies = experience.counts.setdefault(who, {}).setdefault(named[about], {})
                     counters[_local(subject)] = tallies
-                else:  # what was deleted isn't counted any more; Protégé deletes with a rule all that names it
+                else:  # a deleted item isn't counted any more; Protégé deletes all triples that name it
                     counters[_local(subject)] = {}
         for counter, target, tally in links:
             fact = facts[target] if target.startswith("fact_") else ITSELF
@@ -266,7 +268,9 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             tallies[fact] = tallies[fact] | tally if fact in tallies else tally
         for replica, epoch in experience.counts:
             if epoch > (lived := experience.episodes.get(replica, epoch)):
-                raise ValueError(f":epoch {epoch} of {replica!r}, whose :episodes are {lived}; wanted no later one")
+                raise ValueError(
+                    f":epoch {epoch} of {replica!r}, which has {lived} :episodes; wanted an epoch of at most {lived}"
+                )
     except KnowledgeError:
         raise
     except (KeyError, ValueError, IndexError) as error:
@@ -275,7 +279,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
 
 
 def _count(text: str, what: str) -> int:
-    """Return a number that something was counted to; raise ValueError if that can't be."""
+    """Return a count; raise `ValueError` if it is out of range."""
     if not 0 <= (number := int(text)) < MOST:
         raise ValueError(f":{what} {number}; wanted a number from 0 to {MOST}")
     return number
@@ -293,9 +297,9 @@ def _local(iri: str) -> str:
 
 
 def pull(endpoint: str, names: Names | None = None, replica: str | None = None, timeout: float = 60.0) -> Experience:
-    """Read all memories that a SPARQL endpoint has, as one.
+    """Return the union of all memories at a SPARQL endpoint.
 
-    Each replica has a named graph of its own there, so that writers never meet. An endpoint without memory gives an empty one.
+    Each replica has a named graph of its own there, so that writers never conflict. An endpoint without memory gives an empty one.
     """
     query = f'CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(STRSTARTS(STR(?g), "{MEMORY}graph/")) }}'
     answer = _ask(endpoint, {"query": query}, timeout)
@@ -309,7 +313,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
 
 
 def push(endpoint: str, experience: Experience, names: Names, domain: str, timeout: float = 60.0) -> None:
-    """Replace this replica's own graph at a SPARQL endpoint by what it has counted; no other replica's is touched."""
+    """Replace this replica's graph at a SPARQL endpoint by its own counts; the graphs of other replicas stay unchanged."""
     graph = _node(MEMORY + "graph/", experience.replica)
     text = "".join(turtle(experience, names, domain, only=experience.replica))
     data = ox.serialize([q.triple for q in ox.parse(text, format=ox.RdfFormat.TURTLE)], format=ox.RdfFormat.N_TRIPLES)
@@ -318,7 +322,7 @@ def push(endpoint: str, experience: Experience, names: Names, domain: str, timeo
 
 
 def _ask(endpoint: str, form: Mapping[str, str], timeout: float) -> bytes:
-    from urllib.error import URLError  # only where a memory is at an endpoint: what speaks HTTP takes long to import
+    from urllib.error import URLError  # imported on use: HTTP modules take long to import
     from urllib.parse import urlencode
     from urllib.request import Request, urlopen
 

@@ -16,8 +16,8 @@ Conclusion: TypeAlias = "tuple[str, tuple[str, ...]]"
 class Links:
     """The tables of section III-C of the paper.
 
-    `tables` has one categorical distribution over values per conclusion and symbol of which something was learned; what was
-    never learned is uniform.
+    `tables` has one categorical distribution over values for each learned pair of conclusion and symbol; all other pairs have the
+    uniform distribution.
 
     >>> Links().probability(("MOVE", ("cup",)), Symbol("LOCATION", ("cup",)), "shelf", ["shelf", "table"])
     0.5
@@ -33,5 +33,5 @@ class Links:
         return table.get(value, 0.0)
 
     def __len__(self) -> int:
-        """Return how many links there are."""
+        """Return the number of links."""
         return sum(len(table) for symbols in self.tables.values() for table in symbols.values())

@@ -1,8 +1,8 @@
 """The confabulation memory on disk: knowledge links as annotated axioms of a Turtle file that imports the scene.
 
 Each link is a triple ``quantified behaviour :associatedWith situated object instance`` and an ``owl:Axiom`` that annotates it with
-``:probability``. Protégé opens the file and shows the number beside the assertion. The file is the memory's own: no file that
-people edit is ever rewritten.
+``:probability``. Protégé opens the file and shows the number beside the assertion. The file belongs to the memory: Confab never
+rewrites a file that people edit.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     ----------
     path : Path
     names : Names
-        The scene's names; links about terms that it doesn't have are kept under their last part.
+        The scene's names; terms unknown to the scene keep the last part of their IRIs.
     found : Lines, optional
-        What `memory_lines` found in the file, if it was read before.
+        The result of `memory_lines` for the file, if it has been read before.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
 
 
 def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
-    """Return the scene that a memory file imports, and short names for the terms that it speaks of; `found` as in `load_links`.
+    """Return the scene that a memory file imports, and short names for the terms in the file; `found` as in `load_links`.
 
     Raises
     ------
@@ -86,19 +86,19 @@ def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
     return scenes[0], Names(
         text(term)
         for said, term in graph.select("SELECT DISTINCT ?said ?term WHERE { ?node ?said ?term FILTER(isIRI(?term)) }")
-        if text(said).startswith(CORE) and not text(term).startswith(MEMORY)  # what links and rules speak of
+        if text(said).startswith(CORE) and not text(term).startswith(MEMORY)  # the terms of links and rules
     )
 
 
 def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
-    """Write the links to a memory file, whole or not at all.
+    """Write the links to a memory file atomically.
 
     Parameters
     ----------
     path : Path
     links : Links
     names : Names
-        The scene's names, to lead back to IRIs.
+        The scene's names, which give the IRIs.
     scene : str
         IRI of the scene, which the file imports.
     """
@@ -109,19 +109,19 @@ def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
 
 
 def links_text(links: Links, names: Names, scene: str) -> str:
-    """Return the links as N-Triples, without the head of a file of their own."""
+    """Return the links as N-Triples, without the ontology header."""
     iri = f"{scene.rstrip('#/')}.memory"
     triples = [t for t in _triples(links, names, scene, iri) if t.subject != ox.NamedNode(iri)]
     return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
 
 
 def memory_lines(path: Path) -> Lines:
-    """Read a memory file and take it apart.
+    """Read a memory file and split it into `Lines`.
 
     Raises
     ------
     KnowledgeError
-        It is missing or can't be read as text.
+        The file is missing or can't be read as text.
     """
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
@@ -134,7 +134,7 @@ def memory_lines(path: Path) -> Lines:
 
 
 def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
-    """Return all of a file but the counts as a graph."""
+    """Return the triples of a file without the counts."""
     found = found or memory_lines(path)
     rest = found.rest + found.paper
     graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")

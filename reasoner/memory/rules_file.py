@@ -1,8 +1,8 @@
-"""Rules, orders and methods as triples, in the words in which ontologies say conditions and behaviours, for people to edit.
+"""Rules, orders and methods as triples that people can edit, in the vocabulary of conditions and behaviours.
 
-A `:LearnedRule` has a `:forGoal`, what it `:asksFor`, and the behaviour that it `:does` with its arguments. Its
-roles are parameters of its own. A `:LearnedMethod` has the behaviour that it `:refines` and steps with an index; a `:LearnedOrder`
-what comes `:first` and `:then`. ``:enabled false`` keeps something from being followed.
+A `:LearnedRule` has a goal (`:forGoal`), conditions (`:asksFor`), and a behaviour with arguments (`:does`); its
+roles are parameters of its own. A `:LearnedMethod` has the refined behaviour (`:refines`) and steps with an index; a
+`:LearnedOrder` has the situation types `:first` and `:then`. ``:enabled false`` switches an item off.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ Node: TypeAlias = "Mapping[str, Sequence[str]]"
 """The values of a node by property, without the core's namespace."""
 Words: TypeAlias = "Callable[[Said], str]"
 MOST_INSIDE = 50
-"""Conditions inside each other; more are a circle."""
+"""Maximum depth of nested conditions; more means that a condition contains itself."""
 
 
 def label(one: Said) -> str:
-    """Return in a few names what something says."""
+    """Return a short description of a learned item."""
     match one:
         case Rule(goal, _, does):
             wanted = " ".join((*goal.arguments[:1], goal.situation, *goal.arguments[1:], goal.value))
@@ -52,20 +52,20 @@ def label(one: Said) -> str:
     raise TypeError(one)
 
 
-class Writer:
-    """Writes what was learned as Turtle; short names lead back to IRIs, what has none is kept under its name."""
+class RuleWriter:
+    """Writes learned items as Turtle. Short names are expanded to IRIs; a name without an IRI gets one of the memory."""
 
     def __init__(self, names: Names, words: Words = label) -> None:
         self.names, self.words = names, words
 
     def term(self, name: str) -> str:
-        """Return an individual, class, behaviour or situation type."""
+        """Return the Turtle term of an individual, class, behaviour or situation type."""
         if name in self.names:
             return str(ox.NamedNode(self.names.iri(name)))
         return f":{name}" if name in (TRUE, FALSE) else str(ox.NamedNode(MEMORY + quote(name, safe="")))
 
     def said(self, one: Said, enabled: bool = True) -> str:
-        """Return what something says, its parts included."""
+        """Return the triples of a learned item and its parts."""
         me = f"m:{one.name}"
         match one:
             case Rule():
@@ -83,7 +83,7 @@ class Writer:
         return head + "".join(f"{line} .\n" for line in lines[1:])
 
     def rule(self, rule: Rule, me: str) -> list[str]:
-        """Return a rule's properties, and its parts."""
+        """Return a rule's properties as the first text, and the triples of its parts."""
         parts: list[str] = []
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
         goal = self.condition(rule.goal, terms, me, parts)
@@ -98,12 +98,12 @@ class Writer:
         return [" ; ".join(said), *roles, *parts]
 
     def step(self, does: tuple[str, Sequence[str]], terms: Mapping[str, str]) -> str:
-        """Return a behaviour with its arguments."""
+        """Return the properties of a behaviour with its arguments."""
         put = [terms.get(term) or self.term(term) for term in does[1]]
         return " ; ".join([f":does {self.term(does[0])}", *(f":{a} {t}" for a, t in zip(ARGUMENTS, put, strict=False))])
 
     def method(self, method: Method, me: str) -> list[str]:
-        """Return a method's properties, and its parts."""
+        """Return a method's properties as the first text, and the triples of its parts."""
         roles = [f"{me}.role{i}" for i in range(method.roles + len(method.open))]
         steps = [f"{me}.step{i}" for i in range(len(method.steps))]
         lines = [f":refines {self.term(method.behavior)} ; :roles {method.roles} ; :step {', '.join(steps)}"]
@@ -125,7 +125,7 @@ class Writer:
         return lines
 
     def condition(self, one: Condition, terms: dict[str, str], me: str, parts: list[str]) -> str:
-        """Write a condition and those inside it into `parts`; return its name."""
+        """Append the triples of a condition and its nested conditions to `parts`; return its name."""
         name = f"{me}.c{len(parts)}"
         place = len(parts)
         parts.append("")
@@ -163,13 +163,13 @@ class Writer:
                     parts.append(f"{groups[-1]} a owl:NamedIndividual, :AllOf{of}")
                 said = f":AnyOf ; :alternative {', '.join(groups)}"
             case Comparison():
-                raise TypeError(f"{one} is no condition of a rule: rules compare no amounts")
+                raise TypeError(f"{one} can't be a condition of a rule: rules don't compare amounts")
         parts[place] = f"{name} a owl:NamedIndividual, {said}{no}"
         return name
 
 
-class Reader:
-    """Reads what was learned from the triples of a file."""
+class RuleReader:
+    """Reads learned items from the triples of a file."""
 
     def __init__(self, nodes: Mapping[str, Node], names: Names | None) -> None:
         self.nodes, self.names = nodes, names
@@ -183,7 +183,7 @@ class Reader:
         return iri.rsplit("#", 1)[-1].rsplit("/", 1)[-1]
 
     def said(self, iri: str) -> Said | None:
-        """Return what a node says, if it was learned; raises `ValueError` if it lacks a part."""
+        """Return the learned item of a node, or None if the node is none; raise `ValueError` if a part is missing."""
         node = self.nodes[iri]
         kinds = [kind.removeprefix(CORE) for kind in node.get(RDF + "type", ())]
         if "LearnedRule" in kinds:
@@ -199,18 +199,18 @@ class Reader:
         return None
 
     def one(self, iri: str, name: str) -> str:
-        """Return the one value of a property."""
+        """Return the only value of a property; raise `ValueError` if there is none or more than one."""
         found = self.nodes.get(iri, {}).get(name, ())
         if len(found) != 1:
             raise ValueError(f"<{iri}>: wanted one :{name}, found {len(found)}")
         return found[0]
 
     def arguments(self, iri: str) -> list[str]:
-        """Return the arguments of a node, in their order."""
+        """Return the arguments of a node in order."""
         return [value for name in ARGUMENTS for value in self.nodes[iri].get(name, ())[:1]]
 
     def rule(self, iri: str, node: Node) -> Rule:
-        """Return a rule."""
+        """Return the rule of a node."""
         roles = sorted(node.get("role", ()), key=lambda role: (int(self.one(role, "index")), role))
         terms = {role: "?" + unquote(role.removeprefix(iri + ".")) for role in roles}
         if len(set(terms.values())) < len(roles) or any("." in name for name in terms.values()):
@@ -224,7 +224,7 @@ class Reader:
         return Rule(goal, asks, does, kinds)
 
     def method(self, iri: str, node: Node) -> Method:
-        """Return a method."""
+        """Return the method of a node."""
         own = int(self.one(iri, "roles"))
         opened = sorted(node.get("role", ()), key=lambda role: int(self.one(role, "index")))
         steps = []
@@ -247,11 +247,11 @@ class Reader:
         return Method(self.short(self.one(iri, "refines")), own, tuple(steps), tuple(roles))
 
     def term(self, iri: str, terms: Mapping[str, str]) -> str:
-        """Return a role, or what else a node names."""
+        """Return the role of a term, else its short name."""
         return terms.get(iri) or self.short(iri)
 
     def condition(self, iri: str, terms: Mapping[str, str], depth: int = 0) -> Condition:
-        """Return a condition with those inside it."""
+        """Return the condition of a node, with its nested conditions."""
         if depth > MOST_INSIDE:
             raise ValueError(f"<{iri}>: the condition contains itself")
         node = self.nodes.get(iri, {})

@@ -11,7 +11,7 @@ import pytest
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Tally
 from reasoner.memory.experience_file import MOST, lines, load, parse, probability, save, turtle
-from reasoner.memory.rules_file import MOST_INSIDE, Reader, label
+from reasoner.memory.rules_file import MOST_INSIDE, RuleReader, label
 from reasoner.names import Names
 from reasoner.symbols import AnyOf, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
 from reasoner.vocabulary import CORE
@@ -104,10 +104,10 @@ def test_a_rule_whose_roles_were_renamed_is_the_same_rule() -> None:
 
 
 def test_short_names_are_the_ends_of_iris_where_nobody_knows_better() -> None:
-    reader = Reader({}, None)
+    reader = RuleReader({}, None)
     assert reader.short("https://x.org/k#Cup") == "Cup"
     assert reader.short("https://x.org/Cup") == "Cup"
-    assert Reader({}, NAMES).short(f"{DOMAIN}#MOVE") == "MOVE"
+    assert RuleReader({}, NAMES).short(f"{DOMAIN}#MOVE") == "MOVE"
     plain = read(written(rule()), None)
     assert {one.does for one in plain.said.values() if isinstance(one, Rule)} == {("MOVE", ("?cup", "?place"))}
 
@@ -134,7 +134,7 @@ def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
         (r":chosen 1 ", ":chosen 1.5 ", "broken memory"),
         (r":epoch 0", ":epoch -1", ":epoch -1; wanted a number from 0"),
         (r":episodes 1", f":episodes {MOST}", f":episodes {MOST}; wanted a number from 0 to {MOST}"),
-        (r":epoch 0", ":epoch 2", ":epoch 2 of 'robot', whose :episodes are 1; wanted no later one"),
+        (r":epoch 0", ":epoch 2", ":epoch 2 of 'robot', which has 1 :episodes; wanted an epoch of at most 1"),
         (r":chosen 1 ", f":chosen {MOST} ", f"wanted numbers from 0 to {MOST}"),
         (r"m:counter_\S+ a owl:NamedIndividual, :Counter", "m:other a :Counter", "lacks a part"),
     ],

@@ -108,7 +108,7 @@ def test_the_union_of_two_files_is_a_file_of_both_memories(tmp_path: Path) -> No
     ("content", "message"),
     [
         ("<a> <b", "broken memory"),
-        ("<a> <b> <c> .", "says no :memoryFormat"),
+        ("<a> <b> <c> .", ":memoryFormat is missing"),
         ("<a> <https://w3id.org/confab/core#memoryFormat> 99 .", "format 99, wanted 5"),
     ],
 )
@@ -123,7 +123,7 @@ def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content
     [
         (r":chosen \d+ ", ":chosen -1 ", "wanted numbers from 0"),
         (r":chosen \d+ ", ":chosen 1" + 400 * "0" + " ", "wanted numbers from 0"),
-        (r":learnsAs \S+", ":label 1", "doesn't say who learns into it"),
+        (r":learnsAs \S+", ":label 1", "the ID of its replica, is missing"),
     ],
 )
 def test_counts_that_cant_be_and_nobody_who_learns_are_clear_errors(

@@ -30,7 +30,7 @@ def test_what_nobody_can_do_is_known_beforehand(live: LiveWorld) -> None:
     assert live.impossible(put("cup1", "location6")) is None
     assert "which is no place" in str(live.impossible(put("cup1", "in_hand")))
     assert "interventions change BEVERAGE and LOCATION" in str(live.impossible(held))
-    assert "no body on the table" in str(live.impossible(Intervention(Change.REMOVE, individual="left_hand")))
+    assert "no body of this world" in str(live.impossible(Intervention(Change.REMOVE, individual="left_hand")))
     assert "has a shape" in str(live.impossible(Intervention(Change.ADD, individual="x", kind="Hand")))
 
 

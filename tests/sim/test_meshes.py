@@ -41,7 +41,7 @@ def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name:
         ("a.obj", f"v 0 0 0\nf 1 1 {10**30}\n", "can't be read"),
         ("a.obj", "v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nf 1 2 3\n", "more than 1000 m away"),
         ("a.stl", "solid\n", "has no triangles"),
-        ("a.dae", "<x/>", "no OBJ or STL file; convert it"),
+        ("a.dae", "<x/>", "neither OBJ nor STL; convert it"),
     ],
 )
 def test_what_is_no_mesh_is_said(tmp_path: Path, name: str, text: str, said: str) -> None:

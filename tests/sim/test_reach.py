@@ -35,4 +35,4 @@ def test_what_keeps_a_hand_from_a_place_is_named_with_the_stage_of_the_grasp(ser
     assert hindrance(serving.embodiment, name) == ("right_hand: 9.9 cm out of reach when grasping",)
     above = Fixture("lamp", (0.5, 0.5, 0.02), (*place.position[:2], place.position[2] + 0.25))
     hung = replace(serving.embodiment, fixtures=(*serving.embodiment.fixtures, above))
-    assert hindrance(hung, name)[0] == "left_hand: lamp is in the way when it is lifted"
+    assert hindrance(hung, name)[0] == "left_hand: lamp is in the way when lifting"

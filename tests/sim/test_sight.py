@@ -119,7 +119,7 @@ def test_a_plan_stops_where_uncovering_shows_that_the_belief_is_wrong() -> None:
     )
     failure = rollout.failure
     assert failure is not None
-    assert failure.verdict.message == "BEVERAGE of cup: expected no_beverage, perceived no value"
+    assert failure.verdict.message == "BEVERAGE of cup: expected no_beverage, seen no value"
     assert CUP not in rollout.state
 
 
