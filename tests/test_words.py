@@ -18,7 +18,7 @@ LEFT: dict[str, int] = {
     "planner/grounded": 28,
     "planner/hierarchical": 51,
     "planner/paper": 6,
-    "reasoner": 8,
+    "reasoner": 10,
     "reasoner/graph": 4,
     "reasoner/pddl": 3,
     "reasoner/reading": 26,
