@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -12,6 +13,7 @@ from confab.interchange import read_plan
 from planner.plan import Plan
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
+from reasoner.possible import ImpossibleStateError
 from reasoner.symbols import FALSE, TRUE, Problem
 
 
@@ -61,6 +63,15 @@ def check_goal(scene: str, problem: Problem) -> None:
         if not counted and value not in allowed[symbol.situation]:
             values = allowed[symbol.situation] - {TRUE, FALSE}
             raise KnowledgeError(f"the goal of {symbol} is {value}, which is no value of it{nearest(value, values)}")
+
+
+@contextmanager
+def possible() -> Iterator[None]:
+    """Turn what is said of a state that can't be into a `KnowledgeError`."""
+    try:
+        yield
+    except ImpossibleStateError as error:
+        raise KnowledgeError(str(error)) from error
 
 
 def several(given: Facts) -> list[str]:

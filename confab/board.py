@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from confab.accepting import check_goal, possible
 from confab.known import Known
 from confab.labels import Labels, labels_of
 from confab.planning import Result
 from planner.plan import Limits
 from planner.solve import DEFAULT_MODE, Request, solve
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.names import nearest
+from reasoner.possible import refuse_impossible
 from reasoner.symbols import FALSE, TRUE, Problem, Symbol
 
 if TYPE_CHECKING:
@@ -93,8 +96,17 @@ class Sheet:
         return [*values, *dict.fromkeys(v for v in there if v is not None and v not in values)]
 
     def turned(self, by: Mapping[str, Any]) -> Problem:
-        """Return the problem as somebody has turned it: ``facts`` and ``goals`` by symbol; a goal that is None isn't wanted."""
+        """Return the problem with other facts and goals, each by its symbol; a goal that is None isn't wanted.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no such symbol, a goal wants what is no value of it, or the facts can't hold together.
+        """
         symbols = self.symbols
+        for key in (*by.get("facts", {}), *by.get("goals", {})):
+            if key not in symbols:
+                raise KnowledgeError(f"there is no {key}{nearest(key, symbols)}")
         initial, goal = dict(self.problem.initial), dict(self.problem.goal)
         for key, value in by.get("facts", {}).items():
             initial[symbols[key]] = value
@@ -102,7 +114,12 @@ class Sheet:
             goal.pop(symbols[key], None)
             if value is not None:
                 goal[symbols[key]] = value
-        return replace(self.problem, initial=initial, goal=goal)
+        with possible():
+            refuse_impossible(self.problem, self.problem.initial, initial)
+        turned = replace(self.problem, initial=initial, goal=goal)
+        if goal:
+            check_goal(self.scene.iri, turned)
+        return turned
 
     def plan(self, by: Mapping[str, Any]) -> Result:
         """Return what planning gives in what somebody has turned."""

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, several
+from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
 from planner.acting.episode import Change, End, Episode, Intervention, World
 from planner.acting.executive import Moment, Patience, act
@@ -22,6 +22,7 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import within
 from reasoner.memory.links import Links
 from reasoner.names import nearest
+from reasoner.possible import refuse_impossible
 from reasoner.reading.goals import parse_fact, with_goals
 from reasoner.symbols import Fact, Problem, Symbol
 
@@ -99,7 +100,10 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         return Intervention(Change.REMOVE, individual=_known(problem, words[0], text), **when)
     if verb == "add":
         return _add(problem, words, text, when)
-    return Intervention(Change.WORLD, (Fact(*parse_fact(problem, match[3])),), **when)
+    fact = Fact(*parse_fact(problem, match[3]))
+    with possible():
+        refuse_impossible(problem, {}, {fact.symbol: fact.value}, f"'{text}'")
+    return Intervention(Change.WORLD, (fact,), **when)
 
 
 def _position(text: str) -> int:
@@ -150,6 +154,8 @@ def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
         Fact(*parse_fact(wider, f"{individual} {situation} {value}"))
         for situation, value in zip(pairs[::2], pairs[1::2], strict=True)
     ]
+    with possible():
+        refuse_impossible(wider, {}, {fact.symbol: fact.value for fact in facts}, f"'{text}'")
     return Intervention(Change.ADD, tuple(facts), individual=individual, kind=kind, **when)
 
 
@@ -424,12 +430,11 @@ def execute(
     wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
     if both_hands and (world != "pybullet" or wanted):
         raise KnowledgeError("both hands at once: only in the world pybullet, and without interventions")
-    if not isinstance(world, str):
-        return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
     if world == "symbolic":
-        return Execution(
-            scene, act(problem, SymbolicWorld(problem), plan, wanted, planner, patience, tell, True, caution)
-        )
+        world = SymbolicWorld(problem)
+    if not isinstance(world, str):
+        with possible():
+            return Execution(scene, act(problem, world, plan, wanted, planner, patience, tell, True, caution))
     if world != "pybullet":
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
     from confab.physics import require_skills
@@ -439,10 +444,11 @@ def execute(
 
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     require_skills(scene, [behavior.name for behavior in lowest])
-    with Physics(scene.embodiment, problem.initial, seed, Perturbation() if perturb else None) as physics:
+    varied = Perturbation() if perturb else None
+    with possible(), Physics(scene.embodiment, problem.initial, seed, varied) as physics:
         if prepare is not None:
             prepare(physics)
-        live = LiveWorld(physics, problem.classes)
+        live = LiveWorld(physics, problem.classes, problem)
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")

@@ -14,9 +14,11 @@ import numpy as np
 import pybullet
 
 from planner.acting.episode import Change, Intervention
+from planner.acting.symbolic_world import disturbed, with_individual
 from planner.plan import Step
 from reasoner.embodiment.values import Body, PerceiverUse
-from reasoner.symbols import Fact, State, Symbol
+from reasoner.possible import refuse_impossible
+from reasoner.symbols import Fact, Problem, State, Symbol
 from sim.bodies import KINDS, center_height, inner_radius, vessel_height
 from sim.engine import Bead, Engine, Thing
 from sim.linkage import wide
@@ -45,10 +47,12 @@ class LiveWorld:
     world : World
     classes : mapping of class to individuals
         An object that an intervention adds gets the shape of an object of its class.
+    problem : Problem, optional
+        What an intervention would lead to is checked against it.
     """
 
-    def __init__(self, world: World, classes: Mapping[str, Sequence[str]]) -> None:
-        self.world, self.classes = world, classes
+    def __init__(self, world: World, classes: Mapping[str, Sequence[str]], problem: Problem | None = None) -> None:
+        self.world, self.classes, self.problem = world, classes, problem
         self.waiting: list[Intervention] = []
         self.concerned: set[str] = set()
         world.disturb = self._each_step
@@ -156,6 +160,13 @@ class LiveWorld:
             raise SkillError("interrupted", tuple(sorted(self.concerned)), "an intervention changed an object of it")
 
     def _interfere(self, intervention: Intervention) -> None:
+        if self.problem is not None:
+            if intervention.change is Change.ADD:
+                self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
+            now = self.world.observe()
+            refuse_impossible(
+                self.problem, now, disturbed(self.problem, now, intervention), f"'{intervention.text}' can't happen"
+            )
         if intervention.change is Change.REMOVE:
             take_away(self.world, intervention.individual)
         elif intervention.change is Change.ADD:

@@ -40,6 +40,7 @@ from planner.hierarchical.planner import plan as fast_plan
 from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from planner.validation import open_goals, successor
 from reasoner.limits import LimitError, check
+from reasoner.possible import ImpossibleStateError
 from reasoner.refutations import Refutation, with_refuted
 from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
@@ -184,6 +185,8 @@ def _asking(what: str) -> Iterator[None]:
     """Turn whatever a world raises into a `WorldError`; the whole story goes to the log, at level DEBUG."""
     try:
         yield
+    except ImpossibleStateError:  # the caller's fault, and not the world's
+        raise
     except Exception as error:
         logger.debug("the world failed", exc_info=True)
         raise WorldError(f"the world's {what} raised {type(error).__name__}: {error}") from error

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from planner.acting.episode import Change, Intervention
 from planner.plan import Step
 from planner.validation import successor
+from reasoner.possible import refuse_impossible
 from reasoner.symbols import Fact, Problem, State, Symbol
 
 
@@ -80,10 +81,18 @@ class SymbolicWorld:
         return DONE
 
     def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention happen."""
+        """Let an intervention happen.
+
+        Raises
+        ------
+        ImpossibleStateError
+            What it would lead to can't be.
+        """
         if intervention.change is Change.ADD:
             self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
-        self.state = disturbed(self.problem, self.state, intervention)
+        after = disturbed(self.problem, self.state, intervention)
+        refuse_impossible(self.problem, self.state, after, f"'{intervention.text}' can't happen")
+        self.state = after
 
 
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:

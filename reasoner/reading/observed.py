@@ -16,7 +16,8 @@ import pyoxigraph as ox
 from reasoner.files import write_whole
 from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from reasoner.names import Names
-from reasoner.reading.problem import Reading, check_values
+from reasoner.possible import ImpossibleStateError, refuse_impossible
+from reasoner.reading.problem import Reading
 from reasoner.symbols import State, Symbol
 from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
 
@@ -74,11 +75,13 @@ def load_observed(path: Path, reading: Reading) -> Reading:
                 f"{path}: {symbol} is {other} and {node['value']}, which can't both be seen (a memory says what may be); "
                 "give the file that 'confab run' or 'confab execute' wrote"
             )
+    problem = reading.problem
+    now = {**problem.initial, **seen}
     try:
-        check_values(seen, reading.problem.domain, reading.names)
-    except KnowledgeError as error:
-        raise KnowledgeError(f"{path}: {error}; observe this scene anew") from error
-    return replace(reading, problem=replace(reading.problem, initial={**reading.problem.initial, **seen}))
+        refuse_impossible(problem, problem.initial, now, str(path))
+    except ImpossibleStateError as error:
+        raise KnowledgeError(f"{error}; observe this scene anew") from error
+    return replace(reading, problem=replace(problem, initial=now))
 
 
 def observed_iri(scene: str) -> str:

@@ -19,11 +19,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import chain, product
 
 from reasoner.amounts import (
-    DECIMAL,
     Amount,
     Quantity,
     inside,
@@ -34,6 +32,7 @@ from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from reasoner.language import walk
 from reasoner.limits import check
 from reasoner.names import Names, local_name
+from reasoner.possible import values_at_fault
 from reasoner.reading import swrl
 from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
 from reasoner.reading.goals import check_arguments, with_task
@@ -656,24 +655,6 @@ def _initial(
 
 def check_values(state: State, domain: Domain, names: Names) -> None:
     """Raise `KnowledgeError` if a symbol has a value that is declared nowhere, or an amount that it can't have."""
-    for symbol, value in state.items():
-        quantity = domain.situations[symbol.situation].quantity
-        if quantity is not None:
-            _check_amount(symbol, value, quantity, names)
-        for name in symbol.arguments if quantity else (*symbol.arguments, value):
-            if name not in names and name not in (TRUE, FALSE):
-                raise KnowledgeError(
-                    f"{symbol} is {value}, but {name} isn't declared as an individual; declare it, or mend the name"
-                )
-
-
-def _check_amount(symbol: Symbol, value: str, quantity: Quantity, names: Names) -> None:
-    """Raise `KnowledgeError` if a symbol has an amount that it can't have."""
-    node = names.iri(symbol.arguments[0]) if symbol.arguments[0] in names else ""
-    if not DECIMAL.fullmatch(value):
-        raise KnowledgeError(f"{symbol} is {value[:40]}; wanted a number, like 2 or 1.5", node)
-    if not quantity.allows(Fraction(value)):
-        limits = [] if quantity.least is None else [f"at least {written(quantity.least)}"]
-        limits += [] if quantity.most is None else [f"at most {written(quantity.most)}"]
-        limits += ["a whole number"] if quantity.whole else []
-        raise KnowledgeError(f"{symbol} is {value}; it has to be {' and '.join(limits)}; mend the scene", node)
+    for fault in values_at_fault(state, domain, names):
+        about = next(iter(fault.symbol.arguments), "")
+        raise KnowledgeError(str(fault), names.iri(about) if about in names else "")

@@ -14,6 +14,7 @@ import pyoxigraph as ox
 from reasoner.amounts import bounds, written
 from reasoner.files import as_iri_part
 from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
+from reasoner.possible import ImpossibleStateError, refuse_impossible
 from reasoner.reading.problem import Reading
 from reasoner.refutations import Refutation
 from reasoner.symbols import FALSE, TRUE, Fact, Symbol
@@ -34,7 +35,17 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
     """Return a copy of a graph in which some facts hold, each in place of what was stated of its symbol.
 
     What follows by inference is for the caller to conclude anew.
+
+    Raises
+    ------
+    KnowledgeError
+        Together with what holds besides, the facts can't be.
     """
+    initial = reading.problem.initial
+    try:
+        refuse_impossible(reading.problem, initial, {**initial, **{fact.symbol: fact.value for fact in facts}})
+    except ImpossibleStateError as error:
+        raise KnowledgeError(f"{', '.join(map(str, facts))}: {error}") from error
     copy = _copied(graph)
     properties = value_properties(graph)
     for fact in facts:

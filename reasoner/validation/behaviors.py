@@ -203,6 +203,9 @@ def crowded_places(case: Case) -> Iterator[Fault]:
                 asks[given] = asks.get(given, free) & free
     holders: dict[tuple[str, str], list[str]] = defaultdict(list)
     for symbol, value in sorted(problem.initial.items()):
+        perceived = problem.domain.situations[symbol.situation].perceived
+        if perceived is not None and perceived.exclusive:
+            continue  # an error: `reasoner.validation.situations`
         if len(symbol.arguments) == 1 and asks.get((symbol.situation, value)):
             holders[symbol.situation, value].append(symbol.arguments[0])
     for (situation, value), individuals in holders.items():

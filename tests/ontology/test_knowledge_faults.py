@@ -42,7 +42,8 @@ FEE = """
          "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
         ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
          "SWITCH decreases h and EUR (FEE and HOURS)", "name amounts of one unit"),
-        ("d:hours 0.5", "d:hours -0.5", "first-night", "spot2", "<spot2, HOURS> is -0.5; it has to be at least", "mend the scene"),
+        ("d:hours 0.5", "d:hours -0.5", "first-night", "spot2", "<spot2, HOURS> is -0.5; it has to be at least",
+         "state such an amount"),
     ],
 )  # fmt: skip
 def test_a_fault_is_told_once_with_line_and_mend(

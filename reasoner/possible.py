@@ -1,0 +1,179 @@
+"""What no state can be: one check, with one set of messages, for every door by which a state comes in.
+
+Files, facts that a caller gives, observations, interventions and the board say what holds. Each time, a value has to be one of
+its situation type, an amount within its bounds, and what physics gives to one individual only one has. A symbol without a value
+is unknown, which is no fault.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Container, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from reasoner.amounts import DECIMAL, Quantity, written
+from reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
+
+PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
+"""The perceivers that tell where an object is, what a hand holds and where a hand is."""
+
+
+class ImpossibleStateError(ValueError):
+    """Something would hold that can't; the message says what, and what to do."""
+
+
+@dataclass(frozen=True)
+class Impossible:
+    """Why a state can't be.
+
+    Attributes
+    ----------
+    symbol : Symbol
+        One of those whose values are at fault.
+    what, why, remedy : str
+    """
+
+    symbol: Symbol
+    what: str
+    why: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Return what is wrong, and what to do."""
+        return f"{self.what}; {self.remedy}"
+
+
+def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
+    """Yield why a state can't be; nothing for one that can.
+
+    Parameters
+    ----------
+    problem : Problem
+        Has the situation types and the individuals; its initial state isn't looked at.
+    state : State
+        The values of some symbols, or of all.
+    """
+    declared = {name for members in problem.classes.values() for name in members}
+    wrong = [*values_at_fault(state, problem.domain, declared)]
+    yield from wrong
+    for symbol, value in state.items():
+        situation = problem.domain.situations[symbol.situation]
+        among = (TRUE, FALSE) if situation.boolean else problem.members(situation.range)
+        if situation.quantity is None and value in (declared | {TRUE, FALSE}) and value not in among:
+            yield Impossible(
+                symbol,
+                f"{symbol} is {value}, which is no value of {situation.name}",
+                "no behaviour leads to such a value, and none is asked for it",
+                f"name an individual of {situation.name}",
+            )
+    if not wrong:
+        yield from against_physics(problem, state)
+
+
+def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
+    """Yield the exclusive values that two individuals have, and objects that are held and stand somewhere at once."""
+    yield from _had_twice(problem, state)
+    yield from _held_elsewhere(problem, state)
+
+
+def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
+    """Raise `ImpossibleStateError` if a state can't be, for a reason that isn't one of the state before.
+
+    Parameters
+    ----------
+    problem : Problem
+    before, after : State
+    cause : str
+        What would lead from one to the other, to be named in the message.
+    """
+    known = {fault.what for fault in impossible(problem, before)}
+    for fault in impossible(problem, after):
+        if fault.what not in known:
+            raise ImpossibleStateError(f"{cause}: {fault}" if cause else str(fault))
+
+
+def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:
+    """Yield values that name what is declared nowhere, and amounts that are no numbers or out of their bounds."""
+    for symbol, value in state.items():
+        quantity = domain.situations[symbol.situation].quantity
+        if quantity is not None and (limits := _limits(value, quantity)):
+            yield Impossible(
+                symbol, f"{symbol} is {value[:40]}; {limits}", "amounts keep to their bounds", "state such an amount"
+            )
+        for name in symbol.arguments if quantity else (*symbol.arguments, value):
+            if name not in declared and name not in (TRUE, FALSE):
+                yield Impossible(
+                    symbol,
+                    f"{symbol} is {value}, but {name} isn't declared as an individual",
+                    "an unknown name is read as a new one",
+                    "declare it, or mend the name",
+                )
+
+
+def _limits(value: str, quantity: Quantity) -> str:
+    """Return what a value of an amount has to be, if it isn't."""
+    if not DECIMAL.fullmatch(value):
+        return "wanted a number, like 2 or 1.5"
+    if quantity.allows(Fraction(value)):
+        return ""
+    limits = [] if quantity.least is None else [f"at least {written(quantity.least)}"]
+    limits += [] if quantity.most is None else [f"at most {written(quantity.most)}"]
+    limits += ["a whole number"] if quantity.whole else []
+    return f"it has to be {' and '.join(limits)}"
+
+
+def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
+    """Yield the exclusive values that two individuals have."""
+    having: dict[tuple[str, str], list[Symbol]] = defaultdict(list)
+    for symbol, value in sorted(state.items()):
+        perceived = problem.domain.situations[symbol.situation].perceived
+        if perceived is not None and perceived.exclusive and value not in (v for _, v in perceived.special):
+            having[symbol.situation, value].append(symbol)
+    for (situation, value), (first, *others) in having.items():
+        for other in others:
+            yield Impossible(
+                other,
+                f"{first.arguments[0]} and {other.arguments[0]} have the same {situation}, {value}",
+                f"physics gives each value of {situation} to one {_owner(problem, situation)} at a time",
+                f"state another {situation} of one of them",
+            )
+
+
+def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
+    """Yield objects that stand at a place while a hand that is elsewhere holds them, or are in a hand while no hand holds them.
+
+    A hand that grasps or puts down holds what still stands at its place: as long as it is at that object.
+    """
+    by = {s.perceived.by: s for s in problem.domain.situations.values() if s.perceived is not None}
+    if PLACE not in by or HELD not in by:
+        return
+    place, held = by[PLACE], by[HELD]
+    in_hand = dict(place.perceived.special).get("valueInHand") if place.perceived else None
+    hands = {value: symbol for symbol, value in sorted(state.items()) if symbol.situation == held.name}
+    for symbol, value in state.items():
+        if symbol.situation != place.name:
+            continue
+        (thing,) = symbol.arguments
+        hand = hands.get(thing)
+        if value == in_hand:
+            if hands and hand is None:
+                yield Impossible(
+                    symbol,
+                    f"{symbol} is {value}, but no {_owner(problem, held.name)} has {thing} as its {held.name}",
+                    "what is in a hand is held by one",
+                    f"state {held.name} {thing} of the one that holds it, or another {place.name} of {thing}",
+                )
+        elif hand is not None and POSITION in by:
+            at = state.get(Symbol(by[POSITION].name, hand.arguments))
+            if at is not None and at != thing:
+                yield Impossible(
+                    symbol,
+                    f"{hand} is {thing}, but {symbol} is {value}, and {hand.arguments[0]} isn't at it",
+                    "an object that a hand carries stands nowhere",
+                    f"state {place.name} {in_hand} of {thing}, or another {held.name} of {hand.arguments[0]}",
+                )
+
+
+def _owner(problem: Problem, situation: str) -> str:
+    return problem.domain.situations[situation].arguments[0].replace("|", " or ")

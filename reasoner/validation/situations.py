@@ -1,0 +1,28 @@
+"""Rules of the situation in the beginning, and of the one that is wanted: what physics allows in no state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from reasoner.possible import against_physics
+from reasoner.validation.case import Case, Fault
+
+
+def impossible_situations(case: Case) -> Iterator[Fault]:
+    """Find an initial situation that can't be, and goals that can't hold together."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    found = set()
+    for fault in against_physics(problem, problem.initial):
+        found.add(fault.what)
+        yield names.iri(fault.symbol.arguments[0]), fault.what, fault.why, fault.remedy
+    levels = problem.domain.levels
+    for fault in against_physics(problem, problem.goal_on(levels[-1]) if levels else problem.goal):
+        if fault.what not in found:
+            yield (
+                names.iri(fault.symbol.arguments[0]),
+                f"the goals can't hold together: {fault.what}",
+                fault.why,
+                "want another value of one of them",
+            )

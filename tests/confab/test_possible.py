@@ -1,0 +1,114 @@
+"""What can't be is refused at every door, in the same words; what can be, or isn't known, is taken."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.board import Sheet
+from reasoner.possible import impossible
+from reasoner.reading.observed import load_observed, save_observed
+from reasoner.symbols import Fact, Symbol
+from reasoner.validation.validate import validate
+
+TWICE = "cup1 and cup2 have the same LOCATION, location1; state another LOCATION of one of them"
+HELD = "<left_hand, HOLDS> is cup1, but <cup1, LOCATION> is location2, and left_hand isn't at it"
+NOBODY = "<cup1, LOCATION> is in_hand, but no Hand has cup1 as its HOLDS"
+WRONG = [("cup1 LOCATION location1", TWICE), ("left_hand HOLDS cup1", HELD), ("cup1 LOCATION in_hand", NOBODY)]
+
+SCENE = """
+@prefix : <https://example.org/{name}#> .
+@prefix s: <https://w3id.org/confab/beverage-serving#> .
+@prefix k: <https://w3id.org/confab/tabletop#> .
+@prefix t: <https://w3id.org/confab/dining-table#> .
+@prefix r: <https://w3id.org/confab/two-arms#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix dcterms: <http://purl.org/dc/terms/> .
+<https://example.org/{name}> a owl:Ontology ; dcterms:title "Two cups"@en ; dcterms:description "Two cups."@en ;
+  owl:imports <https://w3id.org/confab/tabletop-bodies>, <https://w3id.org/confab/dining-table>,
+    <https://w3id.org/confab/two-arms> .
+:cup1 a owl:NamedIndividual, k:Cup ; c:index 1 ; rdfs:label "cup 1"@en ; k:beverage k:no_beverage ; k:location t:{place} .
+:cup2 a owl:NamedIndividual, k:Cup ; c:index 2 ; rdfs:label "cup 2"@en ; k:beverage k:no_beverage ; k:location t:location1 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :cup1 :cup2 k:nothing ) ] .
+"""
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+def refused(act: Callable[[], object]) -> str:
+    with pytest.raises(confab.KnowledgeError) as caught:
+        act()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("fact", "message"), WRONG)
+def test_what_can_t_be_is_refused_at_every_door_in_the_same_words(
+    fact: str, message: str, scene: confab.Scene, tmp_path: Path
+) -> None:
+    about, situation, value = fact.split()
+    assert message in refused(lambda: scene.with_fact(fact))
+    assert message in Sheet.of(scene).answer({"facts": {f"{about} {situation}": value}})["headline"]
+    assert message.split("location2")[0].split("location1")[0] in refused(
+        lambda: scene.execute(interventions=f"at=0.5 {fact}")
+    )
+    seen = {**scene.problem.initial, Symbol(situation, (about,)): value}
+    save_observed(tmp_path / "seen.ttl", seen, scene.names, scene.iri)
+    assert message in refused(lambda: load_observed(tmp_path / "seen.ttl", scene.reading))
+
+
+def test_a_file_is_told_the_same(tmp_path: Path) -> None:
+    for name, place, more, message in (
+        ("twice", "location1", "", TWICE),
+        ("held", "location2", "r:left_hand k:holds :cup1 .", HELD),
+        ("nobody", "location2", "", NOBODY),
+    ):
+        text = SCENE.format(name=name, place=place) + more
+        text = text.replace("t:location2", "k:in_hand") if name == "nobody" else text
+        (tmp_path / f"{name}.ttl").write_text(text, encoding="utf-8")
+        (finding,) = (f for f in validate([tmp_path / f"{name}.ttl"]) if f.rule == "impossible-situation")
+        assert finding.what == message.partition(";")[0]
+        assert finding.serious
+        assert finding.line
+
+
+def test_an_intervention_that_can_t_happen_later_is_refused_when_it_would(scene: confab.Scene) -> None:
+    said = refused(lambda: scene.execute(interventions="after=28 cup2 LOCATION location7"))
+    assert said.startswith("'after=28 cup2 LOCATION location7' can't happen: cup1 and cup2 have the same LOCATION")
+    said = refused(lambda: scene.execute(interventions="after=28 add Cup cup9 LOCATION location5"))
+    assert "cup2 and cup9 have the same LOCATION, location5" in said
+
+
+def test_an_amount_out_of_its_bounds_is_refused() -> None:
+    scene = confab.load("canteen-small")
+    symbol = next(s for s in scene.problem.initial if scene.problem.domain.situations[s.situation].quantity)
+    for value in ("-9999", "99999", ">=2"):
+        message = f"{symbol} is {value}; "
+        fact = str(Fact(symbol, value))
+        assert message in refused(lambda fact=fact: scene.with_fact(fact))  # type: ignore[misc]
+        assert message in refused(lambda fact=fact: scene.execute(interventions=f"at=1 {fact}"))  # type: ignore[misc]
+
+
+def test_cups_that_change_places_and_a_cup_that_a_hand_lifted_or_grasped_can_be(scene: confab.Scene) -> None:
+    assert scene.with_fact("cup1 LOCATION location1", "cup2 LOCATION location2").plan().solved
+    assert "left_hand HOLDS cup1" in scene.with_fact("left_hand HOLDS cup1", "cup1 LOCATION in_hand").facts
+    assert scene.with_fact("left_hand HOLDS cup1", "left_hand HAND_POSITION cup1").facts
+
+
+def test_what_is_not_known_is_no_fault(scene: confab.Scene) -> None:
+    problem = scene.problem
+    assert not [*impossible(problem, {})]
+    assert not [*impossible(problem, {Symbol("LOCATION", ("cup1",)): "in_hand"})]
+    assert not [*impossible(problem, {Symbol("HOLDS", ("left_hand",)): "cup1"})]
+
+
+def test_what_a_scene_has_wrong_already_does_not_refuse_other_facts(tmp_path: Path) -> None:
+    (tmp_path / "twice.ttl").write_text(SCENE.format(name="twice", place="location1"), encoding="utf-8")
+    scene = confab.load(tmp_path / "twice.ttl")
+    assert scene.with_fact("right_hand HAND_TILT tilted").facts
+    assert scene.with_fact("cup1 LOCATION location3").facts
