@@ -1,4 +1,4 @@
-"""Learning made visible: how many expansions planning takes as a memory grows, episode by episode, on anyone's scenes."""
+"""Learning curves: the number of expansions of planning as a memory grows, episode by episode."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 KINDS = (".png", ".svg", ".pdf")
 MODES = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
-"""After so long a planning call is left out of the picture."""
+"""Time limit in seconds of a planning call; the picture leaves out calls that exceed it."""
 MANY = 12
-"""So many episodes are named, and their counts written."""
+"""Maximum number of episodes that are labelled with their names and counts."""
 
 
 def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, curve: Curve | None = None) -> Curve:
-    """Plan in scenes and learn from the plans, some rounds long, and return how the effort of planning changed.
+    """Plan in scenes and learn from the plans for some rounds; return the curve of the planning effort.
 
     Examples
     --------
@@ -48,14 +48,14 @@ def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, c
 
 @dataclass
 class Curve:
-    """Expansions per episode and mode, without memory and with what was learned before that episode; None where it gave up."""
+    """Expansions per episode and mode, with the memory before that episode and without memory; None where planning gave up."""
 
     scenes: list[str] = field(default_factory=list)
     with_memory: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
     without: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
 
     def measure(self, name: str, scene: Scene, memory: Memory) -> None:
-        """Plan in a scene with a memory as it is now, and without any."""
+        """Add an episode: plan in a scene with the present memory and without memory."""
         seen = self.scenes.index(name) if name in self.scenes else None
         self.scenes.append(name)
         for mode in MODES:
@@ -65,7 +65,7 @@ class Curve:
             self.without[mode].append(alone)
 
     def save(self, path: Path) -> Path:
-        """Draw the curves into a file, and return which."""
+        """Draw the curves into a file; return its path."""
         from confab.picturing import save, words_as_they_are
 
         require_drawable(path)
@@ -108,7 +108,7 @@ class Curve:
         under = [name.replace("-", "\n") if several else "" for name in self.scenes]
         names = [f"{number}\n{name}".strip() for number, name in zip(episodes, under, strict=True)]
         axes.set_xticks(list(episodes) if few else [], names if few else [], fontsize=8)
-        axes.set_xlabel("episode: what was learned before it is known")
+        axes.set_xlabel("episode, planned with the memory of all earlier ones")
         axes.set_ylabel("expansions")
         axes.set_title("Expansions of planning as memory grows", fontsize=11)
         figure.legend(fontsize=8, ncols=2, loc="outside lower center")
@@ -117,13 +117,13 @@ class Curve:
 
 
 def require_drawable(path: Path) -> None:
-    """Raise `KnowledgeError` if there is no such kind of picture."""
+    """Raise `KnowledgeError` if the path's suffix is no supported picture format."""
     if path.suffix.lower() not in KINDS:
         raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {', '.join(KINDS)}")
 
 
 def _expansions(scene: Scene, memory: Memory | None, mode: str) -> int | None:
-    """Return how many expansions planning takes, or None if that isn't known in time."""
+    """Return the number of expansions of planning, or None if it finds no plan in time."""
     try:
         outcome = scene.plan(memory=memory, mode=mode, time_limit=SECONDS, engine="none").outcome
     except (KnowledgeError, LimitError):

@@ -1,4 +1,4 @@
-"""A schedule as a picture: a strip per hand, a bar per primitive."""
+"""A schedule as a Gantt chart: a row per hand, a bar per primitive."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 TALL, LINES = 21, 2.8
-"""Words stand in their bars: so many signs go into a line, and so many lines into a second."""
+"""Number of characters in a line of a bar's text, and number of lines per second of the bar's width."""
 
 
 def save_gantt(
     slots: Sequence[Slot], path: str | Path, serial: float | None = None, labels: Labels | None = None
 ) -> Path:
-    """Draw a schedule, in words, and the time that one hand after the other would take, into a picture file; return where."""
+    """Draw a schedule with labelled bars, and optionally the serial duration, into a picture file; return its path."""
     from confab.picturing import save, words_as_they_are
 
     with words_as_they_are():

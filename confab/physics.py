@@ -1,4 +1,4 @@
-"""Plans in physics, at the front desk: from a scene to rollouts, and what to show of them."""
+"""Verification of plans in physics: rollouts of a scene's plan, and their report."""
 
 from __future__ import annotations
 
@@ -30,11 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Report:
-    """What physics said about a plan: one or more rollouts, and the film of the first.
+    """The report of a verification: one or more rollouts of a plan, and the film of the first.
 
-    A rollout is good if every primitive did what it promises and the goal's facts were seen in the end. `trusted` are the
-    situation types that the plan changes and nothing perceives: that part of it is taken on trust. `scene` is where the plan is
-    carried out.
+    A rollout is good if every primitive had its expected effects and the goal's facts were seen in the end. `trusted` has the
+    situation types that the plan changes and no perceiver reads: these effects are not verified.
     """
 
     plan: Plan
@@ -51,7 +50,7 @@ class Report:
 
     @property
     def good(self) -> int:
-        """How many rollouts are good."""
+        """Number of good rollouts."""
         return sum(rollout.ok and not self.missed(rollout) for rollout in self.rollouts)
 
     @property
@@ -61,13 +60,13 @@ class Report:
 
     @property
     def film_speed(self) -> float:
-        """How much faster than the simulated time the film runs."""
+        """Ratio of simulated time to the film's time."""
         from sim.film import SPEED
 
         return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
-        """Return the facts of the goal of which something else was seen in the end; what nothing perceives isn't judged."""
+        """Return the facts of the goal for which another value was seen in the end; symbols without a perceiver are skipped."""
         wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
         return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
@@ -88,11 +87,11 @@ class Report:
         }
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return what the first rollout that failed, else the first, says of each step, by the step's path."""
+        """Return the verdict on each step, by the step's path, in the first rollout that isn't good, else in the first."""
         return {report.step.path: "✓" if report.verdict.ok else f"✗ {report.verdict}" for report in self.shown.steps}
 
     def table(self) -> Table:
-        """Return a row for each primitive of the first rollout that failed, else of the first: how it went, what was measured."""
+        """Return a table of the first rollout that isn't good, else of the first: primitives with verdicts and measurements."""
         rows = (
             (
                 str(report.step),
@@ -104,7 +103,7 @@ class Report:
         return Table(("primitive", "done", "measured"), tuple(rows))
 
     def summary(self) -> str:
-        """Return one line that says how it went."""
+        """Return the result in one line."""
         first = self.shown
         several = f"; {self.rate()}" if len(self.rollouts) > 1 else ""
         if first.failure is not None:
@@ -113,7 +112,9 @@ class Report:
             return f"failed {where}: {first.failure.verdict}{several}"
         if missed := self.missed(first):
             seen = "; ".join(f"{fact} (seen: {first.state[fact.symbol]})" for fact in missed)
-            return f"failed: {len(first.steps)} primitives did what they promise, but the goal isn't reached: {seen}{several}"
+            return (
+                f"failed: {len(first.steps)} primitives had their effects, but the goal isn't reached: {seen}{several}"
+            )
         poured = " and ".join(f"{share:.0%}" for share in first.poured)
         unseen = [fact for fact in first.believed if fact.symbol in self.goal]
         return (
@@ -121,19 +122,19 @@ class Report:
             + (f", poured {poured} of a serving" if poured else "")
             + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s"
             + (f"; not seen in the end, believed: {', '.join(map(str, unseen))}" if unseen else "")
-            + (f"; on trust, since nothing perceives it: {', '.join(self.trusted)}" if self.trusted else "")
+            + (f"; not verified, since no perceiver reads it: {', '.join(self.trusted)}" if self.trusted else "")
             + several
         )
 
     def rate(self) -> str:
-        """Return how many rollouts were verified, with Wilson's confidence interval and the seeds."""
+        """Return the number of verified rollouts, with Wilson's confidence interval and the seeds, as text."""
         low, high = wilson(self.good, len(self.rollouts))
         seeds = f"seeds {self.rollouts[0].seed} to {self.rollouts[-1].seed}"
         poured = "" if self.poured is None else f", poured {self.poured:.1%} on average"
         return f"{self.good} of {len(self.rollouts)} rollouts verified ({seeds}; 95 % confidence: {low:.1%} to {high:.1%}){poured}"
 
     def __rich__(self) -> PlanTree:
-        """Return the plan with a verdict behind each primitive, for rich."""
+        """Return the plan with each primitive's verdict, for rich."""
         from confab.show import plan_tree
 
         return plan_tree(self.plan, self.summary(), self.notes())
@@ -177,13 +178,13 @@ def verify(
     gui: bool = False,
     time_limit: float | None = None,
 ) -> Report:
-    """Carry out the primitives of a plan in PyBullet, once or with several seeds.
+    """Execute the primitives of a plan in PyBullet, once or with several seeds.
 
     Parameters
     ----------
     scene, plan
     rollouts, seed
-        How often, with the seeds `seed`, `seed` + 1, …
+        Number of rollouts, with the seeds `seed`, `seed` + 1, …
     perturb
         Vary poses, friction, masses and fill.
     video
@@ -193,11 +194,11 @@ def verify(
     progress
         Called before each step of a single or filmed rollout, with the number of steps done.
     workers
-        A number of processes, or a Ray cluster: see `sim.rollouts.rollouts`.
+        Number of processes, or a Ray cluster: see `sim.rollouts.rollouts`.
     done
-        Called with each rollout that is done.
+        Called with each finished rollout.
     goal
-        What shall be seen in the end; the scene's goal if left out.
+        Facts that have to be seen in the end; by default the scene's goal.
     gui
         Show the first rollout on the screen, no faster than the simulated time.
     time_limit
@@ -206,13 +207,13 @@ def verify(
     Raises
     ------
     KnowledgeError
-        The plan can't be done from the scene's situation, the scene has no geometry, or there are no such workers or no screen.
+        The plan isn't applicable in the scene's situation, the scene has no geometry, or `workers` or a screen is not available.
     """
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
     number("time_limit", time_limit, "seconds as a number, e.g. 5")
     if rollouts < 1:
-        raise KnowledgeError(f"{rollouts} rollouts judge nothing; wanted 1 or more")
+        raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")
     video = None if video is None else Path(video)
     steps = plan.primitives
     require_skills(scene, [step.behavior for step in steps])
@@ -244,24 +245,24 @@ def verify(
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> tuple[str, ...]:
-    """Return the situation types that change on the way through some expected states and that nothing perceives."""
+    """Return the situation types that change in the expected states and that no perceiver reads."""
     initial = scene.problem.initial
     changed = {s.situation for state in expected for s, value in state.items() if initial.get(s) != value}
     return tuple(sorted(changed - scene.embodiment.perceivers.keys()))
 
 
 def require_skills(scene: Known, behaviors: Iterable[str]) -> None:
-    """Raise `KnowledgeError` if physics has no skill for one of some behaviours, or the scene no robot."""
+    """Raise `KnowledgeError` if one of the behaviours has no skill, or the scene no robot."""
     skills = scene.embodiment.skills
     for behavior in behaviors:
         if behavior not in skills:
             raise KnowledgeError(
-                f"behaviour {behavior} names no skill, so physics can't carry it out; give it one (docs/authoring.md), "
+                f"behaviour {behavior} names no skill, so physics can't execute it; give it one (docs/authoring.md), "
                 "or act in the symbolic world (confab execute)"
             )
     if not scene.embodiment.robots:
         raise KnowledgeError(
-            f"{scene.iri} has no robot with a body, so physics can't carry anything out (docs/authoring.md)"
+            f"{scene.iri} has no robot with a body, so physics can't execute anything; describe one (docs/authoring.md)"
         )
 
 
@@ -274,7 +275,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Return the rollout of a seed that is filmed, or shown on the screen, or both."""
+    """Execute the rollout of a seed on film, on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:
@@ -300,7 +301,7 @@ def _shown(
 
 @contextmanager
 def counted(rollouts: int) -> Iterator[Done]:
-    """Show a progress bar on stderr; give what counts a rollout as done."""
+    """Show a progress bar on stderr; yield a function that counts a finished rollout."""
     with progress("rollouts", rollouts) as advance:
         good = 0
 

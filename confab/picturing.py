@@ -1,4 +1,4 @@
-"""Pictures of what was authored: the table at the beginning, a behaviour with its conditions and effects, the classes."""
+"""Pictures of a scene: its initial state, a behaviour with its conditions and effects, the classes of objects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 KINDS = (".png", ".svg", ".pdf")
 MOST_ROWS, DEEPEST = 500, 100
-"""Of a diagram: what is larger no picture can hold."""
+"""Maximum number of rows and of nested classes of a diagram."""
 REACHED, UNREACHED = (30, 140, 60), (200, 40, 40)
 VIEWPOINT = "seen from across the table: the robot's left is on the right"
 GREEN, BLUE, ORANGE, GREY = "#e5f3e5", "#e3ecf7", "#fbeedb", "#f1f1f1"
@@ -44,7 +44,7 @@ SITUATIONS = (
 
 
 def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
-    """Draw a picture into a file and return which: by default the table with its places and who reaches them.
+    """Draw a picture into a file and return its path: by default the table with its places and the hands that reach them.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
     Raises
     ------
     KnowledgeError
-        Another kind of file; no such behaviour; a scene without geometry.
+        The format isn't supported, the behaviour is unknown, or the scene has no geometry.
     """
     diagram = behavior is not None or classes
     wanted = KINDS if diagram else KINDS[:1]
@@ -74,14 +74,14 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
 
 
 def words_as_they_are() -> AbstractContextManager[None]:
-    """Let figures that are made meanwhile show a ``$`` as a dollar, where matplotlib would begin a formula."""
+    """Return a context in which figures show ``$`` as a character; otherwise matplotlib parses it as a formula."""
     from matplotlib import rc_context
 
     return rc_context({"text.parse_math": False})
 
 
 def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
-    """Write a figure in the form that the path's ending names, whole or not at all; return the path."""
+    """Write a figure atomically in the format of the path's suffix; return the path."""
     drawn = BytesIO()
     form = path.suffix[1:].lower()
     figure.savefig(drawn, dpi=dpi, format=form, metadata={"Software" if form == "png" else "Creator": MAKER})
@@ -90,7 +90,7 @@ def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
 
 
 def card(scene: Known, name: str) -> Figure:
-    """Return a behaviour between what has to hold before it and what it changes, in the words of the labels."""
+    """Return a diagram of a behaviour between its preconditions and its effects, in the words of their labels."""
     from matplotlib.figure import Figure
 
     behavior = behavior_named(scene.reading, name)
@@ -123,7 +123,7 @@ def card(scene: Known, name: str) -> Figure:
 
 
 def class_tree(scene: Known) -> Figure:
-    """Return the classes of objects from the left to the right, each with what it brings, what follows last."""
+    """Return a diagram of the classes of objects, from left to right, each with its situation types, defined ones last."""
     from matplotlib.figure import Figure
 
     below: dict[str, list[str]] = {}
@@ -135,7 +135,7 @@ def class_tree(scene: Known) -> Figure:
     for row in scene.knowledge.select(SITUATIONS):
         situations.setdefault(text(row[0]), []).append(local_name(text(row[1])))
     defined: set[str] = set()
-    with suppress(KnowledgeError):  # what can't be planned in can still be drawn
+    with suppress(KnowledgeError):  # a scene that can't be planned can still be drawn
         defined |= {local_name(scene.names.iri(name)) for name in scene.reading.problem.domain.rules}
     root = next((iri for iri in below if local_name(iri) == "Object"), None)
     if root is None:
@@ -173,18 +173,18 @@ def class_tree(scene: Known) -> Figure:
 
 
 def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return pairs of class and subclass without those that follow from others: what a reasoner has written into a file."""
+    """Return pairs of class and subclass without those that follow from others, as reasoners write them into files."""
     import networkx
 
     graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])
-    if not networkx.is_directed_acyclic_graph(graph):  # classes that are the same as each other
+    if not networkx.is_directed_acyclic_graph(graph):  # equivalent classes
         return list(pairs)
     direct = set(networkx.transitive_reduction(graph).edges)
     return [pair for pair in pairs if pair in direct]
 
 
 def fill_lines(words: str, width: int = 32) -> str:
-    """Return a text with each of its lines broken to a width."""
+    """Return a text with each line wrapped to a width."""
     return "\n".join(fill(line, width) for line in words.splitlines())
 
 
@@ -222,7 +222,7 @@ def _top(world: World, name: str) -> Array:
 
 
 def _table(scene: Known, path: Path) -> Path:
-    """Take a picture of the world as it begins, with objects, places, and who reaches those that not every hand does."""
+    """Draw the initial world with objects and places, and the hands at places that not every hand reaches."""
     from PIL import Image, ImageDraw, ImageFont
     from PIL.PngImagePlugin import PngInfo
 

@@ -114,5 +114,5 @@ def summary(outcome: Outcome) -> str:
         f"solved{by}: {lengths(outcome.plan)} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
     ]
     lines += outcome.given_up
-    lines += [f"the plan breaks what only a level above asks: {text}" for text in breaks]
+    lines += [f"the plan violates a condition of the level above: {text}" for text in breaks]
     return "\n".join(lines)

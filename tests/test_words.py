@@ -9,15 +9,13 @@ PRONOUNS = re.compile(
     r"\b(somebody|anybody|nobody|whom|whoever|so many|so much|so often|as little as|of what|of whom)\b", re.IGNORECASE
 )
 LEFT: dict[str, int] = {
-    "confab": 36,
+    "confab": 32,
     "confab/commands": 3,
-    "confab/report": 8,
     "planner": 7,
-    "planner/acting": 9,
+    "planner/acting": 8,
     "planner/experience": 50,
     "planner/grounded": 28,
     "planner/hierarchical": 51,
-    "planner/paper": 6,
     "reasoner": 10,
     "reasoner/graph": 4,
     "reasoner/pddl": 3,

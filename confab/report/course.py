@@ -1,6 +1,6 @@
-"""What was when: the primitives of a plan on one axis of time, and which value each situated object had from when to when.
+"""The timeline of a run: the primitives of a plan, and the values of each situated object, with their beginnings and ends.
 
-A plan alone takes one unit of time per primitive; a rollout and an episode take what the world's clock showed.
+A plan alone takes one unit of time per primitive; rollouts and episodes have the times of the world's clock.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from sim.verify import Rollout
 
 MOST_HANDS = 8
-"""So many of what does the primitives have a lane each."""
+"""Maximum number of lanes by first argument; with more, all primitives share a lane."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A step in time; `ok` is None where nobody looked, `note` says what is to be said of it."""
+    """A step in time; `ok` is None if it was not checked, `note` is a remark on its result."""
 
     step: Step
     begin: float
@@ -36,8 +36,8 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Phase:
-    """A stretch of time in which a symbol had a value."""
+class Period:
+    """A period of time in which a symbol had a value."""
 
     begin: float
     end: float
@@ -45,16 +45,16 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Course:
-    """What was done when, and what was so meanwhile.
+class Timeline:
+    """The primitives of a run in time, and the values of symbols in periods.
 
-    `marks` are moments with a text: interventions and changes of plan. `unit` is that of the axis. `final` is the state in the end.
+    `marks` are times with a text: interventions and changes of plan. `unit` is the unit of time. `final` is the last state.
     """
 
     problem: Problem
     plan: Plan
     bars: tuple[Bar, ...]
-    phases: Mapping[Symbol, tuple[Phase, ...]]
+    phases: Mapping[Symbol, tuple[Period, ...]]
     end: float
     unit: str
     final: State
@@ -67,9 +67,9 @@ class Course:
 
     @property
     def by_path(self) -> dict[tuple[int, ...], Bar]:
-        """The bar of each step of the tree that was begun; of one above primitives, from its first to its last."""
+        """The bar of each begun step of the plan's tree; that of a refined step spans its primitives."""
         found: dict[tuple[int, ...], Bar] = {}
-        for bar in self.bars:  # what was tried again is one stretch, and its last try counts
+        for bar in self.bars:  # repeated attempts make one bar with the last result
             first = found.get(bar.step.path, bar)
             found[bar.step.path] = Bar(bar.step, first.begin, bar.end, bar.ok, bar.note, bar.measured, bar.code)
 
@@ -88,7 +88,7 @@ class Course:
         return found
 
     def lanes(self) -> dict[str, list[Bar]]:
-        """Return the primitives by who does them: each hand, or whatever else has a state of rest; else by their first argument."""
+        """Return the bars of primitives by worker (`planner.acting.schedule.worker_of`), or by first argument if there are none."""
         workers = workers_of(self.problem)
         found: dict[str, list[Bar]] = {}
         for bar in self.bars:
@@ -101,26 +101,26 @@ class Course:
         return dict(sorted(found.items()))
 
     def told(self) -> list[Symbol]:
-        """Return the symbols that change, or are wanted: first those that have a goal."""
+        """Return the symbols that change or have a goal, those with a goal first."""
         goal = self.problem.goal
         symbols = {s for s, phases in self.phases.items() if len(phases) > 1} | set(goal)
         return sorted(symbols & self.phases.keys(), key=lambda s: (s not in goal, s.arguments, s.situation))
 
     def met(self, symbol: Symbol) -> bool | None:
-        """Return whether what is wanted of a symbol is so in the end; None if nothing is."""
+        """Return whether a symbol has its goal value in the end; None if it has no goal."""
         wanted = self.problem.goal.get(symbol)
         return None if wanted is None else self.final.get(symbol, FALSE) == wanted
 
 
-def of_plan(problem: Problem, plan: Plan) -> Course:
-    """Return the course of a plan that nobody carried out: a unit of time for each primitive."""
+def of_plan(problem: Problem, plan: Plan) -> Timeline:
+    """Return the timeline of a plan that was not executed, with one unit of time per primitive."""
     steps = plan.primitives
     bars = tuple(Bar(step, float(i), i + 1.0) for i, step in enumerate(steps))
     return _course(problem, plan, bars, _states(problem, steps), "steps")
 
 
-def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Course:
-    """Return the course of a rollout: what each primitive promised is so from its end on if it did what it should."""
+def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:
+    """Return the timeline of a rollout, with the effects of each successful primitive from its end on."""
     now = max(0.0, rollout.simulated_seconds - sum(report.seconds for report in rollout.steps))
     by_path = {step.path: step for step in plan.primitives}
     bars = []
@@ -138,8 +138,8 @@ def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Course:
     return _course(problem, plan, bars, states, "s")
 
 
-def of_episode(problem: Problem, episode: Episode) -> Course:
-    """Return the course of an episode, as the robot believed it to be."""
+def of_episode(problem: Problem, episode: Episode) -> Timeline:
+    """Return the timeline of an episode, as the robot perceived it."""
     done = {step.path: step for step in episode.done.walk()}
     bars = tuple(
         Bar(
@@ -153,13 +153,13 @@ def of_episode(problem: Problem, episode: Episode) -> Course:
         for event in episode.events
     )
     end = max((bar.end for bar in bars), default=0.0)
-    phases: dict[Symbol, list[Phase]] = {s: [Phase(0.0, end, v)] for s, v in episode.initial.items()}
+    phases: dict[Symbol, list[Period]] = {s: [Period(0.0, end, v)] for s, v in episode.initial.items()}
     for seen in episode.course:
         before = phases.setdefault(seen.symbol, [])
         if before:
-            before[-1] = Phase(before[-1].begin, seen.seconds, before[-1].value)
+            before[-1] = Period(before[-1].begin, seen.seconds, before[-1].value)
         if seen.value is not None:
-            before.append(Phase(seen.seconds, max(end, seen.seconds), seen.value))
+            before.append(Period(seen.seconds, max(end, seen.seconds), seen.value))
     marks = [(at, intervention.text) for intervention, at in episode.interventions]
     ends = {event.step.path: event.end for event in episode.events}
     marks += [(ends.get(r.after, 0.0), f"{r.kind}: {r.because}") for r in episode.replans]
@@ -175,11 +175,11 @@ def of_episode(problem: Problem, episode: Episode) -> Course:
     )
     found = {symbol: tuple(those) for symbol, those in phases.items()}
     unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
-    return Course(lived, episode.done, bars, found, end, unit, episode.observed, tuple(sorted(marks)))
+    return Timeline(lived, episode.done, bars, found, end, unit, episode.observed, tuple(sorted(marks)))
 
 
 def _states(problem: Problem, steps: Iterable[Step]) -> list[State]:
-    """Return the state after each of some primitives; where one can't be done, as it was before."""
+    """Return the state after each of some primitives; an inapplicable one leaves the state unchanged."""
     state, found = problem.initial, []
     for step in steps:
         state = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state) or state
@@ -187,21 +187,21 @@ def _states(problem: Problem, steps: Iterable[Step]) -> list[State]:
     return found
 
 
-def _course(problem: Problem, plan: Plan, bars: Sequence[Bar], states: Sequence[State], unit: str) -> Course:
+def _course(problem: Problem, plan: Plan, bars: Sequence[Bar], states: Sequence[State], unit: str) -> Timeline:
     end = bars[-1].end if bars else 0.0
     begun: dict[Symbol, tuple[float, str]] = {symbol: (0.0, value) for symbol, value in problem.initial.items()}
     begun |= {symbol: (0.0, FALSE) for symbol in problem.goal if symbol not in begun}
-    phases: dict[Symbol, list[Phase]] = {}
+    phases: dict[Symbol, list[Period]] = {}
     before: State = problem.initial
     for bar, state in zip(bars, states, strict=True):
         for symbol, value in state.items():
             if before.get(symbol) == value or (symbol in begun and begun[symbol][1] == value):
                 continue
             since, old = begun.get(symbol, (0.0, FALSE))
-            phases.setdefault(symbol, []).append(Phase(since, bar.end, old))
+            phases.setdefault(symbol, []).append(Period(since, bar.end, old))
             begun[symbol] = bar.end, value
         before = state
     for symbol, (since, value) in begun.items():
-        phases.setdefault(symbol, []).append(Phase(since, end, value))
+        phases.setdefault(symbol, []).append(Period(since, end, value))
     final = {symbol: value for symbol, (_, value) in begun.items()}
-    return Course(problem, plan, tuple(bars), {s: tuple(p) for s, p in phases.items()}, end, unit, final)
+    return Timeline(problem, plan, tuple(bars), {s: tuple(p) for s, p in phases.items()}, end, unit, final)

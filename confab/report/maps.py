@@ -1,4 +1,4 @@
-"""A map from above, with what moved: of a table where places have coordinates, else of the places that static relations connect."""
+"""A map of moved objects: of the table if places have coordinates, else of the places that static relations connect."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from confab.report.course import Course
+from confab.report.course import Timeline
 from confab.report.markup import Markup, tag
 from reasoner.embodiment.values import Embodiment
 from reasoner.symbols import Problem
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 Spots = Mapping[str, tuple[float, float]]
 MOST_SPOTS = 60
-"""Places of a map; with more nothing could be read."""
+"""Maximum number of places of a legible map."""
 MOST_NAMES = 2
-"""So many things at one place have their names on the map."""
+"""Maximum number of names shown at one place."""
 STRETCH = 1.7
-"""A page is wider than high, and names are, too."""
+"""Horizontal stretch of a layout of connected places, since pages and names are wide."""
 LINE, NAME = 13.0, 90.0
-"""How high and how wide a name is, about."""
+"""Approximate height and width of a name, in units of the picture."""
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Where places are, in units of which x goes right and y goes down; boxes by their corners, ways between places, a robot."""
+    """Positions of places (x to the right, y down), boxes by their corners, connections between places, positions of robots."""
 
     spots: Spots
     boxes: tuple[tuple[tuple[float, float], ...], ...] = ()
@@ -39,14 +39,14 @@ class Ground:
 
 
 def ground_of(problem: Problem, embodiment: Embodiment | None) -> Ground | None:
-    """Return what to draw things on, or None if nothing says where anything is."""
+    """Return the background of the map, or None if places have neither coordinates nor connections."""
     if embodiment is not None and embodiment.places:
         return _table(embodiment)
     return _graph(problem)
 
 
 def _table(embodiment: Embodiment) -> Ground | None:
-    """Return a table as the robot sees it: what is on its left is on the left, and it stands below."""
+    """Return a table from the robot's point of view: the robot is below, its left is on the left."""
     if len(embodiment.places) > MOST_SPOTS:
         return None
 
@@ -68,7 +68,7 @@ def _table(embodiment: Embodiment) -> Ground | None:
         reach = abs(solid.rotation) @ np.array(solid.half)
         for sign in (-1, 1):
             of.setdefault(solid.name, []).append(seen(*(solid.center + sign * reach)[:2]))
-    for corners in of.values():  # what mechanisms cover when all is open
+    for corners in of.values():  # the area of mechanisms with every joint open
         (left, right), (back, front) = ((min(side), max(side)) for side in zip(*corners, strict=True))
         boxes.append(((left, back), (right, back), (right, front), (left, front)))
     return Ground(
@@ -79,7 +79,7 @@ def _table(embodiment: Embodiment) -> Ground | None:
 
 
 def _graph(problem: Problem) -> Ground | None:
-    """Return the values of a situation type that a static relation connects, laid out so that what is connected is near."""
+    """Return values of a situation type that static relations connect, laid out so that connected ones are near."""
     import networkx
 
     situations = {symbol.situation for symbol in problem.initial}
@@ -97,8 +97,8 @@ def _graph(problem: Problem) -> Ground | None:
     return Ground(spots, ways=tuple(sorted((min(pair), max(pair)) for pair in graph.edges)))
 
 
-def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> Markup:
-    """Return a picture of where things stood before, and where they stand after."""
+def place_map(ground: Ground, course: Timeline, labels: Labels | None = None) -> Markup:
+    """Return a picture of the initial and final places of objects."""
     moves = _moves(ground, course)
     xs, ys = zip(*[*ground.spots.values(), *(corner for box in ground.boxes for corner in box)], strict=True)
     wide, high = max(max(xs) - min(xs), 1e-9), max(max(ys) - min(ys), 1e-9)
@@ -163,11 +163,11 @@ def place_map(ground: Ground, course: Course, labels: Labels | None = None) -> M
     return tag("figure", svg, tag("figcaption", legend), class_="map")
 
 
-def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str, str]]:
-    """Return what stands on the map, with its first and its last place there, and where it is in the end if that's elsewhere.
+def _moves(ground: Ground, course: Timeline) -> list[tuple[str, str, str, str]]:
+    """Return the objects on the map: name, first and last place there, and final value if that is not on the map.
 
-    A thing stands where a situated object of it says that begins on the map and has no value of rest: what a hand passes
-    on its way is no place of it. If several do, that counts which is longest on the map.
+    The place of an object is the value of a symbol that begins on the map and whose situation type has no rest value, since a
+    hand's position is no place of an object. Of several such symbols, the one that is longest on the map counts.
     """
     situations = course.problem.domain.situations
     found: dict[str, tuple[float, str, str, str]] = {}
@@ -186,13 +186,13 @@ def _moves(ground: Ground, course: Course) -> list[tuple[str, str, str, str]]:
 
 
 def _most_together(moves: Sequence[tuple[str, str, str, str]]) -> int:
-    """Return how many names stand above one place in the end, at most."""
+    """Return the maximum number of names above one final place."""
     places = [after for _, _, after, _ in moves]
     return max((min(places.count(place), MOST_NAMES + 1) for place in places), default=0)
 
 
 def _stretch(points: Sequence[tuple[float, float]], size: float, names: int) -> float:
-    """Return how much longer depth has to be drawn, so that a place's name and those of things behind it don't meet."""
+    """Return the vertical stretch at which the name of a place and those of objects behind it don't overlap."""
     needed = 2 * size + LINE * (names + 1) + 8
     near = [
         abs(a[1] - b[1])
@@ -204,7 +204,7 @@ def _stretch(points: Sequence[tuple[float, float]], size: float, names: int) -> 
 
 
 def _size(spots: Spots) -> float:
-    """Return the radius of a place, so that neighbours don't touch."""
+    """Return the radius of places at which neighbours don't touch."""
     points = list(spots.values())
     apart = min(
         (abs(complex(*a) - complex(*b)) for i, a in enumerate(points) for b in points[:i] if a != b), default=80.0
@@ -217,7 +217,7 @@ def _text(x: float, y: float, words: str, kind: str) -> Markup:
 
 
 def _arrow(start: tuple[float, float], end: tuple[float, float], size: float, color: str) -> Sequence[Markup]:
-    """Return a dashed ring where something stood, and a bent arrow from there to where it stands."""
+    """Return a dashed ring at the initial place, and a bent arrow from there to the final place."""
     (x1, y1), (x2, y2) = start, end
     length = max(abs(complex(x2 - x1, y2 - y1)), 1e-9)
     ux, uy = (x2 - x1) / length, (y2 - y1) / length

@@ -1,4 +1,4 @@
-"""HTML as values: what is text is escaped, what is markup stays as it is."""
+"""HTML as values: text is escaped, markup is not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ EMPTY = frozenset({"br", "circle", "img", "line", "path", "rect", "source", "use
 
 
 class Markup(str):
-    """Text that is HTML already."""
+    """Text that is valid HTML."""
 
     __slots__ = ()
 
@@ -32,7 +32,7 @@ def tag(name: str, *inner: object, **attributes: object) -> Markup:
 
 
 def joined(*parts: object) -> Markup:
-    """Return parts one behind the other: text is escaped, lists are taken apart, None is nothing."""
+    """Return the concatenation of parts: text is escaped, lists are flattened, None is skipped."""
     found = []
     for part in parts:
         if isinstance(part, Markup):
@@ -46,10 +46,10 @@ def joined(*parts: object) -> Markup:
 
 @cache
 def asset(name: str) -> str:
-    """Return a file that lies beside this one."""
+    """Return the text of a file in this folder."""
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 def styled(*pieces: object) -> str:
-    """Return pieces with their style, as a notebook shows them: nothing is fetched, nothing else on the page is touched."""
+    """Return pieces with their style for a notebook, without external files and without effect on the rest of the page."""
     return str(tag("div", tag("style", Markup(asset("style.css"))), *pieces, class_="confab"))

@@ -1,4 +1,4 @@
-"""What a notebook shows: the pieces of the report, by value. The planner's own values are shown so as well (`register`)."""
+"""HTML representations in notebooks of values from rooms that know no HTML (`register`)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SHOWN: dict[tuple[str, str], Callable[[Any], str]] = {
     ("planner.plan", "Step"): _of_step,
     ("sim.verdict", "Verdict"): pieces.verdict,
 }
-"""What the rooms that know no HTML have: shown in a notebook all the same."""
+"""By module and class: the function that returns the HTML of a value."""
 
 
 def register() -> None:
-    """Let a notebook that runs show the values of `SHOWN`; elsewhere nothing happens."""
+    """Register the representations of `SHOWN` in a running notebook; do nothing elsewhere."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if shell is None:
         return

@@ -1,4 +1,4 @@
-"""The report of a run as one HTML page that needs nothing beside itself: no network, no file."""
+"""The report of a run as one self-contained HTML page, without network access or further files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from string import Template
 from typing import TYPE_CHECKING, Protocol
 
 import ontology
-from confab.report.course import Course, of_episode, of_plan, of_rollout
+from confab.report.course import Timeline, of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of, place_map
 from confab.report.markup import Markup, asset, joined, tag
 from confab.report.pieces import Tile, anchor, number, table, tiles, timeline, tree
@@ -32,33 +32,33 @@ if TYPE_CHECKING:
 
 
 class Planned(Protocol):
-    """What came of planning, as the page needs it: `confab.planning.Result`."""
+    """The result of planning, as the page needs it: `confab.planning.Result`."""
 
     problem: Problem
     outcome: Outcome
 
 
 class Executed(Protocol):
-    """What came of carrying a task out, as the page needs it: `confab.execution.Execution`."""
+    """The result of executing a task, as the page needs it: `confab.execution.Execution`."""
 
     @property
     def episode(self) -> Episode:
-        """What happened."""
+        """The episode."""
 
     @property
     def reached(self) -> bool:
         """Whether the goal was reached."""
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return what to say of each step."""
+        """Return a note on each step, by its path."""
 
 
 LARGEST_FILM = 40_000_000
-"""Bytes of a film that is put into the page; a larger one is linked."""
+"""Maximum size in bytes of a film that is embedded in the page; a larger one is linked."""
 LEARNED = 8
-"""So many sentences tell what was learned."""
+"""Maximum number of sentences about learned rules."""
 MOST_STEPS = 4000
-"""Steps of a plan whose reasons are worked out for the page."""
+"""Maximum number of steps of a plan whose purposes are computed for the page."""
 
 
 def report_html(
@@ -69,21 +69,21 @@ def report_html(
     learned: Memory | None = None,
     again: str = "",
 ) -> str:
-    """Return the page.
+    """Return the page as HTML text.
 
     Parameters
     ----------
     scene : Scene
     result : Result, optional
-        What came of planning, maybe that there is no plan.
+        The result of planning, with or without a plan.
     report : Report, optional
-        What physics said of the plan.
+        The verification of the plan in physics.
     execution : Execution, optional
-        What came of carrying the task out; the page then tells that and not the plan.
+        The execution of the task; the page then shows it instead of the plan.
     learned : Memory, optional
-        What is known after the run.
+        The memory after the run.
     again : str, optional
-        The command that does the same; guessed if left out.
+        The command that repeats the run; derived from the other arguments by default.
     """
     from confab.labels import labels_of
 
@@ -100,8 +100,8 @@ def report_html(
         _scene(course, labels, embodiment_of(scene), report),
     ]
     if course is not None:
-        parts += [tag("h2", "Who did what when, and what that changed"), timeline(course, labels, speed)]
-        parts += [tag("h2", "The plan, and why"), _plan(course, labels, report, execution)]
+        parts += [tag("h2", "Timeline"), timeline(course, labels, speed)]
+        parts += [tag("h2", "The plan and its reasons"), _plan(course, labels, report, execution)]
     parts += [_wanted(course, problem, labels), _learned(learned)]
     parts += [
         tag("h2", "Again"),
@@ -115,7 +115,7 @@ def report_html(
 
 def _course(
     problem: Problem, result: Planned | None, report: Report | None, execution: Executed | None
-) -> Course | None:
+) -> Timeline | None:
     if execution is not None:
         return of_episode(problem, execution.episode)
     if report is not None:
@@ -126,7 +126,7 @@ def _course(
 
 
 def embodiment_of(scene: Known) -> Embodiment | None:
-    """Return the scene's bodies; None where it has none, or none that are whole."""
+    """Return the scene's embodiment, or None if it is missing or incomplete."""
     from reasoner.embodiment.facts import EmbodimentError
 
     try:
@@ -139,7 +139,11 @@ def embodiment_of(scene: Known) -> Embodiment | None:
 
 
 def _tiles(
-    problem: Problem, course: Course | None, outcome: Outcome | None, report: Report | None, execution: Executed | None
+    problem: Problem,
+    course: Timeline | None,
+    outcome: Outcome | None,
+    report: Report | None,
+    execution: Executed | None,
 ) -> list[Tile]:
     found: list[Tile] = []
     if execution is not None:
@@ -189,9 +193,9 @@ def _tiles(
 
 
 def _alarm(
-    course: Course | None, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
+    course: Timeline | None, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
 ) -> Markup | None:
-    """Return what went wrong, with its numbers; None if nothing did."""
+    """Return a section on the failure with its measurements, or None if nothing failed."""
     if execution is not None and execution.reached:
         return None
     failed = course.failed if course is not None else None
@@ -244,9 +248,9 @@ def _reasons_of(execution: Executed | None) -> Markup | None:
 
 
 def _scene(
-    course: Course | None, labels: Labels, embodiment: Embodiment | None, report: Report | None
+    course: Timeline | None, labels: Labels, embodiment: Embodiment | None, report: Report | None
 ) -> Markup | None:
-    """Return the film beside the map, or what there is of both."""
+    """Return the film and the map side by side, or whichever exists."""
     film = _film(report)
     ground = ground_of(course.problem, embodiment) if course is not None else None
     drawn = place_map(ground, course, labels) if ground is not None and course is not None else None
@@ -275,7 +279,7 @@ def _film(report: Report | None) -> Markup | None:
     )
 
 
-def _plan(course: Course, labels: Labels, report: Report | None, execution: Executed | None) -> Markup:
+def _plan(course: Timeline, labels: Labels, report: Report | None, execution: Executed | None) -> Markup:
     steps = sum(1 for _ in course.plan.walk())
     notes = execution.notes() if execution is not None else report.notes() if report is not None else {}
     calm = execution is None or not (execution.episode.interventions or execution.episode.failures)
@@ -283,8 +287,8 @@ def _plan(course: Course, labels: Labels, report: Report | None, execution: Exec
     return tree(course.plan, labels, notes, needed, course)
 
 
-def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup | None:
-    """Return what was wanted, and what was so in the end."""
+def _wanted(course: Timeline | None, problem: Problem, labels: Labels) -> Markup | None:
+    """Return a table of the goals with their initial and final values."""
     goal = course.problem.goal if course is not None else problem.goal
     if not goal:
         return None
@@ -296,8 +300,8 @@ def _wanted(course: Course | None, problem: Problem, labels: Labels) -> Markup |
             end = labels.name(course.final.get(symbol, "false"))
             row.append(tag("span", f"{'✓' if met else '✗'} {end}", class_="ok" if met else "bad"))
         rows.append(row)
-    columns = ["wanted", "before", *(["in the end"] if course is not None else [])]
-    return joined(tag("h2", "What was wanted"), table(columns, rows))
+    columns = ["goal", "before", *(["in the end"] if course is not None else [])]
+    return joined(tag("h2", "Goals"), table(columns, rows))
 
 
 def _learned(memory: Memory | None) -> Markup | None:
@@ -321,16 +325,16 @@ def _again(scene: Known, report: Report | None, execution: Executed | None, phys
 
 
 def _small_print(outcome: Outcome | None) -> list[Markup]:
-    """Return which levels were given up, and what that breaks."""
+    """Return notes on the levels that were given up, and on the conditions that the plan violates therefore."""
     said = [tag("p", text, class_="note") for text in (outcome.given_up if outcome is not None else ())]
     for left in outcome.left if outcome is not None else ():
         for broken in left.broken:
-            said.append(tag("p", f"the plan breaks what only a level above asks: {broken.text}", class_="note"))
+            said.append(tag("p", f"the plan violates a condition of the level above: {broken.text}", class_="note"))
     return said
 
 
 def write_report(path: str | Path, page: str) -> Path:
-    """Write a page whole or not at all, and return where."""
+    """Write a page atomically; return its path."""
     from reasoner.files import write_whole
 
     write_whole(Path(path), page)

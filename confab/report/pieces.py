@@ -1,11 +1,11 @@
-"""The pieces of the report: tiles, the axis of time, the plan as a tree, reasons. Each is HTML that needs the style beside it."""
+"""The pieces of the report: tiles, the timeline, the plan as a tree, verdicts. Each is HTML that needs `style.css`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from confab.report.course import Bar, Course
+from confab.report.course import Bar, Timeline
 from confab.report.markup import Markup, joined, styled, tag
 from planner.plan import Plan, Step
 from reasoner.symbols import FALSE, TRUE
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
 Notes = Mapping[tuple[int, ...], str]
 Tile = tuple[str, str, str]
-"""What it is about, what it says, and its tone: good, bad or nothing."""
+"""Name, value and tone (good, bad or empty) of a tile."""
 COLORS = 8
 MOST_BARS, MOST_LANES = 1500, 40
-"""So many bars and lanes are drawn; of what is left out it is said how much it is."""
+"""Maximum numbers of bars and of lanes of facts; a note gives the number of those left out."""
 LAST = 0.04
-"""Of the axis, behind the last primitive."""
+"""Share of the axis that follows the last primitive."""
 MEANT = {True: ("✓", "ok"), False: ("✗", "bad")}
 
 
 def tiles(those: Iterable[Tile]) -> Markup:
-    """Return numbers side by side."""
+    """Return tiles side by side."""
     return tag(
         "div",
         [tag("div", tag("span", what), tag("b", said), class_=f"tile {tone}".strip()) for what, said, tone in those],
@@ -35,16 +35,16 @@ def tiles(those: Iterable[Tile]) -> Markup:
 
 
 def number(value: float) -> str:
-    """Return a number with as many digits as one reads."""
+    """Return a number as text with about three significant digits."""
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def anchor(path: Sequence[int]) -> str:
-    """Return the name of a step on the page."""
+    """Return the HTML ID of a step."""
     return "s" + "-".join(map(str, path))
 
 
-# ------------------------------------------------------------------------------------------------------------ the plan
+# ------------------------------------------------------------------------------------------------------------ plan
 
 
 def tree(
@@ -52,9 +52,9 @@ def tree(
     labels: Labels | None = None,
     notes: Notes | None = None,
     purposes: Mapping[tuple[int, ...], Purpose] | None = None,
-    course: Course | None = None,
+    course: Timeline | None = None,
 ) -> Markup:
-    """Return a plan as lists that fold: what each step does, how it went, what it measured, and what needs it."""
+    """Return a plan as folding lists: each step with its result, measurements and purposes."""
     from confab.why import account, numbers
 
     why = {}
@@ -91,7 +91,7 @@ def tree(
 
 
 def _numbers(step: Step, bar: Bar | None, labels: Labels | None) -> list[Markup]:
-    """Return what a primitive measured, and what the situation gave to a step's variables."""
+    """Return the measurements of a primitive, and the individuals of a step's determined variables."""
     pairs = [(name, number(value)) for name, value in (bar.measured if bar else {}).items()]
     pairs += [(name, labels.name(value) if labels else value) for name, value in step.bindings.items()]
     if not pairs:
@@ -99,24 +99,24 @@ def _numbers(step: Step, bar: Bar | None, labels: Labels | None) -> list[Markup]
     return [tag("dl", [tag("div", tag("dt", name.replace("_", " ")), tag("dd", value)) for name, value in pairs])]
 
 
-# ------------------------------------------------------------------------------------------------------------ in time
+# ------------------------------------------------------------------------------------------------------------ timeline
 
 
-def timeline(course: Course, labels: Labels | None = None, speed: float | None = None) -> Markup:
-    """Return one axis of time: a lane per level, per hand, and per situated object, with a mark where a goal is met.
+def timeline(course: Timeline, labels: Labels | None = None, speed: float | None = None) -> Markup:
+    """Return the timeline: a lane per level, per hand, and per situated object, with a sign whether its goal is met.
 
     Parameters
     ----------
-    course : Course
+    course : Timeline
     labels : Labels, optional
     speed : float, optional
-        How much faster than the axis a film on the page runs, which then follows clicks.
+        Ratio of the axis's time to that of a film on the page, which then follows clicks.
     """
     if not course.bars:
         return Markup("")
     symbols = course.told()
     late = any(phase.begin >= course.end for s in symbols for phase in course.phases[s])
-    end = (course.end or 1.0) * (1 + LAST if late else 1)  # what the last primitive gave is to be seen, too
+    end = (course.end or 1.0) * (1 + LAST if late else 1)  # leaves room for the last primitive's effects
     rows: list[Markup] = []
     by_path = course.by_path
     levels = sorted({step.level for step in course.plan.walk() if step.steps})
@@ -218,7 +218,7 @@ def _axis(end: float, unit: str) -> Markup:
 
 
 def verdict(told: Any) -> str:
-    """Return what physics says of a step."""
+    """Return physics' verdict on a step."""
     sign, tone = MEANT[bool(told.ok)]
     pairs = [
         tag("div", tag("dt", name.replace("_", " ")), tag("dd", number(value))) for name, value in told.measured.items()
@@ -228,7 +228,7 @@ def verdict(told: Any) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Markup:
-    """Return a table that scrolls by itself where it is too wide."""
+    """Return a table that scrolls horizontally if it is too wide."""
     head = tag("tr", [tag("th", name) for name in columns])
     body = [tag("tr", [tag("td", cell if cell is not None else "") for cell in row]) for row in rows]
     return tag("div", tag("table", tag("thead", head), tag("tbody", body)), class_="scroll")

@@ -1,8 +1,7 @@
-"""Both arms at once: the partial order that a plan really needs, and a schedule that keeps it.
+"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that keeps it.
 
-A plan is a sequence, but most of its order means nothing. One primitive must wait for an earlier one only if it wouldn't be
-applicable, or would do something else, had the earlier one not been done yet; or if the earlier one would, had it been done
-before. That is asked of the behaviours themselves, so that conditions of any form count.
+Most of a plan's order is arbitrary. A primitive has to wait for an earlier one only if, executed before it, one of the two would be
+inapplicable or have other effects. This is tested with the behaviours themselves, so that conditions of any form count.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ from reasoner.symbols import Problem, State, Symbol
 
 Order: TypeAlias = "networkx.DiGraph[int]"
 Apart = Callable[[Step, Step], bool]
-"""Whether two primitives leave each other enough room to be done at the same time."""
+"""Function of two primitives: whether there is enough room to execute both at the same time."""
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A primitive in a schedule: who does it, from when to when, in seconds."""
+    """A primitive in a schedule: its worker, its beginning and its end in seconds."""
 
     step: Step
     position: int
@@ -34,25 +33,25 @@ class Slot:
 
 
 def partial_order(problem: Problem, primitives: Sequence[Step]) -> Order:
-    """Return which primitives must be done before which: nodes are positions, edges as few as say the same.
+    """Return the necessary order of primitives as a transitively reduced graph over their positions.
 
     Parameters
     ----------
     problem : Problem
-        Its initial state is where the primitives begin.
+        Its initial state is the state before the primitives.
     primitives : sequence of Step
 
     Raises
     ------
     ValueError
-        A primitive isn't applicable where it is done.
+        A primitive isn't applicable in the state before it.
     """
     states: list[State] = [problem.initial]
     writes: list[dict[Symbol, tuple[str | None, str]]] = []
     for step in primitives:
         after = _done(problem, step, states[-1])
         if after is None:
-            raise ValueError(f"{step} isn't applicable where it is done")
+            raise ValueError(f"{step} isn't applicable in the state before it")
         before = states[-1]
         writes.append({s: (before.get(s), v) for s, v in after.items() if before.get(s) != v})
         states.append(after)
@@ -68,7 +67,7 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> Order:
 
 
 def workers_of(problem: Problem) -> frozenset[str]:
-    """Return the individuals that have a state of rest: those that do one thing at a time."""
+    """Return the workers: individuals with a situation type that has a rest value. A worker executes one primitive at a time."""
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None}
     return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
 
@@ -79,21 +78,21 @@ def schedule(
     seconds_of: Mapping[int, float] | None = None,
     apart: Apart = lambda one, other: True,
 ) -> list[Slot]:
-    """Return when each primitive begins and ends if every hand works as soon as it can.
+    """Return the slots of primitives if every worker begins each of them as early as possible.
 
     Parameters
     ----------
     problem : Problem
     primitives : sequence of Step
     seconds_of : mapping of position to seconds, optional
-        How long each takes; a second if left out.
+        Duration of each primitive; one second by default.
     apart : callable
-        Says of two primitives whether there is room for both at once.
+        Returns whether there is room for two primitives at the same time.
 
     Returns
     -------
     list of Slot
-        In the order of their beginning.
+        In the order of their beginnings.
     """
     seconds = {i: 1.0 if seconds_of is None else seconds_of[i] for i in range(len(primitives))}
     order = partial_order(problem, primitives)
@@ -121,7 +120,7 @@ def ready(
     urgency: Mapping[int, float],
     apart: Apart,
 ) -> list[int]:
-    """Return the primitives that can begin now, the most urgent first, no two of them in each other's way."""
+    """Return the primitives that can begin now, the most urgent first, with room for all of them at once."""
     started, chosen = set(begun), list(running)
     busy = {worker_of(primitives[i], workers) for i in running}
     found = []
@@ -138,23 +137,23 @@ def ready(
 
 
 def urgency_of(order: Order) -> dict[int, float]:
-    """Return for each primitive how many must still follow it, one after the other."""
+    """Return for each primitive the length of the longest chain of primitives that begins with it."""
     return _urgency(order, dict.fromkeys(order, 1.0))
 
 
 def worker_of(step: Step, workers: Iterable[str]) -> str:
-    """Return who does a step: the first of its arguments that is a worker; nobody in particular if there is none."""
+    """Return the worker of a step, the first of its arguments that is one; an empty string if there is none."""
     known = workers if isinstance(workers, frozenset) else frozenset(workers)
     return next((argument for argument in step.arguments if argument in known), "")
 
 
 def makespan(slots: Sequence[Slot]) -> float:
-    """Return when the last primitive ends."""
+    """Return the end of the last primitive."""
     return max((slot.end for slot in slots), default=0.0)
 
 
 def _urgency(order: Order, seconds: Mapping[int, float]) -> dict[int, float]:
-    """Return for each primitive how long it and the longest chain behind it take."""
+    """Return for each primitive the duration of the longest chain of primitives that begins with it."""
     found: dict[int, float] = {}
     for i in reversed(list(networkx.topological_sort(order))):
         found[i] = seconds[i] + max((found[j] for j in order.successors(i)), default=0.0)
@@ -173,7 +172,7 @@ def _needs(
     i: int,
     j: int,
 ) -> bool:
-    """Whether primitive `j` must wait for the earlier `i`."""
+    """Return whether primitive `j` has to wait for the earlier primitive `i`."""
     if writes[i].keys() & writes[j].keys():
         return True
     live = {s: old for s, (old, new) in writes[i].items() if not any(s in writes[k] for k in range(i + 1, j))}
@@ -185,6 +184,6 @@ def _needs(
 
 
 def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:
-    """Whether a primitive is applicable in a state and has the effects that it has in the plan."""
+    """Return whether a primitive is applicable in a state and has the same effects there as in the plan."""
     after = _done(problem, step, state)
     return after is not None and all(after.get(s) == new for s, (_, new) in writes.items())

@@ -1,9 +1,9 @@
-"""A* as Algorithm 1 of the paper means it, with the cogency ranking score of eqs. (3) and (5) in f.
+"""A* as intended by Algorithm 1 of the paper, with the cogency ranking score of eqs. (3) and (5) in f.
 
 g    cost of the behaviours from the start to a node
-h    estimated cost from a node to the goal: the situated object symbols that don't match it
-c    cogency term of the behaviour that led to a node, judged in the state before it; not accumulated along the path
-f    g + h + c, the least of which is expanded next; ties in the order of generation
+h    estimated cost from a node to the goal: the number of situated object symbols that don't match it
+c    cogency term of the behaviour that led to a node, computed in the state before it; not accumulated along the path
+f    g + h + c; the node with the least f is expanded next, ties in the order of generation
 n    depth of a node
 
 Algorithm 1 as printed never puts the start into the open set, has no closed set and overwrites parents without comparing g;
@@ -27,7 +27,7 @@ Goal = Mapping[int, str]
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found: `path` is there exactly if `status` is solved."""
+    """The result of a search; `path` is meaningful only if `status` is solved."""
 
     status: Status
     path: tuple[Applied, ...]
@@ -36,7 +36,7 @@ class Found:
 
 
 def mismatches(values: Values, goal: Goal) -> int:
-    """Return h: how many symbols of the goal have another value (section IV-A of the paper)."""
+    """Return h: the number of the goal's symbols with another value (section IV-A of the paper)."""
     return sum(not meets(values[i], wanted) for i, wanted in goal.items())
 
 
@@ -55,10 +55,10 @@ def a_star(
     ----------
     start : Values
     goal : Goal
-    successors : function of a state to what can be done there; raises `OutOfTimeError` to end the search
-    cost : function of a state and one of them to its cost
-    rank : function of a state to the ranking scores of what can be done there (eq. 4), in [0, 1]; None leaves c at 0
-    bonus : function of ranking score and depth to the term c of eq. (3)
+    successors : function from a state to the behaviours applied there; raises `OutOfTimeError` to end the search
+    cost : function from a state and a behaviour applied there to its cost
+    rank : function from a state to the ranking scores (eq. 4), in [0, 1], of behaviours applied there; None leaves c at 0
+    bonus : function from ranking score and depth to the term c of eq. (3)
     limits : Limits
 
     Returns
@@ -74,7 +74,7 @@ def a_star(
     while open_set:
         _, _, state, g_state = heapq.heappop(open_set)
         if g_state > g[state]:
-            continue  # reached by a cheaper path since
+            continue  # a cheaper path has been found since
         if not mismatches(state, goal):
             return _reconstruct(came_from, state, counts)
         if counts.expanded >= limits.expansions:

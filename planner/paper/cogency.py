@@ -1,7 +1,7 @@
-"""Cogent confabulation: how strongly a behaviour supports the facts that are assumed to hold.
+"""Cogent confabulation: the degree to which a behaviour supports the assumed facts.
 
 The memory of the paper is a table p(<o, S> | b): for each quantified behaviour b and situated object symbol <o, S> one
-categorical distribution over the values of the symbol. What was never learned is uniform.
+categorical distribution over the values of the symbol, which is uniform before anything is learned.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ PAPER = PaperConstants()
 
 
 def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, str, tuple[str, ...]]]:
-    """Return the facts that a level knows of, each with the values that its symbol can have there.
+    """Return the facts of a state that a level sees, each with the values that its symbol can have there.
 
-    Every one is a factor of the cogency, relevant or not (section III-D of the paper).
+    Each fact is a factor of the cogency, relevant or not (section III-D of the paper).
     """
     facts = []
     for symbol in sorted(state):
@@ -70,7 +70,7 @@ def cogencies(
 
 
 def ranking(scores: Mapping[Conclusion, float]) -> dict[Conclusion, float]:
-    """Return c_m of eq. (4): rank 1 is the most cogent, ties share the lowest rank, divided by how many there are.
+    """Return c_m of eq. (4): the rank divided by the number of conclusions; rank 1 is the most cogent, ties share the lowest rank.
 
     >>> ranking({("a", ()): -1.0, ("b", ()): -3.0, ("c", ()): -1.0, ("d", ()): -9.0})
     {('a', ()): 0.25, ('b', ()): 0.75, ('c', ()): 0.25, ('d', ()): 1.0}

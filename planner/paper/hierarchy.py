@@ -1,10 +1,10 @@
 """The hierarchical planner: search on the most abstract level, then refine each behaviour on the level below, down to primitives.
 
-What a refinement has to reach is in docs/levels.md: what the refined behaviour says of all that its level sees, and what the lower
-level adds at rest if it was touched (hands empty; hands raised and upright). The next behaviour begins in the state in which
-that one's refinement ended. What came of a behaviour in a state is remembered; if it can't be refined there, or leaves the rest
-of the plan undoable, the level above is searched again with that known. When a level has no plan at all, the level below is
-given the goal itself.
+docs/levels.md defines the goal of a refinement: the values after the refined behaviour of all symbols that its level sees, and rest
+values of the symbols that the lower level adds, if it changed them (hands empty, raised and upright). The next behaviour begins in
+the state in which this refinement ended. The result of each behaviour in each state is stored; if it can't be refined there, or the
+rest of the plan isn't applicable after it, the level above is searched again with that knowledge. If a level has no plan at all,
+the level below gets the goal itself.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from reasoner.memory.links import Links
 from reasoner.symbols import Fact, GroundBehavior, Problem
 
 SETTLED, UNSETTLED = "settled", "unsettled"
-"""Whether a symbol that wasn't at rest in the beginning is at rest or still untouched: see `Target`."""
+"""Marks of a symbol that did not have its rest value in the beginning: at rest or unchanged, or changed; see `Target`."""
 
 DOUBT = 1_000
-"""Expansions after which it is asked whether there can be a plan at all, and again whenever they are four times as many."""
+"""Number of expansions before the first proof of unsolvability is tried; it is tried again each time the number has quadrupled."""
 Proof: TypeAlias = "Callable[[Problem, int, float | None], Reason | None]"
-"""Says why a problem has no plan, if that can be shown at once or, by a deadline, by looking at so many states."""
+"""Function of a problem, a number of states and a deadline: returns why the problem has no plan, or None if it finds no proof."""
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
-"""A behaviour with its refinement and the state that it really leads to; None if it has no refinement."""
+"""A step with its refinement and the state at the refinement's end; None if there is no refinement."""
 
 
 @dataclass
-class Call:
-    """One planning call: the compiled problem, what guides it, and what it has found out and counted."""
+class PaperCall:
+    """One planning call: the compiled problem, memory, constants and limits, stored refinements, and counts."""
 
     model: Model
     grounds: Mapping[int, tuple[GroundBehavior, ...]]
@@ -54,7 +54,7 @@ class Call:
 
 
 def unproved(problem: Problem, states: int, deadline: float | None) -> None:
-    """Show nothing."""
+    """Return no proof."""
 
 
 def plan(
@@ -72,16 +72,16 @@ def plan(
     ----------
     problem : Problem
     links : Links, optional
-        The confabulation memory; none learned if left out.
+        The confabulation memory; by default an empty one.
     constants : PaperConstants
     limits : Limits
-        Expansions for each search, seconds for the whole call.
+        Maximum number of expansions of each search, and seconds of the whole call.
     grounds : mapping of level to quantified behaviours, optional
-        As `reasoner.reading.quantification` returns them; quantified here from the problem's classes if left out.
+        As `reasoner.reading.quantification` returns them; by default quantified from the problem's classes.
     leave_levels : bool
-        Whether the level below is given the goal where a level has no plan that can be refined.
+        Whether the level below gets the goal if a level has no plan that can be refined.
     proof : Proof
-        Asked after `DOUBT` expansions, and now and then from there on with as many states.
+        Called after `DOUBT` expansions and repeatedly later, each time with a larger number of states.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def flat(
     constants: PaperConstants = PAPER,
     limits: Limits = Limits(),  # noqa: B008 - frozen
 ) -> Outcome:
-    """Search one level alone with the same f, without the hierarchy: what the hierarchy is measured against."""
+    """Search one level with the same f but without the hierarchy, for comparison."""
     begin = perf_counter()
     call = _call(problem, (level,), links, constants, limits, None, unproved)
     return _outcome(call, task(call, level), perf_counter() - begin)
@@ -129,8 +129,8 @@ def _call(
     limits: Limits,
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None,
     proof: Proof,
-) -> Call:
-    return Call(
+) -> PaperCall:
+    return PaperCall(
         model=Model(problem),
         grounds=grounds or {level: ground(problem, level) for level in levels},
         links=links or Links(),
@@ -142,8 +142,8 @@ def _call(
     )
 
 
-def task(call: Call, level: int) -> list[Step] | None:
-    """Return steps of one level, refined down to primitives, to the goal; None if there are none that can all be refined."""
+def task(call: PaperCall, level: int) -> list[Step] | None:
+    """Return steps of one level to the goal, refined down to primitives, or None if no plan of the level can be refined."""
     problem, start = call.model.problem, call.model.values(call.model.problem.initial)
     goal = {i: problem.goal[symbol] for i, symbol in enumerate(call.model.symbols) if symbol in problem.goal}
     found = solve(call, level, start, target(call.model, 0, level, start, goal))
@@ -152,29 +152,29 @@ def task(call: Call, level: int) -> list[Step] | None:
 
 @dataclass(frozen=True)
 class Target:
-    """What steps of a level have to lead to.
+    """The goal of a sequence of steps of one level.
 
-    `values` have to hold in the end. `restless` are symbols that weren't at rest in the beginning, with their rest values:
-    they may stay as they are, but once touched have to come to rest.
+    `values` have to hold in the end. `restless` has the symbols that were not at rest in the beginning, with their rest values:
+    each of them either stays unchanged or has to end at rest.
     """
 
     values: Goal
     restless: Goal
 
     def marks(self, before: Values, after: Values, marks: tuple[str, ...]) -> tuple[str, ...]:
-        """Return for each restless symbol whether it is settled after a step, from what it was before."""
+        """Return the marks of the restless symbols after a step, given the states around it and the marks before it."""
         return tuple(
             SETTLED if after[i] == rest else mark if after[i] == before[i] else UNSETTLED
             for (i, rest), mark in zip(self.restless.items(), marks, strict=True)
         )
 
     def reached(self, state: Values, marks: tuple[str, ...]) -> bool:
-        """Whether a state will do."""
+        """Return whether a state with its marks reaches the target."""
         return not mismatches(state, self.values) and UNSETTLED not in marks
 
 
 def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
-    """Return what steps of a level have to lead to: what is said above it, and rest in what the level adds."""
+    """Return the target of a level: the values `said` by the level above, and rest values of the symbols that the level adds."""
     values, restless = dict(said), dict[int, str]()
     for i, symbol in enumerate(model.symbols):
         rest = model.problem.domain.situations[symbol.situation].rest
@@ -183,10 +183,10 @@ def target(model: Model, above: int, level: int, before: Values, said: Goal) -> 
     return Target(values, restless)
 
 
-def solve(call: Call, level: int, start: Values, wanted: Target) -> tuple[list[Step], Values] | None:
-    """Return refined steps of one level with the state that they lead to, or None if there are none.
+def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[list[Step], Values] | None:
+    """Return refined steps of one level and the state after them, or None if there are none.
 
-    Each pass either succeeds or finds out what one behaviour comes to in one state, of which there are finitely many.
+    Each pass either succeeds or stores the result of one more behaviour in one more state, of which there are finitely many.
     """
     while True:
         found = search(call, level, start, wanted)
@@ -209,8 +209,8 @@ def solve(call: Call, level: int, start: Values, wanted: Target) -> tuple[list[S
             return None
 
 
-def refine(call: Call, level: int, state: Values, ground: GroundBehavior) -> Refined:
-    """Return a behaviour as a step with its refinement below it, and where that leads; None if it can't be done in this state."""
+def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -> Refined:
+    """Return a behaviour as a step with its refinement, and the state after that; None if it is impossible in this state."""
     if (state, ground) in call.known:
         return call.known[state, ground]
     applied = call.model.apply(ground, state)
@@ -231,10 +231,10 @@ def refine(call: Call, level: int, state: Values, ground: GroundBehavior) -> Ref
     return call.known[state, ground]
 
 
-def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
-    """Search one level with eq. (5), over the behaviours that can be refined as far as that is known.
+def search(call: PaperCall, level: int, start: Values, wanted: Target) -> Found:
+    """Search one level with eq. (5), without the behaviours known to have no refinement.
 
-    The states searched are those of the model with the marks of the target behind.
+    The searched states are those of the model, followed by the marks of the target.
     """
     grounds, size = call.grounds[level], len(start)
     rank = ranker(call, level)
@@ -269,15 +269,15 @@ def search(call: Call, level: int, start: Values, wanted: Target) -> Found:
 
 
 def timely(grounds: Iterable[GroundBehavior], deadline: float | None) -> Iterator[GroundBehavior]:
-    """Yield quantified behaviours until a deadline: of a thousand things there are so many that one state takes minutes."""
+    """Yield quantified behaviours; raise `OutOfTimeError` at the deadline, since one state of a large problem can take minutes."""
     for one in grounds:
         if deadline is not None and perf_counter() > deadline:
             raise OutOfTimeError("the time limit")
         yield one
 
 
-def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], float]]:
-    """Return a function of a state to the ranking scores c_m (eq. 4) of what can be done there."""
+def ranker(call: PaperCall, level: int) -> Callable[[Values], Callable[[Applied], float]]:
+    """Return a function from a state to the ranking scores c_m (eq. 4) of the behaviours applicable there."""
     conclusions = [(g.behavior, g.arguments) for g in call.grounds[level]]
     learned = any(conclusion in call.links.tables for conclusion in conclusions)
 
@@ -291,7 +291,7 @@ def ranker(call: Call, level: int) -> Callable[[Values], Callable[[Applied], flo
     return of_state
 
 
-def _outcome(call: Call, steps: list[Step] | None, seconds: float) -> Outcome:
+def _outcome(call: PaperCall, steps: list[Step] | None, seconds: float) -> Outcome:
     limits, levels = call.limits, tuple(call.grounds)
     status, plan, reason = Status.SOLVED, None, None
     if steps is not None:
@@ -302,7 +302,7 @@ def _outcome(call: Call, steps: list[Step] | None, seconds: float) -> Outcome:
         reason = Reason(f"stopped at the limit of {limits.expansions} expansions in one search{seconds_too}")
     else:
         rests = any(kind.rest is not None for kind in call.model.problem.domain.situations.values())
-        what = "no state in which the goal holds" + (" and what was touched is at rest" if rests else "")
+        what = "no state in which the goal holds" + (" and all changed symbols are at rest" if rests else "")
         status = Status.UNSOLVABLE
         reason = Reason(f"{what} can be reached; all states of level {levels[-1]} were tried")
     given_up = tuple(call.given_up)

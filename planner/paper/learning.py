@@ -1,4 +1,4 @@
-"""Learning from a plan that was carried out: eq. (2) on every behaviour of every level, in the situation where it was chosen."""
+"""Learning from an executed plan: eq. (2) for every behaviour of every level, in the situation in which it was chosen."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from reasoner.symbols import GroundBehavior, Problem, State
 
 
 class LearningError(ValueError):
-    """The plan can't be done from the scene's situation, so nothing can be learned from it."""
+    """The plan isn't applicable in the scene's situation, so nothing can be learned from it."""
 
 
 def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:
-    """Return the links after one successful execution of a plan; `links` itself stays as it is.
+    """Return the links after one successful execution of a plan; `links` itself is unchanged.
 
     Parameters
     ----------
     problem : Problem
-        Its initial state is where the plan begins.
+        Its initial state is the state before the plan.
     plan : Plan
         Any depth: a demonstration of the abstract level alone teaches that level.
     links : Links
@@ -31,7 +31,7 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
     Raises
     ------
     LearningError
-        A step's preconditions don't hold where it is done.
+        A step's preconditions don't hold in the state before it.
     """
     learned = Links({c: {s: dict(t) for s, t in symbols.items()} for c, symbols in links.tables.items()})
     model = Model(problem)
@@ -63,7 +63,7 @@ def reinforce(
     conclusion : Conclusion
         The behaviour that was planned and executed successfully.
     state : State
-        The situation in which it was chosen; the paper doesn't say which state is meant.
+        The situation in which it was chosen; the paper does not specify which state that is.
     problem : Problem
         Gives the values that each symbol can have.
     level : int

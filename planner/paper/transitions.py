@@ -1,4 +1,4 @@
-"""What each quantified behaviour makes of a state: a tuple of values, one per symbol, in the order of `Model.symbols`."""
+"""Transitions by quantified behaviours between states, which are tuples of values in the order of `Model.symbols`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Model:
     Parameters
     ----------
     problem : Problem
-        Its `initial` gives the symbols; boolean symbols are completed. What is defined has a place behind them where it is a goal.
+        Its `initial` gives the symbols; boolean symbols are completed. Defined symbols follow them if they are goals.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -53,7 +53,7 @@ class Model:
         self.forward, self.prices = bind(self.table.now, self.table.who)
 
     def values(self, state: State) -> Values:
-        """Return a state as the tuple that search works on."""
+        """Return a state as a tuple of values."""
         return self.completed(tuple(state.get(symbol, FALSE) for symbol in self.symbols[: len(self.cells)]))
 
     def state(self, values: Values) -> dict[Symbol, str]:
@@ -61,14 +61,14 @@ class Model:
         return dict(zip(self.symbols[: len(self.cells)], values, strict=False))
 
     def completed(self, stated: Values) -> Values:
-        """Return the values of what is stated with those of what is defined behind them."""
+        """Return the values of the stated symbols, followed by those of the defined goals."""
         if not self.defined:
             return stated
         self._move(stated)
         return (*stated, *(self.table.now[s.situation].get(key_of(s.arguments), FALSE) for s in self.defined))
 
     def _move(self, values: Values) -> None:
-        """Have the table say what some values say."""
+        """Set the table to the state `values`."""
         for cell, old, new in zip(self.cells, self.here, values, strict=False) if values is not self.here else ():
             if old != new:
                 self.table.put(*cell, new)
@@ -76,7 +76,7 @@ class Model:
         self.table.trail.clear()
 
     def apply(self, ground: GroundBehavior, values: Values) -> Applied | None:
-        """Return what a ground behaviour does in a state, or None if it isn't applicable there."""
+        """Return the application of a ground behaviour in a state, or None if it isn't applicable there."""
         self._move(values)
         done = self.forward[ground.behavior](*ground.arguments)
         if done is None:
@@ -89,7 +89,7 @@ class Model:
         return Applied(ground, bindings, self.completed(tuple(after)))
 
     def cost(self, values: Values, applied: Applied) -> float:
-        """Return what a behaviour costs where it is done."""
+        """Return the cost of an applied behaviour in the state before it."""
         name = applied.ground.behavior
         if name not in self.prices:
             return self.problem.domain.behaviors[name].cost
@@ -98,7 +98,7 @@ class Model:
         return float(self.prices[name](*applied.ground.arguments, *variables))
 
     def successors(self, grounds: Iterable[GroundBehavior], values: Values) -> Iterator[Applied]:
-        """Yield what each applicable one of the ground behaviours does, in their order."""
+        """Yield the application of each ground behaviour that is applicable and changes the state, in their order."""
         for ground in grounds:
             applied = self.apply(ground, values)
             if applied is not None and applied.after != values:
@@ -118,7 +118,7 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
     """Return all quantified behaviours of a level in the order of their IDs.
 
-    The same set as the SPARQL queries of `reasoner.reading.quantification` yield, from the classes read once (tested equal).
+    They equal the results of the SPARQL queries of `reasoner.reading.quantification`, but are computed from the problem's classes.
     """
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []

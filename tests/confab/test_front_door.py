@@ -65,7 +65,7 @@ def test_a_memory_may_be_the_name_of_its_file(tmp_path: Path, scene: confab.Scen
 
 
 def test_no_rollouts_are_refused_in_words(scene: confab.Scene, result: confab.Result) -> None:
-    with pytest.raises(confab.KnowledgeError, match="0 rollouts judge nothing; wanted 1 or more"):
+    with pytest.raises(confab.KnowledgeError, match="0 rollouts can't verify a plan; wanted 1 or more"):
         scene.verify(result, rollouts=0)
 
 

@@ -78,7 +78,9 @@ def test_what_nothing_perceives_is_said_to_be_on_trust(scene: confab.Scene, repo
     assert report.trusted == ()
     symbol = Symbol("GREETED", ("cup1",))
     assert on_trust(scene, [{**scene.problem.initial, symbol: "warmly"}]) == ("GREETED",)
-    assert replace(report, trusted=("GREETED",)).summary().endswith("; on trust, since nothing perceives it: GREETED")
+    assert (
+        replace(report, trusted=("GREETED",)).summary().endswith("; not verified, since no perceiver reads it: GREETED")
+    )
 
 
 def test_nothing_is_cut_off_in_a_pipe_and_lines_wrap_in_a_terminal(

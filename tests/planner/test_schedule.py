@@ -119,5 +119,5 @@ def test_steps_take_the_seconds_that_are_said_and_the_longest_chain_goes_first()
 def test_the_order_names_its_steps_and_refuses_what_cannot_be_done() -> None:
     primitives = planned().primitives
     assert {i: data["label"] for i, data in needed().nodes(data=True)} == dict(enumerate(map(str, primitives)))
-    with pytest.raises(ValueError, match="isn't applicable where it is done"):
+    with pytest.raises(ValueError, match="isn't applicable in the state before it"):
         partial_order(serving(), primitives[1:])
