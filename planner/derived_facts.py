@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from planner.generated import identifier, written
 from planner.transitions import Cell, Key, Table, Writer, arguments_of
 from reasoner.derivation import strata
+from reasoner.limits import check
 from reasoner.symbols import FALSE, TRUE
 
 
@@ -119,6 +120,7 @@ class Stratum:
             order += list(asked)[len(order) :]
 
     def _try(self, cell: Cell) -> bool:
+        check("working out what follows from rules")
         found = self.tests[cell[0]](*arguments_of(cell[1]))
         if found:
             self.known[cell] = True

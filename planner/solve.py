@@ -24,7 +24,7 @@ from planner.levels import levels_left
 from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status
 from planner.plan_costs import cost_of
 from planner.validation import validate
-from reasoner.limits import OutOfTimeError
+from reasoner.limits import OutOfTimeError, within
 from reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
@@ -84,9 +84,12 @@ def solve(request: Request) -> Outcome:
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
     try:
-        outcome = MODES[request.mode](request)
+        with within(request.limits.seconds):
+            outcome = MODES[request.mode](request)
     except MemoryError:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
+    except OutOfTimeError as error:
+        return Outcome(Status.GAVE_UP, reason=Reason(str(error)))
     if outcome.plan is None:
         return outcome
     faults = validate(request.problem, outcome.plan)

@@ -44,9 +44,12 @@ class Deadline:
         """Seconds until then, not less than 0; None without a deadline."""
         return None if math.isinf(self.at) else max(0.0, self.at - perf_counter())
 
-    def check(self, doing: str) -> None:
-        """Raise `OutOfTimeError` if the deadline has passed; `doing` says during which work."""
-        if perf_counter() > self.at:
+    def check(self, doing: str, ahead: float = 0.0) -> None:
+        """Raise `OutOfTimeError` if the deadline has passed, or will have passed after a step that takes `ahead` seconds.
+
+        `doing` says during which work.
+        """
+        if perf_counter() + ahead > self.at:
             raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time (--time-limit)")
 
 
@@ -79,6 +82,6 @@ def current() -> Deadline:
     return _current.get()
 
 
-def check(doing: str) -> None:
-    """Raise `OutOfTimeError` if the deadline that holds here has passed."""
-    _current.get().check(doing)
+def check(doing: str, ahead: float = 0.0) -> None:
+    """Raise `OutOfTimeError` if the deadline that holds here has passed, or will have passed in `ahead` seconds."""
+    _current.get().check(doing, ahead)

@@ -165,7 +165,10 @@ def plan_level(
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY, seconds=perf_counter() - began)
     if isinstance(task, Reason):
         return Outcome(Status.UNSOLVABLE, reason=task, search={level: Counts()}, seconds=perf_counter() - began)
-    found = search(task, limits, deadline, most_work=most_work)
+    try:
+        found = search(task, limits, deadline, most_work=most_work)
+    except OutOfTimeError:
+        found = Flat(Status.GAVE_UP, (), Reason("the time limit came first"))
     plan = Plan(task.steps(found.plan)) if found.status is Status.SOLVED else None
     return Outcome(found.status, plan, found.reason, {level: found.counts}, seconds=perf_counter() - began)
 
@@ -245,6 +248,8 @@ def search(
             done = next(search_)
             total += done
             spent[turn] += done / share
+        except OutOfTimeError:
+            return Flat(Status.GAVE_UP, (), Reason("the time limit came first"), counts, total)
         except MemoryError:
             del searches[turn], spent[turn], kinds[turn]
             if not searches:

@@ -13,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.plan import TooLargeError
+from reasoner.limits import check
 
 Ints = NDArray[np.int64]
+PAIR = 1e-7
+"""Seconds that a row of a join takes at least. A join can't be interrupted, so one that would outlast the deadline isn't begun."""
 
 
 class Table:
@@ -57,9 +60,11 @@ class Table:
         TooLargeError
             There are more than `most` pairs.
         """
+        check("grounding", PAIR * len(self))
         if not columns:
             if len(values) * len(self) > most:
                 raise TooLargeError(f"{len(values) * len(self)} combinations, more than the {most} allowed")
+            check("grounding", PAIR * len(values) * len(self))
             left = np.repeat(np.arange(len(values)), len(self))
             return left, np.tile(np.arange(len(self)), len(values))
         keys, order = self._index(tuple(columns))
@@ -69,6 +74,7 @@ class Table:
         total = int(counts.sum())
         if total > most:
             raise TooLargeError(f"{total} combinations, more than the {most} allowed")
+        check("grounding", PAIR * total)
         left = np.repeat(np.arange(len(values)), counts)
         ends = np.cumsum(counts)
         places = np.arange(total) - np.repeat(ends - counts, counts) + np.repeat(low, counts)

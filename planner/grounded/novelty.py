@@ -21,6 +21,7 @@ from collections.abc import Callable, Generator
 from planner.grounded.hff import Evaluate
 from planner.grounded.task import Task
 from planner.plan import Counts
+from reasoner.limits import check
 
 MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
 """What the states kept by one search may take, about, and what one of them takes besides its bits."""
@@ -62,6 +63,7 @@ def by_novelty(
     queue: list[tuple[bool, int, int, int, int, int, int]] = [(False, first, 0, task.initial, -1, 0, marks)]
     work = 0
     while queue:
+        check("searching")
         _, open_, _, state, wanted, met, unmet = heapq.heappop(queue)
         if work >= relaxing:
             yield work

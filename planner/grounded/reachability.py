@@ -19,7 +19,7 @@ from planner.grounded.joins import Ints, Table, pack
 from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
 from planner.grounded.separation import in_parts
 from reasoner.language import mentions
-from reasoner.limits import OutOfTimeError
+from reasoner.limits import OutOfTimeError, check
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -192,10 +192,10 @@ class Reached:
         self, schema: Schema, start: int | None = None, ranges: Mapping[int, tuple[int, int]] | None = None
     ) -> Iterator[Ints]:
         """Yield the rows of a schema's terms, at most once, that match every atom inside its range of rows."""
-        self.check_time()
         columns: dict[str, Ints] = {}
         count, waiting, filters = 1, list(range(len(schema.atoms))), list(schema.filters)
         while waiting:
+            self.check_time()
             i = start if start in waiting else self._narrowest(schema, waiting, columns)
             assert i is not None
             waiting.remove(i)
@@ -211,6 +211,7 @@ class Reached:
                 *(self._variables(f, schema) for f in filters)
             )
             columns, count = self._projected(columns, count, wanted)
+        self.check_time()
         for condition in filters:  # without atoms, or with local variables only
             keep = self._decide(condition, columns, count, schema.kinds)
             columns, count = {name: column[keep] for name, column in columns.items()}, int(keep.sum())
@@ -231,6 +232,7 @@ class Reached:
         """Raise `OutOfTimeError` when the deadline has passed."""
         if self.deadline is not None and perf_counter() > self.deadline:
             raise OutOfTimeError("the time limit")
+        check("grounding")
 
     def _narrowest(self, schema: Schema, waiting: Sequence[int], columns: Mapping[str, Ints]) -> int:
         """Return the first of the atoms that match the fewest rows; one without a new variable is as good as any."""

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.grounded.joins import Ints
+from reasoner.limits import check
 
 Waiting = tuple[int, list[int], int]
 """An operator, the bits that it needs in the order in which they are asked for, and how many were."""
@@ -42,6 +43,7 @@ class Tree:
             while node is not None:
                 visited += 1
                 if node.waiting:
+                    check("searching")
                     node._branch()
                 if node.operators:
                     found += node.operators

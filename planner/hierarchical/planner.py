@@ -38,7 +38,7 @@ from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from planner.transitions import arguments_of
 from reasoner.amounts import meets
-from reasoner.limits import LimitError
+from reasoner.limits import LimitError, within
 from reasoner.symbols import FALSE, Problem, Symbol
 
 __all__ = ["Call", "Compiled", "compiled", "plan"]
@@ -91,7 +91,7 @@ def plan(
     -------
     Outcome
     """
-    with paused_collection():
+    with within(limits.seconds), paused_collection():
         return _plan(problem, limits, improve, using, leave_levels, advised)
 
 

@@ -250,6 +250,7 @@ class Call:
         known: dict[tuple[str, str, int], bool] = {}
         for cells in by_individual.values():
             for cell in cells:
+                self.segments.check_time()
                 for other in cells:
                     if cell is not other:
                         pattern = cell[0], other[0], self.program.alike.sort.get(arguments_of(cell[1])[0], -1)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 from planner.hierarchical.serialization import Call
 from planner.hierarchical.subplans import Asked
-from planner.plan import Reason
+from planner.plan import Limits, Reason
 from planner.transitions import Cell, arguments_of
 from reasoner.amounts import bounds_written
+from reasoner.limits import LimitError
 from reasoner.symbols import Fact, Symbol
 
-QUESTIONS, AMOUNTS = 160, 3
-"""Values that are followed from the goal to what is in its way, and amounts that are told."""
+QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
+"""Values, and ways to achieve them, that are followed from the goal to what is in its way; and amounts that are told."""
 
 
 def gave_up(call: Call, why: str) -> Reason:
@@ -36,13 +38,19 @@ def gave_up(call: Call, why: str) -> Reason:
 def lacking(call: Call) -> Iterator[str]:
     """Yield the amounts that behaviours towards the first goal that was aimed at ask for, where the steps so far end."""
     segments, situations = call.segments, call.problem.domain.situations
-    segments.deadline = None  # it may have passed
+    if all(situation.quantity is None for situation in situations.values()):
+        return
+    segments.deadline, segments.most_looked = (
+        Limits().end(),
+        segments.looked + LOOKED,
+    )  # the search's own limits may be reached
     call.redo(call.steps)
     told: dict[Cell, str] = {}
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:
         asked: Asked = set()
-        for _ in segments.chains(level, cell, value, QUESTIONS, asked=asked):
-            pass
+        with suppress(LimitError):
+            for _ in segments.chains(level, cell, value, QUESTIONS, asked=asked):
+                pass
         told.update(
             {
                 (name, key): wanted

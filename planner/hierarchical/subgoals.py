@@ -22,6 +22,7 @@ from reasoner.amounts import Amount, Calculation, Number, inside, number
 from reasoner.amounts import written as amount_written
 from reasoner.derivation import circular
 from reasoner.language import mentions, needs, walk
+from reasoner.limits import check
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -151,6 +152,7 @@ class Wants:
         lacking: list[tuple[str, list[Condition]]] = []
         changing = [c for c in witness.conditions if not self._about(c)[0]]
         for individual in self.one_of_each(witness.kind, env.values()):
+            check("planning")
             inner = {**env, witness.variable: individual}
             if all(self.holds(achiever, c, inner) for c in witness.conditions if c not in changing):
                 lacking.append((individual, [c for c in changing if not self.holds(achiever, c, inner)]))
@@ -167,8 +169,10 @@ class Wants:
         found = self._fresh.get(asked)
         if found is None:
             outside, self._entered, self._depth = (self._entered, self._depth), {}, 0
-            found = self._fresh[asked] = list(dict.fromkeys(self._defining(situation, key, wanted, level)))
-            self._entered, self._depth = outside
+            try:
+                found = self._fresh[asked] = list(dict.fromkeys(self._defining(situation, key, wanted, level)))
+            finally:
+                self._entered, self._depth = outside
         return found
 
     def _defining(self, situation: str, key: Key, wanted: bool, level: int) -> Iterator[Want]:

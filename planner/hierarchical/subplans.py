@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 from planner.hierarchical.operators import Achiever, Program
 from planner.hierarchical.subgoals import Env, Want, Wants
-from planner.plan import Counts
+from planner.plan import Counts, Limits
 from planner.transitions import Cell, Change, Key, Table, arguments_of
 from reasoner.amounts import meets
 from reasoner.limits import LimitError
@@ -65,7 +65,7 @@ class Segments:
     goal : mapping of cell to value
         The task's goal, which proposes values.
     deadline : float, optional
-        `perf_counter` at which `LimitError` is raised.
+        When `LimitError` is raised, on the clock of `perf_counter`; the deadline that holds (`reasoner.limits`) if left out.
     doubt : function, optional
         Called whenever the work of small worlds has doubled: it may be in vain.
     most : int
@@ -84,7 +84,11 @@ class Segments:
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.expanded = self.worked = self.doubted = 0
+        self.expanded = self.worked = self.doubted = self.looked = 0
+        self.most_looked = EXPANSION * self.most
+        """The most ways to achieve a value that chains look at before `LimitError` is raised, those not applicable included."""
+        if self.deadline is None:
+            self.deadline = Limits().end()
         self.enough = math.inf
         """The work of all attempts to find a first plan."""
         self.in_vain = 0
@@ -299,22 +303,22 @@ class Segments:
             length += 1
             yield length, None
             if blocked:  # worked out only now: who wants no longer chains has gone
-                wants = [
-                    want
-                    for achiever, unmet, env in blocked
-                    for number in unmet
-                    for want in self.wants.towards(achiever, number, env, level)
-                ]
+                found: list[Want] = []
+                for achiever, unmet, env in blocked:
+                    self.check_time()
+                    for number in unmet:
+                        found += self.wants.towards(achiever, number, env, level)
+                wants = found
             blocked = []
             for situation, key, values in wants:
                 for wanted in values:
                     if (question := (situation, key, wanted)) in asked:
                         continue
                     asked.add(question)
-                    self.check_time()
                     for achiever in self.program.achievers.get((level, situation), ()):
                         achieve = self.achieve[achiever.behavior, achiever.effect]
                         for arguments, unmet, env in achieve(*arguments_of(key), wanted):
+                            self.look()
                             if met is not None:
                                 met.update(dict.fromkeys((*arguments_of(key), wanted, *arguments)))
                                 met.update((found, None) for found in env.values() if found) if env else None
@@ -331,10 +335,18 @@ class Segments:
             return [want[:2] for want in self.wants.defining(*cell, value == TRUE, level)]
         for achiever in self.program.achievers.get((level, cell[0]), ()):
             for _, unmet, env in self.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
+                self.look()
                 for number in unmet:
                     for situation, key, _ in self.wants.towards(achiever, number, env, level):
                         found[situation, key] = None
         return list(found)
+
+    def look(self) -> None:
+        """Count a way to achieve a value that is looked at, and look at the clock."""
+        self.looked += 1
+        if self.looked > self.most_looked:
+            raise LimitError(f"{self.most_looked:,} ways to achieve values")
+        self.check_time()
 
     def check_time(self) -> None:
         """Raise `LimitError` when the time limit has passed."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, TypeAlias
@@ -18,6 +19,7 @@ from planner.hierarchical.subplans import Segments
 from planner.hierarchical.subproblem import LEAST
 from planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
 from planner.transitions import Cell, Table, arguments_of, key_of
+from reasoner.limits import LimitError
 from reasoner.symbols import (
     FALSE,
     Behavior,
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """The work of looking at all states, in states times relaxed operators, that no search has to come before."""
+AT_ONCE = 300_000
+"""The most ways to achieve values that are looked at to show at once that there is no plan: about a second."""
 TOLD, NAMED = 5_000, 3
 """Of so many states, at most, it is said what can be done in none of them; and so many facts are named."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
@@ -47,11 +51,14 @@ Asked: TypeAlias = "dict[tuple[Cell, str], bool]"
 
 
 def impossible(problem: Problem, program: Program | None = None) -> Reason | None:
-    """Return why a problem has no plan, if that can be shown at once; what was compiled for it before serves again."""
+    """Return why a problem has no plan, or None if that can't be shown with little work; `program` saves compiling."""
     goal = {(s.situation, key_of(s.arguments)): value for s, value in problem.goal.items()}
     table = Table(problem.domain.situations, problem.initial)
     start = Segments(program or Program(problem), table, goal)
-    return refuted(start)
+    start.most_looked = AT_ONCE
+    with suppress(LimitError):
+        return refuted(start)
+    return None
 
 
 def refuted(segments: Segments) -> Reason | None:
@@ -76,6 +83,24 @@ def unattainable(segments: Segments) -> Reason | None:
 
 
 def _attainable(segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked) -> bool:
+    """Return whether a value counts as attainable; chains of needs may be longer than the interpreter's stack is deep."""
+    waiting, answer = [_needs(segments, achieve, level, cell, value, asked)], None
+    while waiting:
+        try:
+            needed = waiting[-1].send(answer)
+        except StopIteration as end:
+            waiting.pop()
+            answer = end.value
+        else:
+            waiting.append(_needs(segments, achieve, level, *needed, asked))
+            answer = None
+    return answer is True
+
+
+def _needs(
+    segments: Segments, achieve: Achievers, level: int, cell: Cell, value: str, asked: Asked
+) -> Generator[tuple[Cell, str], bool | None, bool]:
+    """Yield what a value needs, one fact after the other, and take whether it is attainable; return whether the value is."""
     if cell[0] in segments.program.rules or segments.table.now[cell[0]].get(cell[1], FALSE) == value:
         return True
     if segments.program.domain.situations[cell[0]].quantity is not None:
@@ -86,11 +111,12 @@ def _attainable(segments: Segments, achieve: Achievers, level: int, cell: Cell, 
     asked[cell, value] = True
     for achiever in segments.program.achievers.get((level, cell[0]), ()):
         for _, unmet, env in achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
-            if all(
-                _attainable(segments, achieve, level, *needed, asked)
-                for number in unmet
-                if (needed := _needed(segments, achiever, number, env)) is not None
-            ):
+            segments.look()
+            for number in unmet:
+                needed = _needed(segments, achiever, number, env)
+                if needed is not None and not (yield needed):
+                    break
+            else:
                 return True
     asked[cell, value] = False
     return False

@@ -1,15 +1,21 @@
 """Every search and every episode ends: with the right answer where there is one, and within its time."""
 
+from itertools import pairwise
 from pathlib import Path
-from time import process_time
+from time import perf_counter, process_time
 
+import numpy as np
 import pytest
 
 import confab
 from planner.acting import executive
 from planner.acting.symbolic_world import SymbolicWorld
-from planner.plan import Outcome, Plan, Status
-from reasoner.limits import within
+from planner.grounded.joins import Table
+from planner.hierarchical.unsolvability import impossible
+from planner.plan import Limits, Outcome, Plan, Status
+from reasoner.limits import OutOfTimeError, check, current, within
+from reasoner.symbols import TRUE, RelationCondition, SituationType
+from worlds.writing import becomes, behavior, has, world
 
 CASES = Path(__file__).parent / "cases"
 
@@ -45,3 +51,39 @@ def test_an_episode_ends_within_its_time() -> None:
         episode = executive.act(problem, SymbolicWorld(problem))
     assert episode.status.value == "gave-up"
     assert process_time() - begin < 1.0
+
+
+def test_blocks_of_limits_nest_and_the_earliest_deadline_counts() -> None:
+    with within(60.0) as outer:
+        with within(90.0) as inner:
+            assert inner is outer
+        with within(0.0), pytest.raises(OutOfTimeError, match="gave up after 0 s while resting"):
+            check("resting")
+        check("resting")
+    assert current().left is None
+    assert Limits().end() is None
+    with within(10.0):
+        assert 0.0 < (Limits(seconds=20.0).end(0.5) or 0.0) - perf_counter() <= 5.0
+
+
+def test_a_join_that_would_outlast_the_deadline_is_not_begun() -> None:
+    table = Table(1, 4000)
+    table.add(np.arange(4000).reshape(-1, 1))
+    begin = process_time()
+    with within(0.2), pytest.raises(OutOfTimeError):
+        table.match((), table.rows, 20_000_000)
+    assert process_time() - begin < 0.2
+
+
+def test_a_chain_of_needs_may_be_longer_than_the_stack_is_deep() -> None:
+    """Each lamp needs the one before; the first needs a switch, which there isn't."""
+    lamps = [f"lamp{i}" for i in range(1500)]
+    light = behavior(
+        "LIGHT", 1, "?a:Lamp ?b:Lamp",
+        [RelationCondition("after", ("?a", "?b")), has("LIT", "?a", TRUE)], [becomes("LIT", "?b", TRUE)],
+    )  # fmt: skip
+    problem = world(
+        [SituationType("LIT", ("Lamp",), "Truth", boolean=True)], [light], {"Lamp": tuple(lamps)}, {},
+        {f"LIT {lamps[-1]}": TRUE}, {"after": pairwise(lamps)},
+    )  # fmt: skip
+    assert impossible(problem) is not None

@@ -68,7 +68,7 @@ def test_a_file_is_read_no_further_when_the_deadline_has_come(tmp_path: Path) ->
     checked: list[str] = []
 
     class Soon(Deadline):
-        def check(self, doing: str) -> None:
+        def check(self, doing: str, ahead: float = 0.0) -> None:
             checked.append(doing)
             if len(checked) > 20:
                 raise LimitError("over")
