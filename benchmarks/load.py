@@ -1,126 +1,165 @@
-"""A thousand connections at once to `confab serve`, whole and malformed: each is answered, refused or dropped, and it lives on.
+"""Latency of honest requests to `confab serve`, alone and beside slow, abandoned and malformed ones.
 
-    python -m benchmarks.load        1,000 at once, as docs/promises.md quotes them
-    python -m benchmarks.load 200    so many
+    python -m benchmarks.load        1,000 honest ones beside 300, 500 and 200, within a minute, as docs/promises.md quotes them
+    python -m benchmarks.load 50     a fiftieth of each
 
-All are open before the first has an answer. What is malformed has a broken line, header, length or query; what is endless stops
-within its header, and what is slow sends a byte of it a second.
+Honest clients ask a short query; slow ones send a byte of it a second; abandoned ones ask for a cross product and leave after
+up to a second; malformed ones send broken lines, headers, lengths, hosts and queries.
 """
 
 from __future__ import annotations
 
 import asyncio
 import random
+import re
+import subprocess
 import sys
 from collections import Counter
-from pathlib import Path
+from dataclasses import dataclass, field
+from statistics import median, quantiles
 from time import perf_counter
 from urllib.parse import quote
 
-import confab
-from confab.serving import serving
-from reasoner.graph.apart import QueryLimits
-
-QUERY = quote("SELECT ?x WHERE { ?x a :Behavior } ORDER BY ?x")
-WHOLE = f"GET /sparql?query={QUERY} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode()
-POST = b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/sparql-query\r\n"
-MALFORMED = (
+HONEST, SLOW, ABANDONED, MALFORMED, SECONDS = 1_000, 300, 500, 200, 60.0
+CLIENTS = 8
+"""Honest clients; each asks again as soon as it is its turn and it has its answer."""
+SHORT = quote("SELECT ?x WHERE { ?x a :Behavior } ORDER BY ?x")
+LONG = quote("SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i FILTER(?c != ?d) }")
+HOST = "Host: localhost\r\nConnection: close\r\n"
+POST = f"POST /sparql HTTP/1.1\r\n{HOST}Content-Type: application/sparql-query\r\n".encode()
+MALFORMED_REQUESTS = (
     b"\x00\xff\xfe\r\n\r\n",
     b"GET\r\n\r\n",
     b"GET /sparql HTTP/9.9\r\n\r\n",
     b"GET /" + b"x" * 100_000 + b" HTTP/1.1\r\n\r\n",
-    b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 1_000 + b"\r\n",
-    b"GET /sparql?query=%ff%00 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n",
-    b"GET /sparql?query=SELECT HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n",
-    b"GET /sparql?query=" + b"%7B" * 3_000 + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n",
+    b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
+    *(
+        f"GET {target} HTTP/1.1\r\n{HOST}\r\n".encode()
+        for target in (
+            "http://[bad/sparql",
+            "/sparql?query=%ff%00",
+            "/sparql?query=SELECT",
+            f"/sparql?query={'%7B' * 3_000}",
+            "/sparql?default-graph-uri=a%20b&query=ASK%7B%7D",
+        )
+    ),
+    f"GET / HTTP/1.1\r\n{HOST}Origin: http://[bad\r\n\r\n".encode(),
     b"GET / HTTP/1.1\r\nHost: elsewhere.org\r\nConnection: close\r\n\r\n",
     POST + b"Content-Length: -5\r\n\r\n",
+    POST + b"Content-Length: " + b"9" * 5_000 + b"\r\n\r\n",
     POST + b"Content-Length: 99999999999\r\n\r\n",
-    POST + b"Content-Length: 7\r\n\r\nASK",
     POST + b"Content-Length: 4\r\n\r\n\xff\xfe\xfd\xfc",
     POST + b"Transfer-Encoding: chunked\r\n\r\nzz\r\n",
-    b"DELETE /sparql HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    f"DELETE /sparql HTTP/1.1\r\n{HOST}\r\n".encode(),
 )
-KINDS = ("whole", "malformed", "endless", "slow")
-PATIENCE = 300.0
 
 
-class Gate:
-    """Opens when so many have come to it."""
+@dataclass
+class Load:
+    """What was sent to a port: the time of each honest answer, and how all requests were answered."""
 
-    def __init__(self, many: int) -> None:
-        self.missing, self.open = many, asyncio.Event()
+    port: int
+    seconds: list[float] = field(default_factory=list)
+    answers: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    async def wait(self) -> None:
-        """Come to it, and wait until it opens."""
-        self.missing -= 1
-        if not self.missing:
-            self.open.set()
-        await self.open.wait()
+    async def request(self, kind: str, content: bytes, leave: float | None = None, pause: float = 0.0) -> None:
+        """Send a request, byte by byte where there is a pause, and note its answer; leave after so many seconds."""
+        begin = perf_counter()
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
+        try:
+            for piece in [content[i : i + 1] for i in range(len(content))] if pause else [content]:
+                writer.write(piece)
+                await writer.drain()
+                await asyncio.sleep(pause)
+            said = await asyncio.wait_for(reader.read(), leave)
+            match = re.match(rb"HTTP/1\.1 (\d+)", said)
+            self.answers[kind, match[1].decode() if match else "dropped"] += 1
+        except asyncio.TimeoutError:
+            self.answers[kind, "left"] += 1
+        except ConnectionError:
+            self.answers[kind, "dropped"] += 1
+        except asyncio.CancelledError:
+            self.answers[kind, "unfinished"] += 1
+        finally:
+            writer.close()
+        if kind == "honest":
+            self.seconds.append(perf_counter() - begin)
+
+    async def honest(self, times: int, pause: float) -> None:
+        """Ask one short query after the other."""
+        for _ in range(times):
+            await self.request("honest", get(SHORT))
+            await asyncio.sleep(pause)
+
+    async def later(self, after: float, kind: str, content: bytes, leave: float | None, pause: float) -> None:
+        """Send a request after some seconds."""
+        await asyncio.sleep(after)
+        await self.request(kind, content, leave, pause)
+
+    async def run(self, part: float, beside: bool) -> Load:
+        """Send a part of the honest requests, beside the others or alone."""
+        draw, seconds = random.Random(0), SECONDS * part
+        others = [(SLOW, "slow"), (ABANDONED, "abandoned"), (MALFORMED, "malformed")] if beside else []
+        tasks = [
+            asyncio.create_task(
+                self.later(
+                    draw.uniform(0.0, seconds),
+                    kind,
+                    {"slow": get(SHORT), "abandoned": get(LONG)}.get(kind) or draw.choice(MALFORMED_REQUESTS),
+                    draw.uniform(0.05, 1.0) if kind == "abandoned" else 30.0,
+                    1.0 if kind == "slow" else 0.0,
+                )
+            )
+            for many, kind in others
+            for _ in range(round(many * part))
+        ]
+        times = round(HONEST * part / CLIENTS)
+        await asyncio.gather(*(self.honest(times, seconds / times) for _ in range(CLIENTS)))
+        for task in tasks:
+            if not task.done():
+                task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        return self
 
 
-async def asked(port: int, request: bytes, all_open: Gate, kind: str) -> tuple[str, bytes]:
-    """Open a connection, wait for all others, send a request; return how it was answered, and with what."""
-    try:
-        reader, writer = await asyncio.wait_for(asyncio.open_connection("127.0.0.1", port), PATIENCE)
-    except OSError as error:
-        await all_open.wait()
-        return type(error).__name__, b""
-    try:
-        await all_open.wait()
-        for piece in (request,) if kind != "slow" else (request[i : i + 1] for i in range(len(request))):
-            writer.write(piece)
-            await writer.drain()
-            if kind == "slow":
-                await asyncio.sleep(1.0)
-        if kind == "malformed":
-            writer.write_eof()
-        answer = await asyncio.wait_for(reader.read(), PATIENCE)
-    except (ConnectionError, OSError):
-        return "dropped", b""
-    except asyncio.TimeoutError:
-        return "no end", b""
-    finally:
-        writer.close()
-    head, _, body = answer.partition(b"\r\n\r\n")
-    return (head.split()[1].decode("ascii", "replace") if head.startswith(b"HTTP/1") else "dropped"), body
+def get(query: str) -> bytes:
+    """Return a whole request."""
+    return f"GET /sparql?query={query} HTTP/1.1\r\n{HOST}\r\n".encode()
 
 
-async def crowd(port: int, many: int) -> list[tuple[str, str, bytes]]:
-    """Send so many requests at once, half of them whole; return of each what it was and how it was answered."""
-    draw, all_open = random.Random(0), Gate(many)
-    kinds = [draw.choice(KINDS) if draw.random() < 0.5 else "whole" for _ in range(many)]
-    requests = [
-        draw.choice(MALFORMED) if kind == "malformed" else WHOLE[:-9] if kind == "endless" else WHOLE for kind in kinds
-    ]
-    answers = await asyncio.gather(
-        *(asked(port, request, all_open, kind) for kind, request in zip(kinds, requests, strict=True))
-    )
-    return [(kind, *answer) for kind, answer in zip(kinds, answers, strict=True)]
+def measured(part: float) -> tuple[Load, Load, str]:
+    """Return the honest requests alone, then those beside the others, and what the server wrote to its log."""
+    start = "from confab.start import main; main()"
+    command = [sys.executable, "-c", start, "serve", "beverage-serving", "--port", "0", "--time-limit", "20"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        found = re.search(r":(\d+)/", server.stdout.readline())
+        assert found is not None, server.communicate()[1]
+        port = int(found[1])
+        try:
+            asyncio.run(Load(port).honest(CLIENTS, 0.0))
+            quiet = asyncio.run(Load(port).run(part, beside=False))
+            loaded = asyncio.run(Load(port).run(part, beside=True))
+        finally:
+            server.terminate()
+        return quiet, loaded, server.communicate()[1]
 
 
 def main() -> int:
-    """Print how many were answered in which way; return 1 if a whole one wasn't, or the server doesn't live on."""
-    many = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000
-    with serving(confab.load("beverage-serving"), 0, QueryLimits(seconds=5, rows=5000)) as server:
-        threads, begin = len(list(Path("/proc/self/task").iterdir())), perf_counter()
-        found = asyncio.run(crowd(server.server_port, many))
-        seconds = perf_counter() - begin
-        after = asyncio.run(crowd(server.server_port, 1))[0]
-        left = len(list(Path("/proc/self/task").iterdir())) - threads
-    print("| requests | at once | answered with |\n|---|---|---|")
-    for kind in KINDS:
-        said = Counter(status for which, status, _ in found if which == kind)
-        print(
-            f"| {kind} | {said.total()} | {', '.join(f'{times} × {status}' for status, times in sorted(said.items()))} |"
-        )
-    bodies = {body for kind, status, body in found if kind == "whole" and status == "200"}
-    wrong = [status for kind, status, _ in found if kind == "whole" and status != "200"]
-    print(
-        f"\n{seconds:.0f} s; {len(bodies)} different answer to the one query; afterwards {after[1]}, {left} threads more",
-        file=sys.stderr,
-    )
-    return int(bool(wrong) or len(bodies) != 1 or after[1] != "200")
+    """Print how requests were answered and what honest ones waited; return 1 if one had no answer, or on a traceback."""
+    part = 1 / float(sys.argv[1]) if len(sys.argv) > 1 else 1.0
+    quiet, loaded, said = measured(part)
+    print("| requests | times | answered with |\n|---|---|---|")
+    for kind in ("honest", "slow", "abandoned", "malformed"):
+        answers = {status: times for (which, status), times in sorted(loaded.answers.items()) if which == kind}
+        print(f"| {kind} | {sum(answers.values())} | {', '.join(f'{n} × {status}' for status, n in answers.items())} |")
+    print("\n| latency of an honest request (ms) | alone | beside the others | ratio |\n|---|---|---|---|")
+    for name, of in (("median", median), ("95 %", lambda times: quantiles(times, n=20)[-1]), ("longest", max)):
+        one, other = (1_000 * of(load.seconds) for load in (quiet, loaded))
+        print(f"| {name} | {one:.1f} | {other:.1f} | {other / one:.1f} |")
+    print(f"\nTracebacks: {said.count('Traceback')}; lines in the log: {len(said.splitlines())}")
+    answered = loaded.answers["honest", "200"] == quiet.answers["honest", "200"] == len(loaded.seconds)
+    return int("Traceback" in said or not answered)
 
 
 if __name__ == "__main__":

@@ -1,52 +1,74 @@
-"""A scene as a SPARQL 1.1 endpoint on loopback, read-only, and the view of what goes on in it.
+"""A scene as a read-only SPARQL 1.1 endpoint on loopback, and a page that follows an execution.
 
 ==============  ==========================================================================================================
-``/sparql``     the SPARQL 1.1 protocol: GET, POST of a form, POST of a query; without a query, the service's description
+``/sparql``     the SPARQL 1.1 protocol: GET, POST of a form, POST of a query; without a query, the service description
 ``/``           a page that follows a running execution; ``/view`` is the part of it that changes
 ==============  ==========================================================================================================
 
-Queries are answered in processes of their own, a few at a time, each within limits (`reasoner.graph.apart`). Who isn't on this
-machine isn't answered, whatever name the machine is called by.
+uvicorn and starlette serve HTTP. Queries run in processes of their own (`reasoner.graph.apart`), in lanes: the first one is for
+short queries, and a query that takes longer than a lane allows starts again in the next one, with lower priority, so that short
+queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are refused.
 """
 
 from __future__ import annotations
 
+import asyncio
 import html
-import io
 import logging
-import queue
 import re
+import resource
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from asyncio import LifoQueue, Transport
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from string import Template
-from time import monotonic
-from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, urlsplit
+from typing import TYPE_CHECKING, Any, TypeVar
+from urllib.parse import parse_qs
 
 import pyoxigraph as ox
+import uvicorn
+from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.middleware.cors import CORSMiddleware
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from confab.live import View
 from confab.table import Table
-from reasoner.graph.apart import UNION, Apart, QueryLimits
+from reasoner.graph.apart import QueryLimits, QueryWorker
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import LimitError
 
 if TYPE_CHECKING:
     from confab.known import Known
-    from confab.live import View
     from planner.acting.executive import Moment
 
 log = logging.getLogger(__name__)
+transport_log = log.getChild("transport")
+transport_log.setLevel(logging.CRITICAL + 1)
+T = TypeVar("T")
 PORT = 7879
-AT_ONCE, WAITING, LARGEST = 2, 64, 1_000_000
-"""Queries that are answered at once, connections that are open at once, bytes of a request."""
-SLOWEST, HURRIED = 20.0, 1.0
-"""Seconds that a whole request may take to come: as long as there is a place for others, and when there is none."""
-LOOPBACK = re.compile(r"(localhost|127(?:\.\d{1,3}){3}|\[::1\])(:\d+)?", re.IGNORECASE)
-ROWS = {
+LANES, AT_ONCE = (0.05, 0.5, 5.0, None), 2
+"""Seconds that a query may run in each lane, and how many queries run at once in each."""
+LARGEST, SLOWEST = 1_000_000, 20.0
+"""Bytes of a request's body; seconds in which a request must arrive, and an answer be taken."""
+MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
+"""Open connections."""
+LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
+ORIGIN = rf"https?://{LOOPBACK}"
+TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
+"""A request's target that names a host itself."""
+PAGE = Path(__file__).with_name("live.html")
+SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
     "application/sparql-results+xml": "sparql-xml",
@@ -54,102 +76,80 @@ ROWS = {
     "text/csv": "sparql-csv",
     "text/tab-separated-values": "tsv",
 }
-"""What the rows of a SELECT, or the truth of an ASK, are written as: the first where a client wants nothing special."""
+"""Media types of the answer to a SELECT, and the first four of an ASK; the first one is the default."""
 TRIPLES = {
     "text/turtle": ox.RdfFormat.TURTLE,
     "application/n-triples": ox.RdfFormat.N_TRIPLES,
     "application/rdf+xml": ox.RdfFormat.RDF_XML,
     "application/ld+json": ox.RdfFormat.JSON_LD,
 }
-DESCRIPTION = Template("""@prefix sd: <http://www.w3.org/ns/sparql-service-description#> .
-@prefix void: <http://rdfs.org/ns/void#> .
-[] a sd:Service ; sd:endpoint <$url> ; sd:supportedLanguage sd:SPARQL11Query ; sd:feature sd:UnionDefaultGraph ;
-  sd:resultFormat $formats ;
-  sd:defaultDataset [ a sd:Dataset ; sd:defaultGraph [ a sd:Graph ; void:triples $triples ] ;
-    sd:namedGraph $graphs ] .
-""")
-FORMATS = (
-    "SPARQL_Results_JSON",
-    "SPARQL_Results_XML",
-    "SPARQL_Results_CSV",
-    "SPARQL_Results_TSV",
-    "Turtle",
-    "N-Triples",
-    "RDF_XML",
-)
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Confab</title><style>
-:root { color-scheme: light dark }
-body { font: 16px/1.45 system-ui, sans-serif; max-width: 62rem; margin: 1rem auto; padding: 0 1rem }
-ul { list-style: none; padding-left: 1.1rem } code { opacity: .7 } td, th { text-align: left; padding: .1rem .8rem .1rem 0 }
-#state { opacity: .7; font-size: .9rem }
-</style></head><body><p id="state">connecting …</p><main id="view"></main><script>
-const view = document.getElementById("view"), state = document.getElementById("state");
-async function look() {
-  try {
-    const answer = await fetch("/view"), text = await answer.text();
-    if (text !== look.last) { view.innerHTML = text; look.last = text; }
-    state.textContent = "ask it in SPARQL at " + location.origin + "/sparql";
-  } catch { state.textContent = "over: nothing answers any more; this is what was seen last"; }
-  setTimeout(look, 400);
-}
-look();
-</script></body></html>
-"""
+DESCRIPTION = Path(__file__).with_name("service.ttl")
 
 
-class RefusedError(Exception):
-    """A request that isn't answered: an HTTP status, and why in a line."""
+class Worker:
+    """A process that answers queries about a scene as it is now, called from an event loop."""
 
-    def __init__(self, status: int, why: str) -> None:
-        super().__init__(why)
-        self.status = status
+    def __init__(self, service: Service, nice: int) -> None:
+        self.service, self.change = service, 0
+        self.process = QueryWorker(service.scene.knowledge, service.limits, nice)
+
+    def ready(self) -> None:
+        """Wait until the process has read the scene as it is now."""
+        if self.change != self.service.change:
+            self.change = self.service.change
+            self.process.close()
+        self.process.start()
+
+    async def call(self, function: Callable[..., T], *arguments: object) -> T:
+        """Return what a function returns in a thread; if the caller is cancelled, end the query of the process first."""
+        future = asyncio.get_running_loop().run_in_executor(self.service.threads, function, *arguments)
+        try:
+            return await asyncio.shield(future)
+        except asyncio.CancelledError:
+            while not future.done():
+                self.process.interrupt()
+                await asyncio.wait([future], timeout=0.05)
+            future.exception()
+            raise
 
 
-@dataclass
 class Service:
-    """What is served: a scene, what is known of it now, and the processes that answer queries about it."""
+    """A scene that is served, its view, and the processes that answer queries about it."""
 
-    scene: Known
-    limits: QueryLimits
-    view: View
-    change: int = 0
-    _free: queue.Queue[tuple[int, Apart]] = field(default_factory=queue.Queue)
+    def __init__(self, scene: Known, limits: QueryLimits) -> None:
+        self.scene, self.limits, self.change = scene, limits, 0
+        self.view = View(known=dict(scene.problem.initial))
+        self.lanes: list[LifoQueue[Worker]] = [LifoQueue() for _ in LANES]
+        self.workers = [Worker(self, nice=5 * lane) for lane in range(len(LANES)) for _ in range(AT_ONCE)]
+        self.threads = ThreadPoolExecutor(len(self.workers))
+        for number, worker in enumerate(self.workers):
+            self.lanes[number // AT_ONCE].put_nowait(worker)
 
-    def __post_init__(self) -> None:
-        for _ in range(AT_ONCE):
-            self._free.put((self.change, Apart(self.scene.knowledge, self.limits)))
-
-    def ask(self, query: str, graphs: Sequence[str]) -> tuple[str, Table]:
-        """Return what a query answers, on what is known now: ``rows``, ``triples`` or ``truth``, and which.
+    async def run(self, work: Callable[[QueryWorker], T]) -> T:
+        """Return the result of some work with a process, in the first lane that allows the time that it takes.
 
         Raises
         ------
-        RefusedError
-            It is no query, goes beyond the limits, or too many others wait.
+        HTTPException
+            A query is not SPARQL 1.1, or exceeds the limits.
         """
-        try:
-            made, apart = self._free.get(timeout=self.limits.seconds + SLOWEST)
-        except queue.Empty:
-            raise RefusedError(503, "too many queries at once; ask again later") from None
-        try:
-            if made != self.change:
-                apart.close()
-                made, apart = self.change, Apart(self.scene.knowledge, self.limits)
-            kind, columns, found = apart.ask(query, graphs)
-        except KnowledgeError as error:
-            raise RefusedError(400, str(error)) from error
-        except LimitError as error:
-            raise RefusedError(500, str(error)) from error
-        finally:
-            self._free.put((made, apart))
-        if kind == "truth":
-            return kind, Table((), (), truth=found)
-        return kind, Table(tuple(columns), (), tuple(map(tuple, found)))
+        for seconds, lane in zip(LANES, self.lanes, strict=True):
+            worker = await lane.get()
+            try:
+                await worker.call(worker.ready)
+                return await asyncio.wait_for(worker.call(work, worker.process), seconds)
+            except asyncio.TimeoutError:
+                continue
+            except KnowledgeError as error:
+                raise HTTPException(400, str(error)) from error
+            except LimitError as error:
+                raise HTTPException(500, str(error)) from error
+            finally:
+                lane.put_nowait(worker)
+        raise AssertionError("the last lane has no time limit of its own")
 
     def take(self, moment: Moment) -> None:
-        """Take note of what happens in an execution: it is shown, and what was observed can be asked."""
+        """Note an event of an execution: the page shows it, and queries see what was observed."""
         from reasoner.reading.observed import assert_observed
 
         self.view.take(moment)
@@ -159,259 +159,283 @@ class Service:
 
     def close(self) -> None:
         """End the processes."""
-        for _ in range(AT_ONCE):
-            self._free.get()[1].close()
+        for worker in self.workers:
+            worker.process.close()
+        self.threads.shutdown()
+        for worker in self.workers:  # some may have started meanwhile
+            worker.process.close()
 
-
-class Server(ThreadingHTTPServer):
-    """A server that keeps no more than so many connections at once."""
-
-    daemon_threads = True
-    request_queue_size = 1024  # as many wait for a place; who comes after them would be dropped
-    allow_reuse_address = True
-
-    def __init__(self, port: int, service: Service) -> None:
-        self.service = service
-        self.unfinished: dict[socket.socket, float] = {}  # whose requests are waited for now, and since when
-        self._places, self._ends = threading.BoundedSemaphore(WAITING), threading.Event()
-        super().__init__(("127.0.0.1", port), Handler)
-
-    @property
-    def url(self) -> str:
-        """Where the page is; the endpoint is below it."""
-        return f"http://127.0.0.1:{self.server_port}/"
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread of its own, once there is a place for one more; who is slow, or idle, gives place."""
-        while not self._places.acquire(timeout=0.1):
-            if self._ends.is_set():
-                self.shutdown_request(request)
-                return
-            for connection, since in list(self.unfinished.items()):
-                if monotonic() - since > HURRIED:
-                    with suppress(OSError):
-                        connection.shutdown(socket.SHUT_RDWR)
-        super().process_request(request, client_address)
-
-    def shutdown(self) -> None:
-        """End, also while connections wait for a place."""
-        self._ends.set()
-        super().shutdown()
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answer, and give the place back."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._places.release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Log what went wrong with one connection; the others go on."""
-        log.debug("%s: the connection broke", client_address, exc_info=True)
-
-
-class Incoming(io.RawIOBase):
-    """What comes from a connection: all of a request within `SLOWEST` seconds, however slowly its bytes drop in."""
-
-    def __init__(self, connection: socket.socket, server: Server) -> None:
-        self.connection, self.server, self.begin = connection, server, monotonic()
-
-    def readable(self) -> bool:
-        """Return that it can be read."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Wait for bytes, as long as there is time left for this request."""
-        left = self.begin + SLOWEST - monotonic()
-        if left <= 0:
-            raise TimeoutError(f"the request took more than {SLOWEST:.0f} s to come")
-        self.server.unfinished[self.connection] = self.begin
-        try:
-            self.connection.settimeout(left)
-            return self.connection.recv_into(buffer)
-        finally:
-            del self.server.unfinished[self.connection]
-            self.connection.settimeout(SLOWEST)
-
-
-class Handler(BaseHTTPRequestHandler):
-    """The requests of one connection."""
-
-    server: Server
-    connection: socket.socket
-    protocol_version = "HTTP/1.1"
-    server_version = "confab"
-    timeout = SLOWEST
-
-    def setup(self) -> None:
-        """Begin to read what comes."""
-        super().setup()
-        self.rfile.close()
-        self.incoming = Incoming(self.connection, self.server)
-        self.rfile = io.BufferedReader(self.incoming)
-
-    def handle_one_request(self) -> None:
-        """Answer the next request; its time begins now."""
-        self.incoming.begin = monotonic()
-        super().handle_one_request()
-
-    def do_GET(self) -> None:
-        """Answer GET."""
-        self._answered(self._get)
-
-    do_HEAD = do_GET  # noqa: N815
-
-    def do_POST(self) -> None:
-        """Answer POST."""
-        self._answered(self._post)
-
-    def do_OPTIONS(self) -> None:
-        """Say what may be asked, as browsers want to know."""
-        self._answered(lambda: ("", b""))
-
-    def _get(self) -> tuple[str, bytes]:
-        parts = urlsplit(self.path)
-        if parts.path == "/":
-            return "text/html; charset=utf-8", PAGE.encode()
-        if parts.path == "/view":
-            return "text/html; charset=utf-8", view_html(self.server.service).encode()
-        if parts.path != "/sparql":
-            raise RefusedError(404, f"nothing is at {parts.path[:80]}; the endpoint is at /sparql")
-        fields = _fields(parts.query)
-        return self._query(fields) if "query" in fields or "update" in fields else self._description()
-
-    def _post(self) -> tuple[str, bytes]:
-        parts = urlsplit(self.path)
-        body = self._body()
-        if parts.path != "/sparql":
-            raise RefusedError(404, f"nothing is at {parts.path[:80]}; the endpoint is at /sparql")
-        kind = self.headers.get_content_type()
-        if kind == "application/x-www-form-urlencoded":
-            return self._query({**_fields(parts.query), **_fields(body)})
-        if kind == "application/sparql-query":
-            return self._query({**_fields(parts.query), "query": [body]})
-        if kind == "application/sparql-update":
-            raise RefusedError(403, "this endpoint is only read; updates are refused")
-        raise RefusedError(415, "wanted application/sparql-query, or a form with the field query")
-
-    def _body(self) -> str:
-        length = self.headers.get("Content-Length", "")
-        self.close_connection = True  # until the body is read as it was announced
-        if not length.isdecimal():
-            raise RefusedError(411, "wanted a Content-Length")
-        if int(length) > LARGEST:
-            raise RefusedError(413, f"a request has at most {LARGEST:,} bytes")
-        try:
-            content = self.rfile.read(int(length))
-        except TimeoutError as error:
-            raise RefusedError(408, str(error)) from error
-        if len(content) < int(length):
-            raise RefusedError(400, "the request ends before its Content-Length")
-        self.close_connection = False
-        try:
-            return content.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise RefusedError(400, f"the request is not UTF-8: {error}") from error
-
-    def _query(self, fields: Mapping[str, list[str]]) -> tuple[str, bytes]:
-        if "update" in fields:
-            raise RefusedError(403, "this endpoint is only read; updates are refused")
-        queries = fields.get("query", [])
-        if len(queries) != 1:
-            raise RefusedError(400, f"wanted one query, got {len(queries)}")
-        graphs = fields.get("default-graph-uri", []) or UNION
-        what, table = self.server.service.ask(queries[0], graphs)
-        accepted = self.headers.get("Accept", "*/*")
-        if what == "triples":
-            kind = chosen(accepted, list(TRIPLES))
-            found = sorted({ox.Triple(*row) for row in table.terms}, key=str)
-            prefixes = self.server.service.scene.knowledge.spoken if kind == "text/turtle" else None
-            return kind, ox.serialize(found, format=TRIPLES[kind], prefixes=prefixes) or b""
-        kind = chosen(accepted, list(ROWS)[:4] if what == "truth" else list(ROWS))
-        return kind, table.standard(ROWS[kind])
-
-    def _description(self) -> tuple[str, bytes]:
-        kind = chosen(self.headers.get("Accept", "*/*"), list(TRIPLES))
-        store = self.server.service.scene.knowledge.store
-        text = DESCRIPTION.substitute(
-            url=self.server.url + "sparql",
-            triples=len(store),
-            formats=", ".join(f"<http://www.w3.org/ns/formats/{name}>" for name in FORMATS),
-            graphs=", ".join(
-                f"[ a sd:NamedGraph ; sd:name {graph} ]" for graph in sorted(map(str, store.named_graphs()))
-            ),
+    def view_html(self) -> str:
+        """Return the execution as HTML; before there is one, the scene's facts and goals."""
+        if self.view.moment is not None:
+            return self.view._repr_html_()
+        wanted = {goal.rsplit(" ", 1)[0]: goal.rsplit(" ", 1)[1] for goal in self.scene.goals}
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in (what, value, wanted.get(what, '')))}</tr>"
+            for what, value in (fact.rsplit(" ", 1) for fact in self.scene.facts[:2_000])
         )
+        head = "<tr><th>what</th><th>is</th><th>shall be</th></tr>"
+        return f"<h1>{html.escape(self.scene.iri)}</h1><table>{head}{rows}</table>"
+
+
+class Guard:
+    """Middleware that answers requests of this machine alone, and of no page of another site."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        headers = Headers(scope=scope)
+        host, origin = headers.get("Host", "localhost"), headers.get("Origin", "")
+        if named := TARGET.fullmatch(scope["path"]):
+            host, scope["path"] = named["host"], named["path"] or "/"
+        status, why = 0, ""
+        if not scope["path"].startswith("/"):
+            status, why = 400, "the request has no path"
+        elif not re.fullmatch(LOOPBACK, host, re.IGNORECASE):
+            status, why = 421, "this endpoint answers on loopback alone"
+        elif not re.fullmatch(ORIGIN, origin) and (origin or headers.get("Sec-Fetch-Site") == "cross-site"):
+            status, why = 403, "this endpoint answers no page of another site"
+        if status:
+            await PlainTextResponse(f"{why}\n", status)(scope, receive, send)
+        else:
+            await self.app(scope, receive, send)
+
+
+class Endpoint:
+    """The pages of a service."""
+
+    def __init__(self, service: Service, url: str) -> None:
+        self.service, self.url = service, url
+        self.app = Starlette(
+            routes=[
+                Route("/", self.page),
+                Route("/view", self.view),
+                Route("/sparql", self.sparql, methods=["GET", "POST"]),
+            ],
+            middleware=[
+                Middleware(Guard),
+                Middleware(CORSMiddleware, allow_methods=("GET", "POST"), allow_origin_regex=ORIGIN),
+            ],
+            exception_handlers={HTTPException: refused, Exception: fault},
+        )
+        self.app.router.redirect_slashes = False
+
+    async def page(self, request: Request) -> Response:
+        """Answer with the page that follows an execution."""
+        return HTMLResponse(PAGE.read_bytes(), headers={"Cache-Control": "no-store"})
+
+    async def view(self, request: Request) -> Response:
+        """Answer with the part of the page that changes."""
+        content = await asyncio.to_thread(self.service.view_html)
+        return HTMLResponse(content, headers={"Cache-Control": "no-store"})
+
+    async def sparql(self, request: Request) -> Response:
+        """Answer a query, or describe the service."""
+        fields = form(request.scope["query_string"])
+        if request.method == "POST":
+            kind = request.headers.get("Content-Type", "").partition(";")[0].strip().lower()
+            content = await body(request)
+            if kind == "application/x-www-form-urlencoded":
+                fields |= form(content)
+            elif kind == "application/sparql-query":
+                fields["query"] = [utf8(content)]
+            elif kind == "application/sparql-update":
+                fields["update"] = [""]
+            else:
+                raise HTTPException(415, "wanted application/sparql-query, or a form with the field query")
+        accept = request.headers.get("Accept", "*/*")
+        if "update" in fields:
+            raise HTTPException(403, "this endpoint is read-only; it refuses updates")
+        if request.method != "POST" and "query" not in fields:
+            kind, content = await asyncio.to_thread(self.description, accept)
+        else:
+            queries = fields.get("query", [])
+            if len(queries) != 1:
+                raise HTTPException(400, f"wanted one query, got {len(queries)}")
+            default, named = fields.get("default-graph-uri", []), fields.get("named-graph-uri", [])
+            dataset = (default, named) if default or named else None
+            work = partial(self.answer, query=queries[0], dataset=dataset, accept=accept)
+            kind, content = await while_connected(request, self.service.run(work))
+        return Response(content, headers={"Content-Type": kind, "Cache-Control": "no-store", "Vary": "Accept"})
+
+    def answer(
+        self, process: QueryWorker, query: str, dataset: tuple[Sequence[str], Sequence[str]] | None, accept: str
+    ) -> tuple[str, bytes]:
+        """Return the answer of a query, preceded by its media type."""
+        what, columns, found = process.ask(query, dataset)
+        if what == "triples":
+            kind = preferred(accept, list(TRIPLES))
+            triples = sorted({ox.Triple(*row) for row in found}, key=str)
+            prefixes = self.service.scene.knowledge.spoken if kind == "text/turtle" else None
+            return kind, ox.serialize(triples, format=TRIPLES[kind], prefixes=prefixes) or b""
+        if what == "truth":
+            kind = preferred(accept, list(SOLUTIONS)[:4])
+            return kind, Table((), (), truth=found).standard(SOLUTIONS[kind])
+        kind = preferred(accept, list(SOLUTIONS))
+        return kind, Table(tuple(columns), (), tuple(map(tuple, found))).standard(SOLUTIONS[kind])
+
+    def description(self, accept: str) -> tuple[str, bytes]:
+        """Return the service description, preceded by its media type."""
+        kind, store = preferred(accept, list(TRIPLES)), self.service.scene.knowledge.store
+        graphs = ", ".join(f"[ a sd:NamedGraph ; sd:name {name} ]" for name in sorted(map(str, store.named_graphs())))
+        text = Template(DESCRIPTION.read_text()).substitute(url=f"{self.url}sparql", triples=len(store), graphs=graphs)
         triples = [quad.triple for quad in ox.parse(text, format=ox.RdfFormat.TURTLE)]
         return kind, ox.serialize(triples, format=TRIPLES[kind]) or b""
 
-    def _answered(self, answer: Callable[[], tuple[str, bytes]]) -> None:
-        """Send what a request is answered with, or why it isn't."""
-        status = 200
-        try:
-            if not LOOPBACK.fullmatch(self.headers.get("Host", "localhost")):
-                raise RefusedError(421, "this endpoint answers on loopback alone")
-            kind, content = answer()
-            status = 200 if kind else 204
-        except RefusedError as error:
-            status, kind, content = error.status, "text/plain; charset=utf-8", f"{error}\n".encode()
-        except Exception:
-            log.exception("confab: a request couldn't be answered")
-            status, kind, content = 500, "text/plain; charset=utf-8", b"a fault of Confab, not yours; see its log\n"
-        self.send_response(status)
-        origin = urlsplit(self.headers.get("Origin", ""))
-        if LOOPBACK.fullmatch(origin.netloc):
-            self.send_header("Access-Control-Allow-Origin", f"{origin.scheme}://{origin.netloc}")
-            self.send_header("Access-Control-Allow-Methods", "GET, POST, OPTIONS")
-            self.send_header("Access-Control-Allow-Headers", "Accept, Content-Type")
-        self.send_header("Vary", "Accept, Origin")
-        if kind:
-            self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("Content-Length", str(len(content)))
-        if status >= 400:
-            self.close_connection = True
-            self.send_header("Connection", "close")
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(content)
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Log a request where somebody looks for it."""
-        log.debug(format, *args)
+async def refused(request: Request, error: Exception) -> Response:
+    """Answer a request that is refused with a status and one line."""
+    assert isinstance(error, HTTPException)
+    where = f"nothing is at {request.scope['path'][:80]!r}; the endpoint is at /sparql"
+    return PlainTextResponse(
+        f"{where if error.status_code == 404 else error.detail}\n", error.status_code, error.headers
+    )
 
 
-def chosen(accept: str, offered: Sequence[str]) -> str:
-    """Return the media type that a client likes best, the first offered of those that it likes equally.
+async def fault(request: Request, error: Exception) -> Response:
+    """Answer a request that met a fault of the program."""
+    if not isinstance(error, ClientDisconnect):
+        log.error("confab: a request couldn't be answered", exc_info=error)
+    return PlainTextResponse("a fault of Confab, not yours; see its log\n", 500)
 
-    >>> chosen("text/csv;q=0.5, application/*", ["application/json", "text/csv"]), chosen("*/*", ["a/b", "c/d"])
+
+async def while_connected(request: Request, work: Awaitable[T]) -> T:
+    """Return the result of some work; cancel it, and raise `ClientDisconnect`, as soon as the client leaves."""
+
+    async def leaving() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
+    tasks = asyncio.ensure_future(work), asyncio.ensure_future(leaving())
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        if not tasks[0].done():
+            raise ClientDisconnect
+        return tasks[0].result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def body(request: Request) -> bytes:
+    """Return the body of a request: at most `LARGEST` bytes, within `SLOWEST` seconds."""
+
+    async def read() -> bytes:
+        content = bytearray()
+        async for part in request.stream():
+            content += part
+            if len(content) > LARGEST:
+                raise too_large
+        return bytes(content)
+
+    close = {"Connection": "close"}
+    too_large = HTTPException(413, f"a request has at most {LARGEST:,} bytes", close)
+    if int(request.headers.get("Content-Length", "0")) > LARGEST:
+        raise too_large
+    try:
+        return await asyncio.wait_for(read(), SLOWEST)
+    except asyncio.TimeoutError:
+        raise HTTPException(408, f"the request took more than {SLOWEST:g} s to arrive", close) from None
+
+
+def form(content: bytes) -> dict[str, list[str]]:
+    """Return the fields of a form."""
+    try:
+        return parse_qs(utf8(content), keep_blank_values=True, errors="strict", max_num_fields=100)
+    except ValueError as error:
+        raise HTTPException(400, f"the fields of the request can't be read: {error}") from error
+
+
+def utf8(content: bytes) -> str:
+    """Return a text, which is UTF-8."""
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise HTTPException(400, f"the request is not UTF-8: {error}") from error
+
+
+def preferred(accept: str, offered: Sequence[str]) -> str:
+    """Return the media type that an ``Accept`` header prefers; among equals, the first that is offered.
+
+    >>> preferred("text/csv;q=0.5, application/*", ["application/json", "text/csv"]), preferred("*/*", ["a/b", "c/d"])
     ('application/json', 'a/b')
     """
-    liked: dict[str, float] = {}
+    quality: dict[str, float] = {}
     for part in accept.split(",")[:100]:
         name, *parameters = (word.strip() for word in part.lower().split(";"))
-        quality = next((p[2:] for p in parameters if p.startswith("q=")), "1")
-        with_number = re.fullmatch(r"[01](\.\d{0,3})?", quality)
-        liked[name] = float(quality) if with_number else 0.0
+        given = next((p[2:] for p in parameters if p.startswith("q=")), "1")
+        quality[name] = float(given) if re.fullmatch(r"[01](\.\d{0,3})?", given) else 0.0
     scores = [
-        next((liked[name] for name in (kind, kind.split("/")[0] + "/*", "*/*") if name in liked), 0.0)
+        next((quality[name] for name in (kind, kind.split("/")[0] + "/*", "*/*") if name in quality), 0.0)
         for kind in offered
     ]
     if not any(scores):
-        raise RefusedError(406, f"it can be had as {', '.join(offered)}")
+        raise HTTPException(406, f"it can be had as {', '.join(offered)}")
     return offered[scores.index(max(scores))]
 
 
-def view_html(service: Service) -> str:
-    """Return what is to be seen now: the execution if there is one, else what holds and what is wanted."""
-    if service.view.moment is not None:
-        return service.view._repr_html_()
-    scene = service.scene
-    wanted = {goal.rsplit(" ", 1)[0]: goal.rsplit(" ", 1)[1] for goal in scene.goals}
-    rows = "".join(
-        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in (what, value, wanted.get(what, '')))}</tr>"
-        for what, value in (fact.rsplit(" ", 1) for fact in scene.facts[:2_000])
-    )
-    return f"<h1>{html.escape(scene.iri)}</h1><table><tr><th>what</th><th>is</th><th>shall be</th></tr>{rows}</table>"
+class Connection(H11Protocol):
+    """A connection on which each request must arrive, and each answer be taken, within `SLOWEST` seconds.
+
+    If too many are open, the one that has been waited for longest is dropped.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.logger, self.access_log = transport_log, False
+
+    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
+        """Begin to wait for the first request."""
+        super().connection_made(transport)
+        self.deadline = self.loop.call_later(SLOWEST, transport.abort)
+        if len(self.connections) > MOST:
+            waiting = [c for c in self.connections if isinstance(c, Connection) and not c.deadline.cancelled()]
+            min(waiting, key=lambda c: c.deadline.when()).transport.abort()
+
+    def handle_events(self) -> None:
+        """Handle what has arrived; once the head of a request has, the application has its own limits."""
+        before = self.cycle
+        super().handle_events()
+        if self.cycle is not before and not self.cycle.response_complete:
+            self.deadline.cancel()
+
+    def on_response_complete(self) -> None:
+        """Begin to wait for the next request."""
+        self.deadline.cancel()
+        self.deadline = self.loop.call_later(SLOWEST, self.transport.abort)
+        super().on_response_complete()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self.deadline.cancel()
+        super().connection_lost(exc)
+
+
+class Server(uvicorn.Server):
+    """A server in a thread of its own, which drops its clients when it ends."""
+
+    def __init__(self, service: Service, listening: socket.socket) -> None:
+        self.service, self.listening = service, listening
+        self.port: int = listening.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}/"
+        app = Endpoint(service, self.url).app
+        super().__init__(uvicorn.Config(app, http=Connection, ws="none", lifespan="off", log_config=None))
+        self.thread = threading.Thread(target=asyncio.run, args=[self.run_quietly()], name="confab-serve", daemon=True)
+
+    async def run_quietly(self) -> None:
+        """Serve until `should_exit`; clients that break off are no news."""
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: transport_log.debug("%s", context))
+        await self.serve([self.listening])
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Drop the clients, which cancels their queries."""
+        for connection in list(self.server_state.connections):
+            connection.transport.abort()
+        self.force_exit = True
+        await super().shutdown(sockets)
 
 
 @contextmanager
@@ -423,27 +447,18 @@ def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -
     KnowledgeError
         The port is taken, or the scene is at an endpoint already.
     """
-    from confab.live import View
-
     if scene.knowledge.remote:
         raise KnowledgeError(f"{scene.iri} is at an endpoint already; ask that one")
-    service = Service(scene, limits or QueryLimits(), View(known=dict(scene.problem.initial)))
+    service = Service(scene, limits or QueryLimits())
     try:
-        server = Server(port, service)
+        listening = socket.create_server(("127.0.0.1", port), backlog=1024)
     except OSError as error:
         raise KnowledgeError(f"port {port} can't be used ({error.strerror}); give another one (--port)") from error
-    thread = threading.Thread(target=server.serve_forever, name="confab-serve", daemon=True)
-    thread.start()
+    server = Server(service, listening)
+    server.thread.start()
     try:
         yield server
     finally:
-        server.shutdown()
-        server.server_close()
+        server.should_exit = True
+        server.thread.join()
         service.close()
-
-
-def _fields(text: str) -> dict[str, list[str]]:
-    try:
-        return parse_qs(text, keep_blank_values=True, errors="strict", max_num_fields=100)
-    except ValueError as error:
-        raise RefusedError(400, f"the fields of the request can't be read: {error}") from error

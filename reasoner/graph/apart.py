@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import pickle
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Timer
+from threading import Event, Lock, Timer
 from types import TracebackType
 from typing import Any, TypeAlias
 
@@ -41,8 +43,16 @@ LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
 """More that could stand there than helps anybody."""
 NAMESPACES = re.compile(r"\bPREFIX\s+([\w-]*):\s*<([^<>]*)>", re.IGNORECASE)
 PLACE = re.compile(r"error at (\d+):(\d+): ")
+FROM = re.compile(
+    rf"(?P<text>{TEXTS.pattern})|(?<![\w?$:.-])FROM(?![\w:-])(?:\s|#[^\n]*\n)*(?P<named>NAMED(?:\s|#[^\n]*\n)*)?"
+    r"(?:<(?P<iri>[^<>]*)>|(?P<prefix>[\w.-]*):(?P<name>[\w.-]*))",
+    re.DOTALL | re.IGNORECASE,
+)
+"""Texts, which hold no clauses, and clauses that name a graph of a query's dataset."""
 SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
+Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
+"""The graphs whose union is the default graph, and those that ``GRAPH`` sees; None for all."""
 Answer: TypeAlias = "tuple[str, list[str], Any]"
 """What a query gives: ``rows``, ``triples`` or ``truth``; the columns; and which."""
 
@@ -70,35 +80,32 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
     limits = limits or QueryLimits()
     if graph.remote:
         return _checked(graph, query, limits, _remotely(graph, allowed(query, limits), limits))
-    with Apart(graph, limits) as apart:
-        return apart.ask(query)
+    with QueryWorker(graph, limits) as worker:
+        return worker.ask(query)
 
 
-class Apart:
-    """A process that answers queries about a graph as it is now, one after the other; it ends with the ``with`` block.
+class QueryWorker:
+    """A process that answers queries about a graph as it is when the process starts, one after the other.
+
+    It starts with the first query and ends with the ``with`` block or with this process, however that ends. A query that is
+    interrupted, or that exceeds its limits, ends alone.
 
     Parameters
     ----------
     graph : KnowledgeGraph
     limits : QueryLimits
-        Of each query; `megabytes` those of the process.
+        Limits of each query.
+    nice : int
+        How far it gives way to other processes, as of ``nice``.
     """
 
-    def __init__(self, graph: KnowledgeGraph, limits: QueryLimits) -> None:
-        self.graph, self.limits = graph, limits
-        self._setup = pickle.dumps(
-            {
-                "prefixes": graph.spoken,
-                "quads": graph.store.dump(format=ox.RdfFormat.N_QUADS),
-                "memory": limits.megabytes * 1_000_000,
-                "rows": limits.rows,
-                "service": limits.service,
-            }
-        )
+    def __init__(self, graph: KnowledgeGraph, limits: QueryLimits, nice: int = 0) -> None:
+        self.graph, self.limits, self.nice = graph, limits, nice
         self._process: subprocess.Popen[bytes] | None = None
+        self._sending = Lock()
 
-    def __enter__(self) -> Apart:
-        """Return it; the process begins with the first query, and anew after one that brought it down."""
+    def __enter__(self) -> QueryWorker:
+        """Return it."""
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
@@ -106,75 +113,103 @@ class Apart:
         self.close()
 
     def close(self) -> None:
-        """End the process, if it has begun."""
+        """End the process, if it has started; a query that it answers ends, too."""
         if self._process is not None:
             self._process.kill()
             self._process.communicate()
             self._process = None
 
-    def ask(self, query: str, graphs: Sequence[str] = UNION) -> Answer:
-        """Return what a query answers on the union of some graphs; errors as of the function `ask`."""
+    def start(self) -> None:
+        """Start the process if it doesn't run, and wait until it has read the graph."""
+        if self._process is None:
+            self.ask("ASK {}")
+
+    def interrupt(self) -> None:
+        """End the query of another thread, in which `ask` raises `LimitError`; do nothing while the process starts."""
+        if self._sending.acquire(blocking=False):
+            self._send(None)
+            self._sending.release()
+
+    def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
+        """Return what a query answers on a dataset; by default its own one (``FROM``), or the union of all graphs.
+
+        Errors are those of the function `ask`; a graph that doesn't exist is one, too.
+        """
         self.graph.round_trips += 1
-        found = self._answer(core_names(self.graph, allowed(query, self.limits)), graphs)
+        dataset = _existing(self.graph, dataset or clauses(self.graph, query) or (UNION, None))
+        found = self._answer(core_names(self.graph, allowed(query, self.limits)), dataset)
         if found[0] == "error":
-            found = self._answer(query, graphs)  # as it was written, so that the position is right
+            found = self._answer(query, dataset)  # as it was written, so that the position is right
         return _checked(self.graph, query, self.limits, found)
 
-    def _answer(self, query: str, graphs: Sequence[str]) -> Answer:
-        if self._process is None:
-            self._process = subprocess.Popen(
-                [sys.executable, str(PROCESS)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                start_new_session=True,  # Ctrl-C is for us, who end it
-            )
-            self._send(self._setup)
-        process, late = self._process, False
-        assert process.stdout is not None
+    def _answer(self, query: str, dataset: Dataset) -> Answer:
+        late = Event()
 
         def end() -> None:
-            nonlocal late
-            late = True
-            process.kill()
+            late.set()
+            self.interrupt()
 
-        left = current().left
+        with self._sending:
+            if self._process is None:
+                self._process = subprocess.Popen(
+                    [sys.executable, str(PROCESS)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    start_new_session=True,  # Ctrl-C is for us, who end it
+                )
+                self._send(self._setup())
+            self._send((query, *dataset))
+        left, process = current().left, self._process
+        assert process.stdout is not None
         timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), end)
         timer.start()
         try:
-            self._send(pickle.dumps((query, list(graphs))))
-            answer: Answer = pickle.load(process.stdout)
-            return answer
+            found = pickle.load(process.stdout)
         except (EOFError, pickle.UnpicklingError):
-            raise self._why(late) from None
+            self._process = None
+            process.kill()
+            said = process.communicate()[1].decode("utf-8", "replace")
+            raise self._why(process.returncode, said, late.is_set()) from None
         finally:
             timer.cancel()
+        if found[0] == "ended":
+            raise self._why(found[1], found[2], late.is_set())
+        answer: Answer = found
+        return answer
 
-    def _send(self, what: bytes) -> None:
-        assert self._process is not None and self._process.stdin is not None
-        try:
-            self._process.stdin.write(what)
-            self._process.stdin.flush()
-        except BrokenPipeError:  # it has ended; why, is asked where its answer is missed
-            pass
+    def _setup(self) -> dict[str, object]:
+        return {
+            "prefixes": self.graph.spoken,
+            "quads": self.graph.store.dump(format=ox.RdfFormat.N_QUADS),
+            "seconds": self.limits.seconds,
+            "memory": self.limits.megabytes * 1_000_000,
+            "rows": self.limits.rows,
+            "service": self.limits.service,
+            "nice": self.nice,
+        }
 
-    def _why(self, late: bool) -> Exception:
-        """Return what to say of a process that ended without an answer."""
-        assert self._process is not None
-        process, self._process = self._process, None
-        said = process.communicate()[1].decode("utf-8", "replace")
-        if late:
+    def _send(self, message: object) -> None:
+        if self._process is not None and self._process.stdin is not None:
+            content = pickle.dumps(message)
+            with suppress(OSError):  # it has ended, which is noticed where its answer is read
+                self._process.stdin.write(len(content).to_bytes(8, "big") + content)
+                self._process.stdin.flush()
+
+    def _why(self, status: int, said: str, late: bool) -> Exception:
+        """Return what to raise for a query that ended without an answer."""
+        if late or status == -signal.SIGXCPU:
             return LimitError(
                 f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time (--time-limit)"
             )
+        if status == -signal.SIGKILL:
+            return LimitError("the query was interrupted")
         if "memory" in said.lower():
             return LimitError(
                 f"gave up: the query needs more than {self.limits.megabytes:,} MB of memory; ask for less"
             )
-        if process.returncode < 0:
-            return KnowledgeError(
-                f"the query brings the SPARQL engine down (signal {-process.returncode}); nest it less deeply"
-            )
+        if status < 0:
+            return KnowledgeError(f"the query brings the SPARQL engine down (signal {-status}); nest it less deeply")
         return RuntimeError(f"the process that answers queries failed: {said}")
 
 
@@ -185,6 +220,30 @@ def allowed(query: str, limits: QueryLimits) -> str:
             "the query asks another endpoint (SERVICE), which may learn from it; allow that with --service"
         )
     return query
+
+
+def clauses(graph: KnowledgeGraph, query: str) -> Dataset | None:
+    """Return the dataset that a query's ``FROM`` clauses describe; None if it has none."""
+    known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
+    found = [match for match in FROM.finditer(query) if match["text"] is None]
+    names = [
+        match["iri"] if match["iri"] is not None else known.get(match["prefix"], match["prefix"] + ":") + match["name"]
+        for match in found
+    ]
+    if not found:
+        return None
+    named = [name for name, match in zip(names, found, strict=True) if match["named"]]
+    return [name for name, match in zip(names, found, strict=True) if not match["named"]], named
+
+
+def _existing(graph: KnowledgeGraph, dataset: Dataset) -> Dataset:
+    """Return a dataset; raise `KnowledgeError` if it names a graph that doesn't exist."""
+    known = {*UNION, *(name.value for name in graph.store.named_graphs() if isinstance(name, ox.NamedNode))}
+    for name in (*dataset[0], *(dataset[1] or ())):
+        if name not in known:
+            hint = "there are " + ", ".join(sorted(known))
+            raise KnowledgeError(f"no graph is named <{name}>{nearest(name, known, hint)}")
+    return dataset
 
 
 def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answer) -> Answer:

@@ -1,52 +1,120 @@
-"""The other end of `reasoner.graph.apart`: a process that answers queries. It needs nothing of this project.
+"""The process that answers queries for `reasoner.graph.apart`. It needs nothing else of this project.
 
-It reads from stdin what is asked of which triples, then one query after the other, and writes to stdout what each gives. Before it
-answers it gives up what it doesn't need: more memory than it is allowed, and new files, which connections to elsewhere are, too.
+It keeps a graph, and forks for each query: the fork gives up what it doesn't need (more memory and time than it is allowed, and new
+files, which connections are, too) and ends with its answer. The next message, or the end of the asking process, ends it before.
 """
 
 from __future__ import annotations
 
+import os
 import pickle
 import resource
+import select
+import signal
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import pyoxigraph as ox
 
 
 def main() -> None:
-    """Answer each query: ``(kind, columns, rows)``, kind being ``rows``, ``triples``, ``truth``, ``too many`` or ``error``."""
-    asked = pickle.load(sys.stdin.buffer)
-    for limit, value in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_AS, asked["memory"])):
-        resource.setrlimit(limit, (value, value))
+    """Answer each query by ``(kind, columns, rows)`` with the kinds of `answer`, or by ``("ended", status, what it said)``."""
+    setup = received()
+    os.nice(setup["nice"])
+    limit(resource.RLIMIT_CORE, 0)
+    limit(resource.RLIMIT_AS, setup["memory"])
     store = ox.Store()
-    store.bulk_extend(ox.parse(asked["quads"], format=ox.RdfFormat.N_QUADS))
-    if not asked["service"]:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))  # stdin, stdout, stderr: there is no further one to be had
+    store.bulk_extend(ox.parse(setup["quads"], format=ox.RdfFormat.N_QUADS))
     while True:
+        question = received()
+        if question is not None:  # None interrupts a query that has just been answered
+            sys.stdout.buffer.write(forked(store, question, setup))
+            sys.stdout.buffer.flush()
+
+
+def received() -> Any:
+    """Return the next message; end with the asking process."""
+    size = int.from_bytes(read(8), "big")
+    return pickle.loads(read(size))
+
+
+def read(size: int) -> bytes:
+    """Return bytes from stdin, and never more than these, so that `select` tells of the next message."""
+    found = bytearray()
+    while len(found) < size:
+        part = os.read(0, min(size - len(found), 1 << 20))
+        if not part:
+            sys.exit()
+        found += part
+    return bytes(found)
+
+
+def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) -> bytes:
+    """Return the pickled answer of a fork, or how it ended without one."""
+    ours, theirs = os.pipe()
+    child = os.fork()
+    if child == 0:
+        status = 1
         try:
-            query, graphs = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        said = pickle.dumps(answer(store, query, graphs, asked))
-        if len(said) > asked["memory"] // 10:  # it takes several times as much where it is read
-            said = pickle.dumps(("too many", (), ()))
-        sys.stdout.buffer.write(said)
-        sys.stdout.buffer.flush()
+            os.close(ours)
+            for number in (0, 1, 2):
+                os.dup2(theirs, number)
+            limit(resource.RLIMIT_CPU, int(min(setup["seconds"], 1e9)) + 2)
+            if not setup["service"]:
+                limit(resource.RLIMIT_NOFILE, 3)  # no further one
+            query, default, named = question
+            said = pickle.dumps(answer(store, query, default, named, setup))
+            if len(said) > setup["memory"] // 10:  # it takes several times as much where it is read
+                said = pickle.dumps(("too many", (), ()))
+            while said:
+                said = said[os.write(theirs, said[: 1 << 20]) :]
+            status = 0
+        except BaseException as error:
+            os.write(2, f"{type(error).__name__}: {error}".encode())
+        finally:
+            os._exit(status)
+    os.close(theirs)
+    found, part = bytearray(), b"some"
+    while part:
+        if 0 in select.select([ours, 0], [], [])[0]:
+            os.kill(child, signal.SIGKILL)
+            break
+        part = os.read(ours, 1 << 20)
+        found += part
+    os.close(ours)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if part:  # it was interrupted, be it behind its answer
+        return pickle.dumps(("ended", -signal.SIGKILL, ""))
+    return bytes(found) if status == 0 else pickle.dumps(("ended", status, found.decode("utf-8", "replace")))
 
 
-def answer(store: ox.Store, query: str, graphs: list[str], asked: dict[str, Any]) -> tuple[str, object, object]:
-    """Return what one query gives, on the union of some graphs."""
+def limit(what: int, value: int) -> None:
+    """Set a limit of this process for good."""
+    resource.setrlimit(what, (value, value))
+
+
+def answer(
+    store: ox.Store, query: str, default: Sequence[str], named: Sequence[str] | None, setup: dict[str, Any]
+) -> tuple[str, object, object]:
+    """Return what one query gives: ``rows``, ``triples``, ``truth``, ``too many`` or ``error``, the columns, and which.
+
+    It sees the union of some graphs and, in ``GRAPH``, some or all of the named ones.
+    """
     try:
-        union = [ox.NamedNode(name) for name in graphs]
-        found = store.query(query, prefixes=asked["prefixes"], default_graph=union)  # type: ignore[arg-type]
+        found = store.query(
+            query,
+            prefixes=setup["prefixes"],
+            default_graph=[ox.NamedNode(name) for name in default],
+            named_graphs=None if named is None else [ox.NamedNode(name) for name in named],
+        )
         if isinstance(found, ox.QueryBoolean):
             return "truth", (), bool(found)
         columns = [variable.value for variable in getattr(found, "variables", ())]
         rows: list[tuple[object, ...]] = []
         for row in found:
             rows.append(tuple(row))
-            if len(rows) > asked["rows"]:
+            if len(rows) > setup["rows"]:
                 return "too many", (), ()
         return "triples" if isinstance(found, ox.QueryTriples) else "rows", columns, rows
     except (SyntaxError, OSError, RuntimeError) as error:

@@ -770,8 +770,8 @@ main()
         ("plan living-room -o p.json", "planner.validation:validate"),
         ("plan living-room -o p.json", "reasoner.files:os.fsync"),
         ("learn living-room --memory m.ttl", "reasoner.files:os.fsync"),
-        ("query living-room ASK{?s?p?o}", "reasoner.graph.apart:Apart._send"),
-        ("serve living-room --port 0", "socketserver:BaseServer.serve_forever"),
+        ("query living-room ASK{?s?p?o}", "reasoner.graph.apart:QueryWorker._send"),
+        ("serve living-room --port 0", "socket:create_server"),
     ],
 )
 def test_ctrl_c_is_one_line_and_leaves_nothing_half_done(tmp_path: Path, command: str, moment: str) -> None:

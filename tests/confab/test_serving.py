@@ -4,10 +4,14 @@ import http.client
 import json
 import random
 import socket
+import subprocess
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
+from statistics import median
 from time import monotonic, sleep
 from urllib.parse import urlencode
 
@@ -17,11 +21,13 @@ import urllib3
 from rdflib.plugins.stores.sparqlstore import SPARQLStore
 
 import confab
-from confab.serving import Server, serving
+from benchmarks.load import measured
+from confab.serving import AT_ONCE, Server, serving
 from reasoner.graph.apart import QueryLimits
 
 CUPS = "SELECT ?cup ?where WHERE { ?cup a k:Cup ; k:location ?where } ORDER BY ?cup"
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
+ASSERTED = "urn:confab:graph:asserted"
 FORM = "application/x-www-form-urlencoded"
 
 
@@ -130,7 +136,7 @@ def test_our_own_client_plans_at_it(server: Server) -> None:
         ("POST", "sparql", "{}", "application/json", 415),
         ("POST", "sparql", "", FORM, 400),
         ("GET", "nothing", None, None, 404),
-        ("PUT", "sparql", "x", "text/turtle", 501),
+        ("PUT", "sparql", "x", "text/turtle", 405),
         ("GET", "sparql?query=SELECT+*+{SERVICE+<http://127.0.0.1:9/>{?a+?b+?c}}", None, None, 400),
         ("GET", "sparql?query=SELECT+*+WHERE{?a+?b+?c.?d+?e+?f}", None, None, 500),
         ("GET", "sparql?query=SELECT+*+" + "{" * 3000 + "}" * 3000, None, None, 400),
@@ -142,18 +148,134 @@ def test_what_it_does_not_answer_has_a_status_and_a_line(
     headers = {"Content-Type": kind} if kind else {}
     answer = pool.request(method, server.url + path, body=body, headers=headers)
     assert answer.status == status, answer.data
-    if status != 501:
-        assert answer.data.count(b"\n") == 1
-        assert b"Traceback" not in answer.data
+    assert answer.data.count(b"\n") == 1
+    assert b"Traceback" not in answer.data
 
 
 def test_only_this_machine_is_answered(server: Server, pool: urllib3.PoolManager) -> None:
     url = f"{server.url}sparql?{urlencode({'query': CUPS})}"
     assert pool.request("GET", url, headers={"Host": "evil.example"}).status == 421
-    near = pool.request("OPTIONS", url, headers={"Origin": "http://localhost:8080"})
-    assert (near.status, near.headers["Access-Control-Allow-Origin"]) == (204, "http://localhost:8080")
-    far = pool.request("GET", url, headers={"Origin": "https://evil.example"})
-    assert "Access-Control-Allow-Origin" not in far.headers
+    asked = {"Origin": "http://localhost:8080", "Access-Control-Request-Method": "POST"}
+    near = pool.request("OPTIONS", url, headers=asked)
+    assert (near.status, near.headers["Access-Control-Allow-Origin"]) == (200, "http://localhost:8080")
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Origin": "https://evil.example"}, 403),
+        ({"Origin": "http://localhost.evil.example"}, 403),
+        ({"Origin": "http://[bad"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Sec-Fetch-Site": "cross-site"}, 403),
+        ({"Sec-Fetch-Site": "cross-site", "Origin": "http://localhost:8080"}, 200),
+        ({"Sec-Fetch-Site": "same-site", "Origin": "http://127.0.0.1:8080"}, 200),
+        ({"Sec-Fetch-Site": "same-origin"}, 200),
+        ({"Sec-Fetch-Site": "none"}, 200),
+    ],
+)
+def test_pages_of_other_sites_are_refused(
+    server: Server, pool: urllib3.PoolManager, headers: dict[str, str], status: int
+) -> None:
+    url = f"{server.url}sparql?{urlencode({'query': CUPS})}"
+    assert pool.request("GET", url, headers=headers).status == status
+    assert pool.request("POST", server.url + "sparql", fields={"query": CUPS}, headers=headers).status in (403, 415)
+
+
+@pytest.mark.parametrize(
+    ("request_head", "status"),
+    [
+        ("GET http://[bad/sparql HTTP/1.1\r\nHost: localhost", 421),
+        ("GET http://evil.example/sparql HTTP/1.1\r\nHost: localhost", 421),
+        ("GET http://localhost/view HTTP/1.1\r\nHost: evil.example", 200),
+        ("GET nowhere HTTP/1.1\r\nHost: localhost", 400),
+        (f"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: {'9' * 5000}", 400),
+        ("POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999", 413),
+        ("POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: -5", 400),
+        ("GET /sparql?default-graph-uri=a%20b&query=ASK%7B%7D HTTP/1.1\r\nHost: localhost", 400),
+        ("GET /sparql HTTP/1.1\r\nHost: localhost\r\nHost: localhost", 400),
+        ("GET /sparql HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade", 200),
+        ("GET /%00%ff HTTP/1.1\r\nHost: localhost", 404),
+    ],
+)
+def test_malformed_requests_have_a_status_and_leave_nothing_in_the_log(
+    server: Server, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str], request_head: str, status: int
+) -> None:
+    assert status_of(server, f"{request_head}\r\n\r\n".encode()) == status
+    assert (caplog.text, *capfd.readouterr()) == ("", "", "")
+
+
+def status_of(server: Server, request: bytes) -> int:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as client:
+        client.sendall(request)
+        return int(client.recv(12).split()[1])
+
+
+HEAVY = "SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i FILTER(?c != ?d && ?f != ?g) }"
+
+
+def sent(server: Server, query: str) -> socket.socket:
+    client = socket.create_connection(("127.0.0.1", server.port), timeout=30.0)
+    client.sendall(f"GET /sparql?{urlencode({'query': query})} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+    return client
+
+
+def running(server: Server) -> int:
+    return sum(AT_ONCE - lane.qsize() for lane in server.service.lanes)
+
+
+def test_a_client_that_leaves_ends_its_query(server: Server) -> None:
+    client = sent(server, HEAVY)
+    until(lambda: running(server) == 1)
+    client.close()
+    until(lambda: running(server) == 0)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    begin = monotonic()
+    while not condition():
+        assert monotonic() - begin < 4.0, "it didn't come in time"
+        sleep(0.01)
+
+
+def test_short_queries_do_not_wait_for_long_ones_whose_clients_stay(
+    pool: urllib3.PoolManager,
+) -> None:
+    with serving(confab.load("living-room"), 0) as served:
+        patient = [sent(served, HEAVY) for _ in range(8)]
+        url = f"{served.url}sparql?{urlencode({'query': 'ASK {}'})}"
+        assert all(pool.request("GET", url, timeout=5.0).json()["boolean"] for _ in range(5))
+        assert pool.request("GET", served.url + "view", timeout=5.0).status == 200
+        for client in patient:
+            client.close()
+
+
+@pytest.mark.parametrize(
+    ("fields", "answer"),
+    [
+        ({"query": "ASK FROM <urn:confab:graph:asserted> { :cup1 a k:Cup }"}, True),
+        ({"query": "ASK FROM <urn:confab:graph:memory> { :cup1 a k:Cup }"}, False),
+        ({"query": "ASK FROM NAMED <urn:confab:graph:asserted> { :cup1 a k:Cup }"}, False),
+        ({"query": "ASK FROM NAMED <urn:confab:graph:asserted> { GRAPH ?g { :cup1 a k:Cup } }"}, True),
+        ({"query": "ASK from # a comment\n<urn:confab:graph:memory> { ?from ?a 'FROM <x:y>' }"}, False),
+        ({"query": "PREFIX g: <urn:confab:graph:> ASK FROM g:asserted { :cup1 a k:Cup }"}, True),
+        ({"query": "ASK FROM <https://example.org/> { :cup1 a k:Cup }"}, 400),
+        ({"query": "ASK FROM <relative> { :cup1 a k:Cup }"}, 400),
+        ({"query": "ASK { :cup1 a k:Cup }", "default-graph-uri": "urn:confab:graph:memory"}, False),
+        ({"query": "ASK FROM <urn:confab:graph:memory> {:cup1 a k:Cup}", "default-graph-uri": ASSERTED}, True),
+        ({"query": "ASK { GRAPH ?g { :cup1 a k:Cup } }", "named-graph-uri": ASSERTED}, True),
+        ({"query": "ASK { GRAPH ?g { :cup1 a k:Cup } }", "default-graph-uri": ASSERTED}, False),
+        ({"query": "ASK {}", "default-graph-uri": "https://example.org/"}, 400),
+    ],
+)
+def test_the_dataset_that_is_named_is_asked_or_refused(
+    server: Server, pool: urllib3.PoolManager, fields: dict[str, str], answer: bool | int
+) -> None:
+    got = pool.request("GET", f"{server.url}sparql?{urlencode(fields)}")
+    if isinstance(answer, bool):
+        assert got.json()["boolean"] is answer
+    else:
+        assert (got.status, b"no graph is named" in got.data) == (answer, True)
 
 
 def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, pool: urllib3.PoolManager) -> None:
@@ -174,14 +296,14 @@ def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, 
         ]
         with socket.socket() as client:
             client.settimeout(20)
-            client.connect(("127.0.0.1", server.server_port))
+            client.connect(("127.0.0.1", server.port))
             client.sendall(texts[number % len(texts)])
             client.shutdown(socket.SHUT_WR)
             while client.recv(4096):
                 pass
 
     def whole(_: int) -> int:
-        connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
         connection.request("GET", path)
         answer = connection.getresponse()
         answer.read()
@@ -199,36 +321,30 @@ def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, 
     assert threading.active_count() < 120
 
 
-def test_clients_that_trickle_or_idle_hold_nobody_up(
+def test_the_connection_that_has_been_waited_for_longest_gives_place(
     monkeypatch: pytest.MonkeyPatch, pool: urllib3.PoolManager
 ) -> None:
-    monkeypatch.setattr("confab.serving.WAITING", 3)
-    monkeypatch.setattr("confab.serving.HURRIED", 0.2)
+    monkeypatch.setattr("confab.serving.MOST", 3)
     with serving(confab.load("living-room"), 0) as server:
-        slow = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(9)]
-        stop = threading.Event()
-
-        def trickle() -> None:
-            while not stop.wait(0.05):
-                for connection in slow:
-                    with suppress(OSError):
-                        connection.send(b"G")
-
-        trickling = threading.Thread(target=trickle)
-        trickling.start()
+        slow = [socket.create_connection(("127.0.0.1", server.port), timeout=5.0) for _ in range(5)]
+        slow[-1].sendall(b"GET / HT")
         assert pool.request("GET", server.url, timeout=10.0).status == 200
-        stop.set()
-        trickling.join()
+        with suppress(ConnectionError):
+            assert slow[0].recv(1) == b""
+        slow[-1].sendall(b"TP/1.1\r\nHost: localhost\r\n\r\n")
+        assert slow[-1].recv(12) == b"HTTP/1.1 200"
         for connection in slow:
             connection.close()
 
 
-@pytest.mark.parametrize("begun", [b"GET / HT", b"POST /sparql HTTP/1.1\r\nContent-Length: 99\r\n\r\n"])
+@pytest.mark.parametrize(
+    "begun", [b"GET / HT", b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99\r\n\r\n"]
+)
 def test_a_request_has_one_time_to_come_in_however_it_trickles(monkeypatch: pytest.MonkeyPatch, begun: bytes) -> None:
     monkeypatch.setattr("confab.serving.SLOWEST", 0.5)
     with (
         serving(confab.load("living-room"), 0) as server,
-        socket.create_connection(("127.0.0.1", server.server_port), timeout=10.0) as slow,
+        socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as slow,
     ):
         slow.sendall(begun)
         begin, answer = monotonic(), b""
@@ -244,13 +360,14 @@ def test_a_request_has_one_time_to_come_in_however_it_trickles(monkeypatch: pyte
         assert answer == b"" or b" 408 " in answer
 
 
-def test_it_ends_though_connections_wait_for_a_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("confab.serving.WAITING", 1)
-    monkeypatch.setattr("confab.serving.HURRIED", 60.0)
+def test_it_ends_though_connections_are_open_and_queries_run() -> None:
     with serving(confab.load("living-room"), 0) as server:
-        waiting = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(4)]
-        sleep(0.2)
-    for connection in waiting:
+        waiting = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(4)]
+        asking = [sent(server, HEAVY) for _ in range(4)]
+        until(lambda: running(server) > 0)
+        begin = monotonic()
+    assert monotonic() - begin < 3.0
+    for connection in waiting + asking:
         connection.close()
 
 
@@ -273,3 +390,33 @@ def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
         assert scene.execute(tell=look).reached
         assert "reached" in pool.request("GET", server.url + "view").data.decode()
     assert seen[-1] == "location7"
+
+
+def test_honest_requests_are_answered_beside_slow_abandoned_and_malformed_ones() -> None:
+    quiet, loaded, said = measured(1 / 60)
+    assert loaded.answers["honest", "200"] == len(loaded.seconds) == len(quiet.seconds) == 16
+    assert {kind for kind, _ in loaded.answers} == {"honest", "slow", "abandoned", "malformed"}
+    assert said == ""
+    assert median(loaded.seconds) < 20 * median(quiet.seconds)
+
+
+def test_a_query_ends_with_the_process_that_asked_it(tmp_path: Path) -> None:
+    code = "import sys, confab; print(flush=True); confab.load('living-room').query(sys.argv[1])"
+    with subprocess.Popen([sys.executable, "-c", code, HEAVY], stdout=subprocess.PIPE) as asking:
+        assert asking.stdout is not None and asking.stdout.readline()
+        until(lambda: len(workers(asking.pid)) == 2)
+        started = workers(asking.pid)
+        asking.kill()
+        asking.wait()
+        until(lambda: not any(alive(pid) for pid in started))
+
+
+def workers(parent: int) -> list[int]:
+    """Return the processes below another one."""
+    below = [int(pid) for file in Path(f"/proc/{parent}/task").glob("*/children") for pid in file.read_text().split()]
+    return below + [pid for child in below for pid in workers(child)]
+
+
+def alive(pid: int) -> bool:
+    stat = Path(f"/proc/{pid}/stat")
+    return stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z"
