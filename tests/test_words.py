@@ -1,4 +1,4 @@
-"""Docstrings, comments and messages name things: pronouns that stand for a missing noun only ever become fewer."""
+"""Docstrings, comments, messages and pages name things: pronouns that stand for a missing noun only ever become fewer."""
 
 import re
 from collections import Counter
@@ -9,8 +9,21 @@ PRONOUNS = re.compile(
     r"\b(somebody|anybody|nobody|whom|whoever|so many|so much|so often|as little as|of what|of whom)\b", re.IGNORECASE
 )
 LEFT: dict[str, int] = {
-    "confab": 32,
+    "confab": 31,
     "confab/commands": 3,
+    "docs/architecture.md": 2,
+    "docs/authoring.md": 15,
+    "docs/command-line.md": 1,
+    "docs/constants.md": 48,
+    "docs/inference.md": 3,
+    "docs/memory.md": 17,
+    "docs/pddl.md": 1,
+    "docs/promises.md": 4,
+    "docs/quantification.md": 1,
+    "docs/search.md": 7,
+    "docs/validation.md": 10,
+    "docs/vocabulary.md": 7,
+    "docs/worlds.md": 4,
     "planner": 7,
     "planner/acting": 8,
     "planner/experience": 50,
@@ -23,14 +36,19 @@ LEFT: dict[str, int] = {
     "reasoner/updates": 5,
     "reasoner/validation": 13,
 }
-"""Occurrences in the folders that are not rewritten yet; lower a number when a folder has fewer, and drop it at 0."""
+"""Occurrences in the folders and pages that are not rewritten yet; lower a number when there are fewer, and drop it at 0."""
+
+
+def pronouns(file: Path) -> int:
+    """Return the number of pronouns in a file, also those that a line break splits."""
+    return len(PRONOUNS.findall(" ".join(file.read_text(encoding="utf-8").split())))
 
 
 def test_the_pronouns_that_stand_for_a_missing_noun_become_fewer() -> None:
     found = Counter[str]()
     for room in ("ontology", "reasoner", "planner", "sim", "confab"):
         for file in sorted((ROOT / room).rglob("*.py")):
-            folder = file.parent.relative_to(ROOT).as_posix()
-            found[folder] += len(PRONOUNS.findall(" ".join(file.read_text(encoding="utf-8").split())))
-    more = {folder: (count, LEFT.get(folder, 0)) for folder, count in found.items() if count > LEFT.get(folder, 0)}
-    assert not more, f"folder: (occurrences, allowed): {more}; name the object, role, step or value instead"
+            found[file.parent.relative_to(ROOT).as_posix()] += pronouns(file)
+    found.update({file.relative_to(ROOT).as_posix(): pronouns(file) for file in (ROOT / "docs").glob("*.md")})
+    more = {place: (count, LEFT.get(place, 0)) for place, count in found.items() if count > LEFT.get(place, 0)}
+    assert not more, f"(occurrences, allowed): {more}; name the object, role, step or value instead"

@@ -71,7 +71,7 @@ def test_a_failure_shows_what_was_expected_and_seen_or_what_the_code_does_not_sa
     assert str(lost) == "slip or drop: jar1, it isn't in the hand"
     blocked = SkillError("goal in collision", ("tray1", "jar1"), clearance_m=-0.0034).verdict
     assert str(blocked) == "goal in collision: tray1, jar1 (clearance_m -0.0034)"
-    assert blocked.as_json()["message"] == "the hand, or what it holds, would touch something there"
+    assert blocked.as_json()["message"] == "the hand or its load would touch something there"
 
 
 def test_what_nothing_perceives_is_said_to_be_on_trust(scene: confab.Scene, report: Report) -> None:
