@@ -7,6 +7,7 @@ steps does what one of them says; `planner.validation` has the last word.
 from __future__ import annotations
 
 import io
+import logging
 import re
 import warnings
 from collections.abc import Iterator
@@ -28,10 +29,15 @@ from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Reason, Status
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import Deadline
+from reasoner.limits import Deadline, within
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import Problem, Symbol
 
+log = logging.getLogger(__name__)
+ENGINE_SECONDS = 60.0
+"""What an engine may take if nothing is said."""
+READING = 0.93
+"""Of its time, the share after which an engine is stopped: what is left is for reading and checking its plan."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines that take no amounts."""
 WITH_DEFINITIONS = {"up_fast_downward"}
@@ -52,14 +58,19 @@ def plan_by_engine(
         As unified-planning calls it, e.g. ``fast-downward``; any installed one that takes the problem if left out.
     level : int, optional
     seconds : float, optional
-        What exporting and the engine may take, where it can be told.
+        What all this may take; `ENGINE_SECONDS` if left out. A plan that the engine has written by then counts.
 
     Raises
     ------
     KnowledgeError
         There is no such engine or level, or something is defined or an amount, which this engine doesn't take.
     """
-    began, deadline = perf_counter(), Deadline.after(seconds)  # exporting and importing are slow, too
+    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:  # exporting and importing are slow, too
+        return _planned(problem, engine, level, deadline)
+
+
+def _planned(problem: Problem, engine: str | None, level: int | None, deadline: Deadline) -> Outcome:
+    began = perf_counter()
     level = problem.domain.levels[-1] if level is None else level
     if level not in problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
@@ -144,6 +155,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
         )
     first = engine or next((name for name in factory.preference_list if name in factory.engines), None)
     if first and issubclass(factory.engine(first), PDDLPlanner) and ":numeric-fluents" not in domain:
+        _tell(first, deadline)
         return first, *_directly(factory.engine(first)(), domain, problem, deadline)
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
@@ -164,13 +176,20 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
                 planner.skip_checks = True  # some say no to action costs, which they take
-                result = planner.solve(task, timeout=deadline.left)
                 name = engine or planner.name
+                _tell(name, deadline)
+                result = planner.solve(task, timeout=deadline.left)
         except UPException as error:
             raise KnowledgeError(f"no engine takes this problem: {' '.join(str(error).split())}") from None
     actions = result.plan.actions if result.plan is not None else ()
     lines = [" ".join((action.action.name, *map(str, action.actual_parameters))) for action in actions]
-    return name, result.status.name, lines
+    return name, "SOLVED_SATISFICING" if lines else result.status.name, lines
+
+
+def _tell(engine: str, deadline: Deadline) -> None:
+    """Say which engine is asked, and how long at most."""
+    limit = "" if deadline.left is None else f", for up to {deadline.left:.3g} s (--time-limit)"
+    log.warning("confab: the engine %s is asked for a plan%s; --engine none asks none", engine, limit)
 
 
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
@@ -187,14 +206,18 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         process = Popen(  # in a session of its own, since it has children
             planner._get_cmd(*map(str, files)), cwd=folder, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True
         )
+        code = None
         try:
-            code = process.wait(deadline.left)
+            code = process.wait(None if deadline.left is None else READING * deadline.left)
         except TimeoutExpired:
-            return "TIMEOUT", []
+            pass
         finally:
             if process.poll() is None:
                 killpg(process.pid, SIGKILL)
                 process.wait()
-        if files[2].exists():
-            return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", files[2].read_text(), re.MULTILINE)
-        return planner._result_status(Nothing(), None, code, []).name, []
+        written = [file for file in Path(folder).iterdir() if re.fullmatch(r"plan(\.\d+)?", file.name)]
+        for file in sorted(written, key=lambda file: file.stat().st_mtime_ns, reverse=True):
+            text = file.read_text()
+            if code is not None or text.endswith("\n"):  # else it was being written
+                return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", text, re.MULTILINE)
+        return "TIMEOUT" if code is None else planner._result_status(Nothing(), None, code, []).name, []

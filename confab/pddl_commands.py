@@ -11,10 +11,11 @@ from planner.grounded.grounding import ground
 from planner.grounded.plan_windows import regrouped, shortened
 from planner.grounded.task import Task
 from planner.paper.transitions import Model, Values
-from planner.plan import Plan, Step
+from planner.plan import Plan, Step, TooLargeError
 from reasoner.files import check_replaceable, write_whole
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
+from reasoner.limits import OutOfTimeError
 from reasoner.pddl.exporting import plan_of, to_pddl
 from reasoner.pddl.importing import imported
 from reasoner.pddl.syntax import PddlError, parse_files
@@ -116,8 +117,11 @@ def read_pddl_plan(
 
 
 def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:
-    """Return the steps regrouped; as they are, if they don't lead to the goal."""
-    task = ground(problem, level)
+    """Return the steps regrouped; as they are, if they don't lead to the goal or there is no time for it."""
+    try:
+        task = ground(problem, level)
+    except (OutOfTimeError, TooLargeError):
+        return plan
     if not isinstance(task, Task):
         return plan
     chosen = task.operators_of(plan)

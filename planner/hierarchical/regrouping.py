@@ -24,7 +24,10 @@ def under_the_levels_above(problem: Problem, plan: Plan) -> Plan:
     """
     steps = list(plan.steps)
     for level in reversed([level for level in problem.domain.levels if steps and level < steps[0].level]):
-        grouped = _grouped(problem, steps, level)
+        try:
+            grouped = _grouped(problem, steps, level)
+        except OutOfTimeError:  # the plan stays as it is
+            break
         if grouped == steps:
             break
         steps = grouped

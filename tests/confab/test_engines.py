@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from time import sleep
 from types import SimpleNamespace
@@ -186,6 +187,23 @@ def test_an_engine_is_stopped_at_the_time_limit_with_all_its_processes(tmp_path:
     assert engines._directly(slow, "", "", Deadline.after(0.1)) == ("TIMEOUT", [])
     sleep(1.1)
     assert not late.exists()
+
+
+def test_a_plan_that_an_engine_has_written_by_its_limit_counts() -> None:
+    pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
+    files = "printf '(a x)\\n(b y)\\n' > plan.1; sleep 0.01; printf '(a' > plan.2; printf '1 2' > plan_numbers; sleep 9"
+    slow = SimpleNamespace(_get_cmd=lambda *_: ["sh", "-c", files])
+    assert engines._directly(slow, "", "", Deadline.after(0.5)) == ("SOLVED_SATISFICING", ["a x", "b y"])
+
+
+def test_which_engine_is_asked_is_said_with_its_limit(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
+    monkeypatch.undo()
+    monkeypatch.setattr(engines, "_directly", lambda *_: ("TIMEOUT", []))
+    plan_by_engine(confab.load(SCENE).problem, None)
+    assert re.search(r"the engine fast-downward is asked for a plan, for up to [56]\d", caplog.text)
 
 
 def test_what_exporting_takes_is_taken_from_the_engines_time(monkeypatch: pytest.MonkeyPatch) -> None:
