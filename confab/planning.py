@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from confab.accepting import Facts, check_goal, number, several
+from confab.checking import refused
 from confab.interchange import outcome_json
 from confab.known import Known
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
@@ -181,8 +182,9 @@ def _plan(
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
     outcome = search(problem)
-    if outcome.status is Status.UNSOLVABLE and mode != "paper" and not observed:
-        # A "no" is worth a look at the whole world, whatever task recognition left out of it.
+    if not seen.whole and (
+        outcome.status is Status.UNSOLVABLE or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
+    ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
         if "reading" not in scene.__dict__:
             scene.reading = read(scene.knowledge, seen.schema)
             scene.knowledge.confirm()

@@ -48,6 +48,8 @@ Values: TypeAlias = "list[str]"
 Test: TypeAlias = "Callable[[Facts, Values], bool]"
 Candidates: TypeAlias = "Callable[[Facts, Values], Iterable[str]]"
 Change: TypeAlias = "tuple[str, Arguments, str]"
+Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
+"""Individuals that a check depends on: those that satisfy a witness's conditions at first, with its open terms as in each row."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +63,46 @@ class Fault:
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
     """Return what is wrong with a plan; nothing if it is one.
 
-    Checked are: every step's ID; on each level, every step's preconditions in the state in which it is done; that the
+    Checked are: every step's ID, and all that `carried_out` checks.
+    """
+    numbered = {step.path: problem.id_of(step.behavior, step.arguments) for step in plan.walk() if _fits(problem, step)}
+    wrong = [
+        Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {numbered[step.path]}")
+        for step in plan.walk()
+        if numbered.get(step.path, step.id) != step.id
+    ]
+    return carried_out(problem, plan) + wrong
+
+
+def _fits(problem: Problem, step: Step) -> bool:
+    """Whether a step has a number: its behaviour exists, and its arguments are of the classes of the parameters."""
+    behavior = problem.domain.behaviors.get(step.behavior)
+    if behavior is None or len(behavior.parameters) != len(step.arguments):
+        return False
+    return all(a in problem.members(p.kind) for p, a in zip(behavior.parameters, step.arguments, strict=True))
+
+
+def carried_out(
+    problem: Problem, plan: Plan, lookups: Lookups | None = None, lifted: Mapping[str, Behavior] | None = None
+) -> list[Fault]:
+    """Return what goes wrong where a plan is carried out on paper.
+
+    Checked are: on each level, every step's preconditions in the state in which it is done; that the
     refinement of a step leaves what that step says, as far as its level knows the symbols, and at rest what else it touched;
     and the goal. After a step that can't be done, nothing more is checked.
+
+    Parameters
+    ----------
+    problem : Problem
+    plan : Plan
+    lookups : dict, optional
+        Filled with the individuals on which the check depends. If the problem has all of them, every larger problem of the same
+        scene has the same faults.
+    lifted : mapping of name to behaviour, optional
+        The behaviours as they are before effects on each of a class are spread; what these change is then looked up, too.
     """
-    check = _Check(problem, max((step.level for step in plan.walk()), default=0))
+    rules = Rules(problem, lookups, lifted)
+    check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
     if check.carried_out(plan.steps, 0, (), "the plan"):
         for fact, got in _unreached(problem, check.facts):
             check.fault((), f"the goal {fact.symbol} = {fact.value} isn't reached: it is {got} in the end")
@@ -98,13 +135,13 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
 class _Check:
     """A plan carried out on paper: the facts so far, and what was wrong."""
 
-    def __init__(self, problem: Problem, depth: int) -> None:
+    def __init__(self, problem: Problem, depth: int, rules: Rules) -> None:
         self.problem = problem
         self.levels = problem.domain.levels
         self.rests = {name: kind.rest for name, kind in problem.domain.situations.items() if kind.rest is not None}
         self.depth = depth  # the lowest level that the plan speaks of
-        self.rules = Rules(problem)
-        self.facts = Facts(problem, problem.initial)
+        self.rules = rules
+        self.facts = Facts(problem, problem.initial, rules)
         self.faults: list[Fault] = []
 
     def fault(self, path: tuple[int, ...], text: str) -> None:
@@ -156,9 +193,6 @@ class _Check:
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
             return False
-        expected_id = self.problem.id_of(step.behavior, step.arguments)
-        if step.id != expected_id:
-            self.fault(step.path, f"{step}: its ID by the numbering of level {behavior.level} is {expected_id}")
         changes = self.rules.changes(behavior, step.arguments, self.facts)
         if changes is None:
             self.fault(step.path, f"{step}: its preconditions don't hold where it is done")
@@ -202,8 +236,9 @@ def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
 class Facts:
     """A state that remembers what was changed: ``log`` has what was overwritten, oldest first."""
 
-    def __init__(self, problem: Problem, state: State) -> None:
+    def __init__(self, problem: Problem, state: State, rules: Rules | None = None) -> None:
         self.problem = problem
+        self.rules = rules or Rules(problem)
         self.log: list[tuple[str, Arguments, str]] = []
         self._values: dict[str, dict[Arguments, str]] = {name: {} for name in problem.domain.situations}
         self._holders: dict[str, dict[str, dict[Arguments, None]]] = {}
@@ -221,8 +256,7 @@ class Facts:
 
     @cached_property
     def _definitions(self) -> Definitions:
-        rules = Rules(self.problem)
-        return Definitions(self.problem.domain.rules, lambda about, key: rules.follows(about, key, self))
+        return Definitions(self.problem.domain.rules, lambda about, key: self.rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
         """Return what is stated now."""
@@ -268,10 +302,16 @@ class Facts:
 
 
 class Rules:
-    """What the behaviours of one problem ask and do, each read when it is first asked for."""
+    """What the behaviours of one problem ask and do, each read when it is first asked for.
 
-    def __init__(self, problem: Problem) -> None:
+    `lookups` and `lifted` are as for `carried_out`.
+    """
+
+    def __init__(
+        self, problem: Problem, lookups: Lookups | None = None, lifted: Mapping[str, Behavior] | None = None
+    ) -> None:
         self.problem = problem
+        self.lookups, self.lifted = lookups, lifted or {}
         self._read: dict[str, _Behavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
         self._defined: dict[str, list[_Behavior]] = {}
@@ -303,6 +343,8 @@ class Rules:
         values = [*arguments, *read.terms[len(arguments) :]]
         if not _hold(read.preconditions, facts, values):
             return None
+        for tests in read.changed:
+            _hold(tests, facts, values.copy())
         found = []
         for when, situation, key, value in read.effects:
             inner = values
@@ -376,6 +418,14 @@ class _Behavior:
             if e.operation in operations
         ]
         self.price = None if behavior.price is None else worth(behavior.price, reading.key, rules.problem.relations)
+        lifted = rules.lifted.get(behavior.name, behavior)
+        self.changed = [  # which looks up every individual that an effect on each of a class can change, and never holds
+            reading.conjunction(
+                (*e.when, ClassCondition(e.each.name, "")), set(bound), {**kinds, e.each.name: e.each.kind}
+            )
+            for e in lifted.every_effect
+            if e.each is not None
+        ]
         self.terms = tuple(reading.places)
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
 
@@ -427,8 +477,11 @@ class _Reading:
                 waiting.remove(condition)
                 tests.append(self.given(condition, kinds[condition.value]))
             else:
+                candidates = self.candidates(condition, unknown, kinds)
+                if self.rules.lookups is not None:
+                    candidates = self.noted(candidates, unknown[0], kinds[unknown[0]], waiting, bound)
                 rest = self.conjunction([*waiting, *nested], bound, kinds)
-                return [*tests, self.choice(condition, unknown, kinds, rest)]
+                return [*tests, self.choice(candidates, unknown[0], kinds[unknown[0]], rest)]
         return tests + [self.test(condition, bound, kinds) for condition in nested]
 
     def given(self, condition: ValueCondition, kind: str) -> Test:
@@ -444,12 +497,9 @@ class _Reading:
 
         return given
 
-    def choice(
-        self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str], rest: Sequence[Test]
-    ) -> Test:
-        """Return whether the rest holds with one of those for the first unknown variable that could satisfy a condition."""
-        place, members = self.place(unknown[0]), self.problem.members(kinds[unknown[0]])
-        candidates = self.candidates(condition, unknown, kinds)
+    def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
+        """Return whether the rest holds with one of some candidates for a variable."""
+        place, members = self.place(variable), self.problem.members(kind)
 
         def some(facts: Facts, values: Values) -> bool:
             for candidate in candidates(facts, values):
@@ -460,6 +510,24 @@ class _Reading:
             return False
 
         return some
+
+    def noted(
+        self, candidates: Candidates, variable: str, kind: str, conditions: Sequence[Condition], bound: set[str]
+    ) -> Candidates:
+        """Return candidates that are put down where they are looked for, as those that satisfy what is known of them at first.
+
+        An individual that the problem doesn't have keeps its values, as no step names it.
+        """
+        asked = tuple(c for c in conditions if variable in _plain(c) <= bound)
+        known = tuple(sorted(set().union(*map(_plain, asked)) - {variable}))
+        assert self.rules.lookups is not None
+        rows, key = self.rules.lookups.setdefault((Witness(variable, kind, asked), known), set()), self.key(known)
+
+        def noting(facts: Facts, values: Values) -> Iterable[str]:
+            rows.add(key(values))
+            return candidates(facts, values)
+
+        return noting
 
     def candidates(self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str]) -> Candidates:
         """Return those that the first unknown variable of a condition could be."""

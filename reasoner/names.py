@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 
@@ -35,6 +35,11 @@ class Names:
     def iri(self, name: str) -> str:
         """Return the IRI behind a short name; raises `KeyError` if there is none."""
         return self._iris[name]
+
+    @property
+    def iris(self) -> Collection[str]:
+        """The IRIs that have names."""
+        return self._names.keys()
 
     def agree(self, other: Names) -> bool:
         """Tell whether all that has a name here has the same one there."""

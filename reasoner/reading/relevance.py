@@ -14,7 +14,6 @@ behaviour changes besides is in the slice as well; so planning in it and plannin
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -28,9 +27,9 @@ from reasoner.language import terms
 from reasoner.limits import check
 from reasoner.names import local_name
 from reasoner.reading.goals import BOUNDS, with_goals
+from reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
 from reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
-from reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Node, Schema, Triple, index_of, link, stated
-from reasoner.reading.swrl import SWRL
+from reasoner.reading.rows import Member, Schema, Triple
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -45,15 +44,10 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, PREFIXES, RDF, TYPE
+from reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
 """Queries that follow routes one step each; what lies farther is closed by a property path, of which the last is one."""
-PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
-"""What leads from a fact that is a node of its own to the individuals in it."""
-NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
-INDEX = CORE + "index"
-FACT = CORE + "SituatedObjectInstance"
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # the cheapest of the steps that reach a term is taken
 
 
@@ -97,7 +91,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ('bottle1', 'bottle2', 'cup1', 'cup2')
     """
     schema = read_schema(graph)
-    constants = _constants(schema)
+    constants = constants_of(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)
     search = _Search(graph, schema)
     if nameless := sorted(term for term in seeds | constants if ":" not in term):
@@ -329,61 +323,8 @@ def _situations(condition: Condition) -> Iterable[str]:
 # ------------------------------------------------------------------------------------------------- 2. following it
 
 
-class _Search:
-    """What was read of the individuals so far.
-
-    Attributes
-    ----------
-    triples : set of triples
-        All that is said of those in `seen`, and what was found backward of others, in the order of reading.
-    seen : set of individuals
-    """
-
-    def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
-        self.graph, self.schema = graph, schema
-        self.subclasses: dict[str, list[str]] = {}
-        for kind, supers in schema.supers.items():
-            for above in supers:
-                self.subclasses.setdefault(above, []).append(kind)
-        self.triples: dict[Triple, None] = {}
-        self.seen: set[str] = set()
-        values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
-        self.links = {*PLACES, *values, *schema.nodes}  # by which facts are said
-
-    def visit(
-        self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
-    ) -> list[Triple]:
-        """Read what is said of some individuals and of those of some classes, and by whom others are named backward."""
-        parts = [f"{{ VALUES ?s {{ {_values(individuals)} }} ?s ?p ?o }}"] if individuals else []
-        for name, whom in (back or {}).items():
-            if not whom:
-                continue
-            if name in PLACES:
-                parts.append(
-                    f"{{ VALUES ?x {{ {_values(whom)} }} ?s <{name}> ?x ; ?p ?o . ?s a :SituatedObjectInstance }}"
-                )
-            else:
-                parts.append(
-                    f"{{ SELECT ?s (<{name}> AS ?p) ?o WHERE {{ VALUES ?o {{ {_values(whom)} }} ?s <{name}> ?o }} }}"
-                )
-        for kind in classes:
-            parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
-        rows = []
-        links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
-        for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
-            subject, said = text(s), text(p)
-            names = isinstance(o, ox.NamedNode)
-            if said in numbers:
-                rows.append(stated((s, p, o), numbers))
-                continue
-            if not names and said in links and subject not in nodes:
-                link((s, p, o))  # says what is wrong with it
-            if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
-                rows.append((subject, said, text(o)))
-        self.triples.update(dict.fromkeys(rows))
-        kinds = self._below(classes)
-        self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
-        return rows
+class _Search(Individuals):
+    """What recognition has read so far, and where it leads."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
         """Follow the routes from what was read first until nothing new comes, by rounds and then by one property path."""
@@ -407,7 +348,7 @@ class _Search:
 
     def _follow(self, triples: Sequence[Triple], bounds: Routes, reached: set[str]) -> None:
         """Add to `reached` where some triples lead."""
-        kinds = self._below(bounds.classes)
+        kinds = self.below(bounds.classes)
         facts = set[str]()
         backward = bounds.backward.keys() - {*PLACES}
         nodes, forward = self.schema.nodes, bounds.forward
@@ -424,15 +365,6 @@ class _Search:
         if facts:
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
-    def _below(self, classes: Iterable[str]) -> set[str]:
-        """Return some classes with their subclasses."""
-        found, waiting = set[str](), [*classes]
-        while waiting:
-            if (kind := waiting.pop()) not in found:
-                found.add(kind)
-                waiting += self.subclasses.get(kind, ())
-        return found
-
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
         """Read everything that the routes reach from a frontier; a path can't tell constants, so it may be more."""
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
@@ -440,47 +372,12 @@ class _Search:
             node = "|".join(f"<{p}>" for p in PLACES)
             ways.append(f"(^({node})/({node}))")
         rows = self.graph.select(
-            f"SELECT DISTINCT ?x WHERE {{ VALUES ?seed {{ {_values(frontier)} }} ?seed ({'|'.join(ways)})* ?x "
+            f"SELECT DISTINCT ?x WHERE {{ VALUES ?seed {{ {values_of(frontier)} }} ?seed ({'|'.join(ways)})* ?x "
             "FILTER(isIRI(?x)) }",
             SCENE,
         )
         far = {text(x) for (x,) in rows} - self.schema.nodes.keys()
         self.visit(far - self.seen, {CORE + "about": far} if self.schema.tuples else None)
-
-    def members(self) -> list[Member]:
-        """Return what was read as individuals of classes."""
-        named = set[str]()
-        kinds: list[tuple[str, str]] = []
-        indices: dict[str, int] = {}
-        for s, p, o in self.triples:
-            if p == TYPE and o == INDIVIDUAL:
-                named.add(s)
-            elif p == TYPE and not o.startswith(OWL):
-                kinds.append((s, o))
-            elif p == INDEX:
-                indices[s] = min(index_of(s, o), indices.get(s, FIRST_INDEX_OF_NONE))
-        named &= self.seen
-        return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
-
-    def facts(self, known: Frame) -> list[Triple]:
-        """Return the values and relations that were read, between individuals whose own triples were read."""
-        wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
-        return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
-
-    def tuples(self) -> dict[str, Node]:
-        """Return the facts that are nodes of their own, as far as all individuals in them were read."""
-        nodes = self.schema.nodes
-        facts = (
-            {s for s, p, o in self.triples if p == TYPE and o == FACT} - nodes.keys() if self.schema.tuples else set()
-        )
-        found: dict[str, dict[str, list[str]]] = {}
-        for s, p, o in sorted(triple for triple in self.triples if triple[0] in facts):
-            found.setdefault(s, {}).setdefault(p, []).append(o)
-        return {
-            s: node
-            for s, node in found.items()
-            if all(o in self.seen for p in PLACES for o in node.get(p, ()) if o not in nodes)
-        }
 
 
 def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
@@ -496,7 +393,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     if not candidates:
         return set()
     rows = graph.select(
-        f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {_values(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual, ?kind "
+        f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {values_of(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual, ?kind "
         "FILTER(isIRI(?kind) && !STRSTARTS(STR(?kind), STR(owl:))) } AS ?named) "
         "FILTER(?named || EXISTS { ?member a ?x }) }",
         SCENE,
@@ -505,7 +402,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     doubtful = {text(x) for x, named in rows if text(named) != TRUE}
     doubtful &= {kind for node in schema.nodes.values() for kind in node.get(TYPE, ())}
     if doubtful:
-        query = f"SELECT DISTINCT ?x ?member WHERE {{ VALUES ?x {{ {_values(doubtful)} }} ?member a ?x, owl:NamedIndividual }}"
+        query = f"SELECT DISTINCT ?x ?member WHERE {{ VALUES ?x {{ {values_of(doubtful)} }} ?member a ?x, owl:NamedIndividual }}"
         found -= doubtful
         found |= {text(x) for x, member in graph.select(query, SCENE) if text(member) not in schema.nodes}
     return found
@@ -521,36 +418,13 @@ def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[
     return found
 
 
-def _values(iris: Iterable[str]) -> str:
-    """Return IRIs as they stand in a VALUES clause; what people wrote and is no IRI is left out."""
-    return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
-
-
-def _constants(schema: Schema) -> set[str]:
-    """Return what the schema names: in conditions, effects and definitions of classes, and as rest and default values."""
-    goals = _goal_conditions(schema)
-    names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
-    found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
-    named = (OWL + "hasValue", RDF + "first")
-    found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}
-    if schema.swrl:
-        known = {*schema.swrl, *schema.supers, *chain.from_iterable(schema.supers.values())}
-        said = (*named, *(SWRL + f"argument{place}" for place in (1, 2)))
-        found |= {v for node in schema.swrl.values() for name in said for v in node.get(name, ()) if ":" in v} - known
-    return (found - set(schema.nodes) - schema.individuals_of) | {CORE + "true", CORE + "false"}
-
-
-def _goal_conditions(schema: Schema) -> set[str]:
-    return {iri for node in schema.nodes.values() for iri in node.get(CORE + "goal", ())}
-
-
 def _goal_situations(schema: Schema) -> set[str]:
-    return {s for iri in _goal_conditions(schema) for s in schema.nodes.get(iri, {}).get(CORE + "situationType", ())}
+    return {s for iri in goal_conditions(schema) for s in schema.nodes.get(iri, {}).get(CORE + "situationType", ())}
 
 
 def _goal_individuals(schema: Schema) -> set[str]:
     """Return what the goals and the facts about nobody name."""
-    goals = [schema.nodes.get(iri, {}) for iri in _goal_conditions(schema)]
+    goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
     named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}
     return named - schema.individuals_of
@@ -558,7 +432,7 @@ def _goal_individuals(schema: Schema) -> set[str]:
 
 def _goal_classes(schema: Schema) -> set[str]:
     """Return the classes of which goals want something of all individuals, or another value than they name."""
-    goals = [schema.nodes.get(iri, {}) for iri in _goal_conditions(schema)]
+    goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
     negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))
     return wanted | {v for node in negated for v in node.get(CORE + "situationType", ()) if v not in schema.pairs}
@@ -574,7 +448,7 @@ def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[s
         return set()
     spaces = _spaces(graph, schema, chain(schema.nodes, schema.supers, _goal_individuals(schema)))
     rows = graph.select(
-        f"SELECT ?x WHERE {{ VALUES ?x {{ {_values(space + word for space in spaces for word in words)} }} "
+        f"SELECT ?x WHERE {{ VALUES ?x {{ {values_of(space + word for space in spaces for word in words)} }} "
         "FILTER EXISTS { ?x a owl:NamedIndividual } }",
         SCENE,
     )

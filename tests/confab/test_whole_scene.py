@@ -1,11 +1,25 @@
 """A plan that leaves is one of the whole scene, whatever was read of it for planning."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import event, given, settings
+from hypothesis import strategies as st
 
 import confab
-from planner.plan import Status
+from confab.checking import refused
+from planner.plan import Plan, Status, Step
+from planner.validation import carried_out, successor, validate
+from reasoner.graph.knowledge import KnowledgeError
+from reasoner.language import DomainError
+from reasoner.reading import relevance
+from reasoner.reading.problem import read
+from reasoner.reading.rows import Triple
+from reasoner.symbols import Problem, State
+from tests.reasoner.worlds import graph_of, worlds
 
 CASES = Path(__file__).parent / "cases"
 MODES = ("guarded", "strict", "optimal", "paper")
@@ -21,3 +35,78 @@ def test_an_effect_on_a_class_asks_the_bounds_of_each_of_its_amounts(mode: str) 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: str) -> None:
     assert confab.load(CASES / "lamps-without-oil.ttl").plan(mode=mode).outcome.status is Status.UNSOLVABLE
+
+
+class Forgetful:
+    """Task recognition with a fault: of the individuals that no goal or behaviour names it loses one, or none if `lost` is None."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.lost: int | None = None
+        close = relevance._Search.close
+
+        def closed(
+            search: relevance._Search, fresh: list[Triple], constants: set[str], bounds: relevance.Routes
+        ) -> None:
+            close(search, fresh, constants, bounds)
+            if self.lost is not None and (found := sorted(search.seen - {s for s, _, _ in fresh})):
+                search.seen.remove(found[self.lost % len(found)])
+
+        patch.setattr(relevance._Search, "close", closed)
+
+
+@pytest.fixture(scope="module")
+def forgetful() -> Iterator[Forgetful]:
+    """Recognition that leaves an individual out."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield Forgetful(patch)
+
+
+def walk(problem: Problem, chance: Random) -> Plan:
+    """Return up to three steps that can be done one after the other."""
+    state: State = problem.initial
+    steps: list[Step] = []
+    behaviors = [*problem.domain.behaviors.values()]
+    for _ in range(200):
+        behavior = chance.choice(behaviors)
+        members = [problem.classes.get(p.kind, ()) for p in behavior.parameters]
+        if len(steps) == 3 or not all(members):
+            continue
+        arguments = tuple(map(chance.choice, members))
+        if (after := successor(problem, behavior, arguments, state)) is not None:
+            number = problem.id_of(behavior.name, arguments)
+            steps.append(Step((len(steps),), number, behavior.level, behavior.name, arguments))
+            state = after
+    return Plan(tuple(steps))
+
+
+@settings(max_examples=60)
+@given(text=worlds(), seed=st.integers(0, 1000))
+def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: Forgetful, text: str, seed: int) -> None:
+    """Whatever individual recognition loses, of steps that can be done without it those are refused that can't be done with it."""
+    with TemporaryDirectory() as folder:
+        graph = graph_of(text, Path(folder))
+    whole = read(graph)
+    forgetful.lost = seed
+    try:
+        part = relevance.recognise(graph)
+        plan = walk(part.problem, Random(seed))
+    except (KnowledgeError, DomainError):
+        return
+    finally:
+        forgetful.lost = None
+    expected = carried_out(whole.problem, plan)
+    faults = carried_out(part.problem, plan)
+    event("a plan in the slice alone" if expected and not faults else "the same")
+    event("can be done" if all(fault.path == () for fault in expected) else "can't be done")
+    assert refused(graph, part, plan) == expected
+
+
+def test_a_plan_that_the_scene_refuses_is_made_anew_in_the_whole_scene(forgetful: Forgetful) -> None:
+    scene = confab.load(CASES / "lamps.ttl")
+    forgetful.lost = 0
+    try:
+        result = scene.plan()
+    finally:
+        forgetful.lost = None
+    assert [step.behavior for step in result.plan.steps] == ["FILL", "BURN"]
+    assert not validate(result.problem, result.plan)

@@ -1,0 +1,43 @@
+"""A plan made in a part of a scene, checked against the scene itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from planner.plan import Plan
+from planner.validation import Fault, Lookups, carried_out
+from reasoner.graph.knowledge import KnowledgeGraph
+from reasoner.limits import Deadline
+from reasoner.reading.goals import parse_fact
+from reasoner.reading.problem import Reading
+from reasoner.reading.surroundings import Surroundings
+
+
+def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:
+    """Return what the whole scene finds wrong with a plan that was made in a slice of it; nothing if it is a plan there.
+
+    The plan is carried out among its own individuals, and the checker says whom each condition, effect and goal depends on.
+    The graph is asked for all of these until none is missing; what task recognition left out plays no part.
+
+    Parameters
+    ----------
+    graph : KnowledgeGraph
+    slice_ : Reading
+        What the plan was made in.
+    plan : Plan
+    goals : sequence of str
+        Goals that replaced some of the task's.
+    """
+    given = dict(parse_fact(slice_.problem, goal) for goal in goals)
+    with graph.until(Deadline()):  # the plan is there, and its check is short beside the search
+        around = Surroundings(graph, slice_)
+        while True:
+            if not around.agree:
+                return [Fault((), "another individual has a name that the plan uses")]
+            lookups: Lookups = {}
+            problem = around.problem()
+            problem = replace(problem, goal={**problem.goal, **given})
+            faults = carried_out(problem, plan, lookups, around.lifted)
+            if not around.widen(lookups):
+                return faults

@@ -1,0 +1,146 @@
+"""What is said of some individuals of a scene, read by queries whose size is theirs and not the scene's."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from itertools import chain
+
+import pyoxigraph as ox
+
+from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from reasoner.reading.problem import Frame
+from reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Node, Schema, Triple, index_of, link, stated
+from reasoner.reading.swrl import SWRL
+from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
+
+PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
+"""What leads from a fact that is a node of its own to the individuals in it."""
+NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
+INDEX = CORE + "index"
+FACT = CORE + "SituatedObjectInstance"
+
+
+class Individuals:
+    """What was read of some individuals so far.
+
+    Attributes
+    ----------
+    triples : set of triples
+        All that is said of those in `seen`, and what was found backward of others, in the order of reading.
+    seen : set of individuals
+    """
+
+    def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
+        self.graph, self.schema = graph, schema
+        self.subclasses: dict[str, list[str]] = {}
+        for kind, supers in schema.supers.items():
+            for above in supers:
+                self.subclasses.setdefault(above, []).append(kind)
+        self.triples: dict[Triple, None] = {}
+        self.seen: set[str] = set()
+        values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
+        self.links = {*PLACES, *values, *schema.nodes}  # by which facts are said
+
+    def visit(
+        self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
+    ) -> list[Triple]:
+        """Read what is said of some individuals and of those of some classes, and by whom others are named backward."""
+        parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
+        for name, whom in (back or {}).items():
+            if not whom:
+                continue
+            if name in PLACES:
+                parts.append(
+                    f"{{ VALUES ?x {{ {values_of(whom)} }} ?s <{name}> ?x ; ?p ?o . ?s a :SituatedObjectInstance }}"
+                )
+            else:
+                parts.append(
+                    f"{{ SELECT ?s (<{name}> AS ?p) ?o WHERE {{ VALUES ?o {{ {values_of(whom)} }} ?s <{name}> ?o }} }}"
+                )
+        for kind in classes:
+            parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
+        rows = []
+        links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
+        for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
+            subject, said = text(s), text(p)
+            names = isinstance(o, ox.NamedNode)
+            if said in numbers:
+                rows.append(stated((s, p, o), numbers))
+                continue
+            if not names and said in links and subject not in nodes:
+                link((s, p, o))  # says what is wrong with it
+            if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
+                rows.append((subject, said, text(o)))
+        self.triples.update(dict.fromkeys(rows))
+        kinds = self.below(classes)
+        self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}
+        return rows
+
+    def below(self, classes: Iterable[str]) -> set[str]:
+        """Return some classes with their subclasses."""
+        found, waiting = set[str](), [*classes]
+        while waiting:
+            if (kind := waiting.pop()) not in found:
+                found.add(kind)
+                waiting += self.subclasses.get(kind, ())
+        return found
+
+    def members(self) -> list[Member]:
+        """Return what was read as individuals of classes."""
+        named = set[str]()
+        kinds: list[tuple[str, str]] = []
+        indices: dict[str, int] = {}
+        for s, p, o in self.triples:
+            if p == TYPE and o == INDIVIDUAL:
+                named.add(s)
+            elif p == TYPE and not o.startswith(OWL):
+                kinds.append((s, o))
+            elif p == INDEX:
+                indices[s] = min(index_of(s, o), indices.get(s, FIRST_INDEX_OF_NONE))
+        named &= self.seen
+        return [(s, kind, indices.get(s, FIRST_INDEX_OF_NONE)) for s, kind in kinds if s in named]
+
+    def facts(self, known: Frame) -> list[Triple]:
+        """Return the values and relations that were read, between individuals whose own triples were read."""
+        wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
+        return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
+
+    def tuples(self) -> dict[str, Node]:
+        """Return the facts that are nodes of their own, as far as all individuals in them were read."""
+        nodes = self.schema.nodes
+        facts = (
+            {s for s, p, o in self.triples if p == TYPE and o == FACT} - nodes.keys() if self.schema.tuples else set()
+        )
+        found: dict[str, dict[str, list[str]]] = {}
+        for s, p, o in sorted(triple for triple in self.triples if triple[0] in facts):
+            found.setdefault(s, {}).setdefault(p, []).append(o)
+        return {
+            s: node
+            for s, node in found.items()
+            if all(o in self.seen for p in PLACES for o in node.get(p, ()) if o not in nodes)
+        }
+
+
+def values_of(iris: Iterable[str]) -> str:
+    """Return IRIs as they stand in a VALUES clause; what people wrote and is no IRI is left out."""
+    return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
+
+
+def constants_of(schema: Schema) -> set[str]:
+    """Return the individuals that the schema names: in conditions, effects, definitions, and as rest and default values."""
+    goals = goal_conditions(schema)
+    names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
+    found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
+    named = (OWL + "hasValue", RDF + "first")
+    found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}
+    if schema.swrl:
+        known = {*schema.swrl, *schema.supers, *chain.from_iterable(schema.supers.values())}
+        said = (*named, *(SWRL + f"argument{place}" for place in (1, 2)))
+        found |= {v for node in schema.swrl.values() for name in said for v in node.get(name, ()) if ":" in v} - known
+    return (found - set(schema.nodes) - schema.individuals_of) | {CORE + "true", CORE + "false"}
+
+
+def goal_conditions(schema: Schema) -> set[str]:
+    """Return the conditions that are goals of a task."""
+    return {iri for node in schema.nodes.values() for iri in node.get(CORE + "goal", ())}

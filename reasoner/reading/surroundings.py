@@ -1,0 +1,153 @@
+"""A part of a scene that grows by what a check depends on, read without the routes of task recognition.
+
+A checker says which individuals it looks for: those of a class that satisfy conditions at first. The graph is asked for all of
+them, by one query. What was found is read with the values that it leads to, until nothing that is looked for is missing.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TypeAlias
+
+from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
+from reasoner.reading.problem import Frame, Reading, frame, reading_of
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    Behavior,
+    Condition,
+    Problem,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+from reasoner.vocabulary import CORE, TYPE
+
+Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
+"""Situation types or relations as IRIs, each with the places where the individual stands that is looked for."""
+
+
+class Surroundings:
+    """Individuals of a scene with all that is said of them: at first those of a slice, of classes in goals, and constants.
+
+    Attributes
+    ----------
+    individuals : Individuals
+        What was read.
+    """
+
+    def __init__(self, graph: KnowledgeGraph, slice_: Reading) -> None:
+        self.graph, self.schema, self.names = graph, slice_.schema, slice_.names
+        self.individuals = Individuals(graph, self.schema)
+        self.forward = {
+            p
+            for s in self.schema.of_kind("SituationType")
+            for p in self.schema.nodes[s].get(CORE + "valueProperty", ())
+        } - self.schema.numbers
+        known = {name for members in slice_.problem.classes.values() for name in members}
+        self._add({self.names.iri(name) for name in known} | constants_of(self.schema), self._classes_of_goals())
+        self._known: Frame | None = None
+
+    def _classes_of_goals(self) -> set[str]:
+        """Return every class that a goal names, and that of the values where a goal excludes one."""
+        goals = [self.schema.nodes.get(iri, {}) for iri in goal_conditions(self.schema)]
+        named = {v for node in goals for values in node.values() for v in values}
+        values = {v for node in goals if CORE + "negated" in node for v in node.get(CORE + "situationType", ())}
+        return (named & self.schema.individuals_of) | (values - self.schema.pairs)
+
+    def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
+        """Read some individuals, those of some classes, and all to which their values lead."""
+        seen, nodes = self.individuals.seen, self.schema.nodes
+        while fresh or classes:
+            rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)
+            facts = {s for s, p, o in rows if p == TYPE and o == FACT}
+            led = {o for s, p, o in rows if p in self.forward or (s in facts and p in PLACES)}
+            fresh, classes = {iri for iri in led if ":" in iri} - seen - nodes.keys(), ()
+
+    @property
+    def frame(self) -> Frame:
+        """The behaviours and classes of what was read."""
+        if self._known is None:
+            self._known = frame(self.schema, self.individuals.members(), self.names.iris)
+        return self._known
+
+    @property
+    def agree(self) -> bool:
+        """Whether everything in the slice has the same name here."""
+        return self.names.agree(self.frame.names)
+
+    @property
+    def lifted(self) -> Mapping[str, Behavior]:
+        """The behaviours with effects on each of a class still in one."""
+        return self.frame.lifted
+
+    def problem(self) -> Problem:
+        """Return the planning problem of what was read."""
+        facts, tuples = self.individuals.facts(self.frame), self.individuals.tuples()
+        return reading_of(self.graph.scene, self.frame, facts, tuples, whole=False).problem
+
+    def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
+        """Read whom some lookups find, of each witness with its open terms as in each row; whether there was anything new."""
+        classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
+        for (witness, known), rows in lookups.items():
+            for row in rows:
+                terms = dict(zip(known, row, strict=True))
+                asked = [*self._asked(witness.variable, (substituted(c, terms) for c in witness.conditions))]
+                if asked:
+                    shape = tuple((name, tuple(t is None for t in about)) for name, about in asked)
+                    shapes[shape].add(tuple(t for _, about in asked for t in about if t is not None))
+                else:
+                    classes.add(witness.kind)
+        parts = [self._pattern(shape, rows) for shape, rows in sorted(shapes.items())]
+        parts += [
+            f"{{ ?x a owl:NamedIndividual ; a/rdfs:subClassOf* <{self.names.iri(name)}> }}"
+            for kind in sorted(classes)
+            for name in kind.split("|")
+        ]
+        if not parts:
+            return False
+        rows_found = self.graph.select("SELECT DISTINCT ?x WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE)
+        fresh = {text(x) for (x,) in rows_found} - self.individuals.seen - self.schema.nodes.keys()
+        self._add(fresh)
+        if fresh:
+            self._known = None
+        return bool(fresh)
+
+    def _asked(self, variable: str, conditions: Iterable[Condition]) -> Iterator[tuple[str, tuple[str | None, ...]]]:
+        """Yield the conditions whose facts are stated where they hold, each by its IRI and terms, with None for the variable."""
+        iri, situations, rules = self.names.iri, self.frame.domain.situations, self.frame.domain.rules
+        for condition in conditions:
+            match condition:
+                case RelationCondition(relation, about, False):
+                    name, terms = iri(relation), about
+                case ValueCondition(situation, about, value, False) if value != FALSE and situation not in rules:
+                    kind = situations[situation]
+                    if kind.quantity is not None or (not kind.boolean and kind.default == value):
+                        continue
+                    name, terms = iri(situation), about if value == TRUE else (*about, value)
+                case _:
+                    continue
+            yield name, tuple(None if t == variable else iri(t) for t in terms)
+
+    def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
+        """Return a graph pattern that binds ``?x`` to all of whom facts are stated, with the known terms as in each row."""
+        number, parts = 0, []
+        at = "|".join(f"<{place}>" for place in PLACES)
+        for i, (name, places) in enumerate(shape):
+            terms = []
+            for open_ in places:
+                terms.append("?x" if open_ else f"?k{number}")
+                number += not open_
+            ways = [" ; ".join([f"?f{i} :situationType|:relation <{name}>", *(f"{at} {term}" for term in terms)])]
+            properties = self.schema.nodes[name].get(CORE + "valueProperty", [name])
+            direct = [f"{terms[0]} <{p}> {terms[1]}" for p in properties] if len(terms) == 2 else []
+            ways = (ways if self.schema.tuples else []) + direct
+            parts.append("{ " + " } UNION { ".join(ways or ["FILTER(false)"]) + " }")
+        if not number:
+            return "{ " + " ".join(parts) + " }"
+        head = " ".join(f"?k{i}" for i in range(number))
+        values = " ".join(f"({values_of(row)})" for row in sorted(rows))
+        return f"{{ VALUES ({head}) {{ {values} }} {' '.join(parts)} }}"
