@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from planner.checked_conditions import Lookups
 from planner.plan import Plan
-from planner.validation import Fault, Lookups, carried_out
+from planner.validation import Fault, carried_out
 from reasoner.graph.knowledge import KnowledgeGraph
-from reasoner.limits import Deadline
+from reasoner.limits import overtime
 from reasoner.reading.goals import parse_fact
 from reasoner.reading.problem import Reading
 from reasoner.reading.surroundings import Surroundings
@@ -17,7 +18,7 @@ from reasoner.reading.surroundings import Surroundings
 def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:
     """Return what the whole scene finds wrong with a plan that was made in a slice of it; nothing if it is a plan there.
 
-    The plan is carried out among its own individuals, and the checker says whom each condition, effect and goal depends on.
+    The plan is carried out among its own individuals, and the checker says which others each condition and effect depends on.
     The graph is asked for all of these until none is missing; what task recognition left out plays no part.
 
     Parameters
@@ -30,7 +31,7 @@ def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[
         Goals that replaced some of the task's.
     """
     given = dict(parse_fact(slice_.problem, goal) for goal in goals)
-    with graph.until(Deadline()):  # the plan is there, and its check is short beside the search
+    with overtime():
         around = Surroundings(graph, slice_)
         while True:
             if not around.agree:

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 
+from planner.checked_conditions import Arguments
 from planner.plan import Plan, Step
-from planner.validation import Arguments, Cell, Facts, Rules
+from planner.validation import Cell, Facts, Rules
 from reasoner.amounts import meets, written
 from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 

@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from planner.causal_links import on_level
+from planner.checked_conditions import Bindings
 from planner.levels import lacking
 from planner.plan import Outcome, Plan, Reason, Step, renumbered
 from planner.plan_costs import cost_of
-from planner.validation import Bindings, Facts, Rules, successor, validate
+from planner.validation import Facts, Rules, successor, validate
 from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]

@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from planner.checked_conditions import Bindings
 from planner.plan import Broken, Left, Plan, Step
-from planner.validation import Bindings, Cell, Facts, Rules, stretches
+from planner.validation import Cell, Facts, Rules, stretches
 from reasoner.amounts import Amount, Calculation, Expression, Measure, written
 from reasoner.symbols import (
     AmountEffect,

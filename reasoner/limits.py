@@ -77,6 +77,29 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
         _current.reset(token)
 
 
+@contextmanager
+def overtime(share: float = 0.1) -> Iterator[Deadline]:
+    """Let a result that was found in time be checked in a share of the time more, and in a tenth of a second at least.
+
+    Examples
+    --------
+    >>> with within(60.0), overtime() as deadline:
+    ...     deadline.left > 65.0
+    True
+    """
+    now = _current.get()
+    later = (
+        now
+        if math.isinf(now.at)
+        else Deadline(max(now.at, perf_counter()) + max(share * now.seconds, 0.1), now.seconds)
+    )
+    token = _current.set(later)
+    try:
+        yield later
+    finally:
+        _current.reset(token)
+
+
 def current() -> Deadline:
     """Return the deadline that holds here."""
     return _current.get()

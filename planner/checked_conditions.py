@@ -1,0 +1,233 @@
+"""Conditions as the checker reads them: each conjunction is a list of tests and choices, the most determined condition first.
+
+It shares no code with any search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import itemgetter
+from typing import Protocol, TypeAlias
+
+from planner.checked_amounts import compares
+from reasoner.amounts import terms_of
+from reasoner.symbols import (
+    FALSE,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+
+Arguments: TypeAlias = "tuple[str, ...]"
+Bindings: TypeAlias = "dict[str, str]"
+Values: TypeAlias = "list[str]"
+"""What the terms of some conditions stand for, by their places."""
+Test: TypeAlias = "Callable[[Stated, Values], bool]"
+Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
+Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
+"""Individuals that a check depends on: those that satisfy a witness's conditions at first, with its open terms as in each row."""
+
+
+class Stated(Protocol):
+    """A state as conditions ask it."""
+
+    def value(self, situation: str, arguments: Arguments) -> str | None:
+        """Return the value of a symbol, or None if there is no such symbol."""
+
+    def holders(self, situation: str, value: str) -> Iterable[Arguments]:
+        """Return the arguments of the symbols that are stated to have a value."""
+
+
+class Source(Protocol):
+    """What conditions are read with: the problem, its relations by one of their places, and where lookups are put down."""
+
+    problem: Problem
+    lookups: Lookups | None
+
+    def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
+        """Return the tuples of a relation, by what stands at a position."""
+
+
+class ConditionReader:
+    """Conditions that share their terms, each of which has a place: there stands what it is, at first the term itself."""
+
+    def __init__(self, rules: Source, terms: Iterable[str]) -> None:
+        self.rules, self.problem = rules, rules.problem
+        self.places = {term: i for i, term in enumerate(terms)}
+
+    def place(self, term: str) -> int:
+        """Return the place of a term."""
+        return self.places.setdefault(term, len(self.places))
+
+    def key(self, terms: Sequence[str]) -> Callable[[Values], Arguments]:
+        """Return a function to what some terms stand for."""
+        places = [self.place(term) for term in terms]
+        if len(places) > 1:
+            return itemgetter(*places)
+        if not places:
+            return lambda values: ()
+        (only,) = places
+        return lambda values: (values[only],)
+
+    def conjunction(self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str]) -> list[Test]:
+        """Return conditions as tests, the last of which may choose and test the rest; `bound` grows by what is chosen.
+
+        What only nested conditions (`AnyOf`, `Witness`) mention is their own.
+        """
+        waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
+        nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
+        tests: list[Test] = []
+        while waiting:
+            condition = min(waiting, key=lambda c: (len(variables_of(c) - bound), _breadth(c, bound)))
+            unknown = sorted(variables_of(condition) - bound)
+            bound.update(unknown[:1])
+            if not unknown:
+                waiting.remove(condition)
+                tests.append(self.test(condition, bound, kinds))
+            elif isinstance(condition, ValueCondition) and _breadth(condition, bound - {unknown[0]}) == 0:
+                waiting.remove(condition)
+                tests.append(self.given(condition, kinds[condition.value]))
+            else:
+                candidates = self.candidates(condition, unknown, kinds)
+                if self.rules.lookups is not None:
+                    candidates = self.noted(candidates, unknown[0], kinds[unknown[0]], waiting, bound)
+                rest = self.conjunction([*waiting, *nested], bound, kinds)
+                return [*tests, self.choice(candidates, unknown[0], kinds[unknown[0]], rest)]
+        return tests + [self.test(condition, bound, kinds) for condition in nested]
+
+    def given(self, condition: ValueCondition, kind: str) -> Test:
+        """Return the choice of a value where the state leaves none."""
+        key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
+
+        def given(facts: Stated, values: Values) -> bool:
+            found = facts.value(condition.situation, key(values))
+            if found is None or found not in members:
+                return False
+            values[place] = found
+            return True
+
+        return given
+
+    def choice(self, candidates: Candidates, variable: str, kind: str, rest: Sequence[Test]) -> Test:
+        """Return whether the rest holds with one of some candidates for a variable."""
+        place, members = self.place(variable), self.problem.members(kind)
+
+        def some(facts: Stated, values: Values) -> bool:
+            for candidate in candidates(facts, values):
+                if candidate in members:
+                    values[place] = candidate
+                    if all_hold(rest, facts, values):
+                        return True
+            return False
+
+        return some
+
+    def noted(
+        self, candidates: Candidates, variable: str, kind: str, conditions: Sequence[Condition], bound: set[str]
+    ) -> Candidates:
+        """Return candidates that are put down where they are looked for, as those that satisfy what is known of them at first.
+
+        An individual that the problem doesn't have keeps its values, as no step names it.
+        """
+        asked = tuple(c for c in conditions if variable in variables_of(c) <= bound)
+        known = tuple(sorted(set().union(*map(variables_of, asked)) - {variable}))
+        assert self.rules.lookups is not None
+        rows, key = self.rules.lookups.setdefault((Witness(variable, kind, asked), known), set()), self.key(known)
+
+        def noting(facts: Stated, values: Values) -> Iterable[str]:
+            rows.add(key(values))
+            return candidates(facts, values)
+
+        return noting
+
+    def candidates(self, condition: Condition, unknown: Sequence[str], kinds: Mapping[str, str]) -> Candidates:
+        """Return those that the first unknown variable of a condition could be."""
+        variable, kind = unknown[0], kinds[unknown[0]]
+        match condition:
+            case ValueCondition(situation, arguments, value, False) if (
+                value not in unknown and situation not in self.problem.domain.rules
+            ):
+                position, at = arguments.index(variable), self.place(value)
+
+                def having(facts: Stated, values: Values) -> Iterable[str]:
+                    if values[at] == FALSE:  # which is seldom stated
+                        return self.problem.classes.get(kind, ())
+                    return (found[position] for found in facts.holders(situation, values[at]))
+
+                return having
+            case RelationCondition(relation, arguments, False) if len(unknown) < len(set(arguments)):
+                position = arguments.index(variable)
+                known = next(i for i, a in enumerate(arguments) if a not in unknown)
+                at = self.place(arguments[known])
+
+                def related(facts: Stated, values: Values) -> Iterable[str]:
+                    rows = self.rules.related(relation, known).get(values[at], ())
+                    return dict.fromkeys([row[position] for row in rows])
+
+                return related
+        return lambda facts, values: self.problem.classes.get(kind, ())
+
+    def test(self, condition: Condition, bound: set[str], kinds: Mapping[str, str]) -> Test:
+        """Return a condition as a test; what is chosen inside of it is forgotten."""
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                key, at = self.key(arguments), self.place(value)
+                return lambda facts, values: (facts.value(situation, key(values)) == values[at]) is not negated
+            case RelationCondition(relation, arguments, negated):
+                rows, key = self.problem.relations.get(relation, frozenset()), self.key(arguments)
+                return lambda facts, values: (key(values) in rows) is not negated
+            case ClassCondition(term, kind, negated):
+                members, at = self.problem.members(kind), self.place(term)
+                return lambda facts, values: (values[at] in members) is not negated
+            case EqualityCondition(left, right, negated):
+                one, other = self.place(left), self.place(right)
+                return lambda facts, values: (values[one] == values[other]) is not negated
+            case Witness(variable, kind, conditions, negated):
+                wanted = (*conditions, ClassCondition(variable, kind))
+                inner = self.conjunction(wanted, bound - {variable}, {**kinds, variable: kind})
+                return lambda facts, values: all_hold(inner, facts, values.copy()) is not negated
+            case AnyOf(alternatives, negated):
+                groups = [self.conjunction(group, set(bound), kinds) for group in alternatives]
+                return lambda facts, values: any(all_hold(g, facts, values.copy()) for g in groups) is not negated
+            case Comparison():
+                comparison = compares(condition, self.key, self.problem.relations)
+                return lambda facts, values: comparison(facts.value, values)
+
+
+def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
+    """Whether tests hold; the first choices with which they do are put into `values`."""
+    for test in tests:  # noqa: SIM110 - a generator takes twice as long
+        if not test(facts, values):
+            return False
+    return True
+
+
+def _breadth(condition: Condition, bound: set[str]) -> int:
+    """Rank conditions with unknown variables: 0 where the state leaves one individual, 1 where few could do, 2 for others."""
+    if isinstance(condition, ValueCondition) and not condition.negated:
+        return not (variables_of(condition) - bound == {condition.value} and condition.value not in condition.arguments)
+    return 1 if isinstance(condition, RelationCondition) and not condition.negated else 2
+
+
+def variables_of(condition: Condition) -> set[str]:
+    """Return the variables of a condition that isn't nested."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            terms = {*arguments, value}
+        case RelationCondition(_, arguments):
+            terms = set(arguments)
+        case ClassCondition(term):
+            terms = {term}
+        case EqualityCondition(left, right):
+            terms = {left, right}
+        case Comparison(one, _, other):
+            terms = {*terms_of(one), *terms_of(other)}
+        case _:
+            terms = set()
+    return {term for term in terms if term.startswith("?")}
