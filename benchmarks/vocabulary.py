@@ -23,8 +23,8 @@ KINDS = {
 }
 HEAD = """# The vocabulary
 
-The terms that domains and scenes are written in, made from the files themselves by `make vocabulary`. Arrows lead from what
-a property is said of to what it leads to; *one* means that there is one value at most.
+The terms of domains and scenes, generated from the ontology files by `make vocabulary`. Arrows lead from the domain of
+a property to its range; *one* means at most one value.
 """
 
 

@@ -9,7 +9,7 @@ PRONOUNS = re.compile(
     r"\b(somebody|anybody|nobody|whom|whoever|so many|so much|so often|as little as|of what|of whom)\b", re.IGNORECASE
 )
 LEFT: dict[str, int] = {
-    "confab": 31,
+    "confab": 27,
     "confab/commands": 3,
     "docs/architecture.md": 2,
     "docs/authoring.md": 15,
@@ -22,7 +22,6 @@ LEFT: dict[str, int] = {
     "docs/quantification.md": 1,
     "docs/search.md": 7,
     "docs/validation.md": 10,
-    "docs/vocabulary.md": 7,
     "docs/worlds.md": 4,
     "planner": 7,
     "planner/acting": 8,
