@@ -31,7 +31,7 @@ LEFT: dict[str, int] = {
     "reasoner": 10,
     "reasoner/graph": 4,
     "reasoner/pddl": 3,
-    "reasoner/reading": 26,
+    "reasoner/reading": 30,
     "reasoner/updates": 5,
     "reasoner/validation": 13,
 }
