@@ -82,17 +82,15 @@ def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
 def write(world: World, one: Complaint, into: Path, folder: Path) -> Path:
     """Make a world small in which something is wrong, and write its scene."""
     said = signature(one)
-    every = one.mode.startswith(("export", "execute", "leading", "learn"))
-
     def still(smaller: World) -> bool:
         try:
-            complaints = Judge(smaller, folder, every).judged().complaints
+            complaints = Judge(smaller, folder, only=one.mode).judged().complaints
         except Exception:  # it is none that can be judged any more
             return False
         return any(signature(other) == said for other in complaints)
 
     small = shrunk(world, still, 20.0 if one.kind != "endless" else 60.0) if still(world) else world
-    again = Judge(small, folder, every).judged()
+    again = Judge(small, folder, only=one.mode).judged()
     words = next((other for other in again.complaints if signature(other) == said), one)
     name = "".join(c if c.isalnum() else "-" for c in said)[:80]
     file = into / name / f"{world.seed}.ttl"

@@ -84,10 +84,10 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 class Judge:
-    """Judges one world."""
+    """Judges one world: by the sample that its seed draws, with everything, or in one mode only."""
 
-    def __init__(self, world: World, folder: Path, every: bool = False) -> None:
-        self.world, self.folder, self.every = world, folder, every
+    def __init__(self, world: World, folder: Path, every: bool = False, only: str = "") -> None:
+        self.world, self.folder, self.every, self.only = world, folder, every or bool(only), only
         self.found = Judged()
         self.meant = Interpreter(world.problem)
         self.rng = Random(f"judge {world.seed}")
@@ -96,8 +96,10 @@ class Judge:
         """Note that something is wrong."""
         self.found.complaints.append(Complaint(kind, mode, str(text)[:400]))
 
-    def sampled(self, one_of: int, what: str) -> bool:
+    def sampled(self, one_of: int, what: str, *modes: str) -> bool:
         """Return whether a world is among those of which something costly is asked."""
+        if self.only:
+            return self.only.startswith(modes)
         return self.every or zlib.crc32(f"{what} {self.world.seed}".encode()) % one_of == 0
 
     def judged(self) -> Judged:
@@ -163,19 +165,23 @@ class Judge:
         modes: dict[str, dict[str, Any]] = {"guarded": {}, "optimal": {"mode": "optimal"}, "paper": {"mode": "paper"}}
         if len(self.world.problem.domain.levels) > 1:
             modes["strict levels"] = {"leave_levels": False}
+        if self.only:
+            modes = {mode: its for mode, its in modes.items() if mode in (self.only, "guarded") or "/" in self.only}
+            if self.only in modes:
+                modes = {self.only: modes[self.only]}
         results = {mode: self.outcome(read, mode, **options) for mode, options in modes.items()}
-        first = results["guarded"]
-        if first is not None and first.plan is not None and self.sampled(LESSONS, "lesson"):
+        first = results.get("guarded")
+        if first is not None and first.plan is not None and self.sampled(LESSONS, "lesson", "lead", "learn"):
             self.with_a_lesson(read, first.plan)
         refused = {mode for mode, status in self.found.status.items() if status == "refused" and mode in modes}
         if refused and len(refused) < sum(mode in self.found.status for mode in modes):
             self.complain("refused by some modes only", "/".join(sorted(refused)), self.found.remarks[-1].text)
         if refused:
             return
-        if self.sampled(EXPORTS, "export"):
+        if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.call(f"export {level}", lambda level=level: self.export(read, level))  # type: ignore[misc]
-        if self.sampled(EXECUTIONS, "execute"):
+        if self.sampled(EXECUTIONS, "execute", "execute"):
             self.execution(read, first)
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
@@ -267,7 +273,7 @@ class Judge:
             return
         if (wanted is None) != (got is None):
             self.complain("export means something else", mode, f"least {wanted}, exported {got}")
-        if self.sampled(READERS, "reader"):
+        if self.sampled(READERS, "reader", "export"):
             self.read_by_unified_planning(mode, exported.domain, exported.problem)
 
     def read_by_unified_planning(self, mode: str, domain: str, problem: str) -> None:
