@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from worlds.judging import Complaint, Judge, Judged
-from worlds.mixed import World, mixed
+from worlds.mixed import World, drawn, mixed
 from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
@@ -53,8 +53,8 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            world = mixed(seed)
-            its = Judge(world, Path(folder)).judged()
+            world, meant = drawn(seed)
+            its = Judge(world, Path(folder), meant=meant).judged()
             note(found, seed, world, its)
             for one in its.complaints:
                 said = signature(one)
@@ -82,6 +82,7 @@ def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
 def write(world: World, one: Complaint, into: Path, folder: Path) -> Path:
     """Make a world small in which something is wrong, and write its scene."""
     said = signature(one)
+
     def still(smaller: World) -> bool:
         try:
             complaints = Judge(smaller, folder, only=one.mode).judged().complaints

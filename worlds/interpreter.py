@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from heapq import heappop, heappush
 from itertools import product
@@ -132,13 +133,24 @@ class Interpreter:
         self.symbols = list(self.slots)
         self.rules = [self.derivations(group) for group in strata(domain.rules)]
         self.initial = self.closed(initial)
-        self.rests = {
-            i: rest
-            for symbol, i in self.slots.items()
-            if (rest := self.kinds[symbol.situation].rest) is not None and symbol not in problem.goal
-        }
+        self.rests = self.unsettled()
         self._actions: dict[int, list[Action]] = {}
         self._named: dict[tuple[str, tuple[str, ...]], Action] = {}
+
+    def unsettled(self) -> dict[int, str]:
+        """Return the rest values that have to hold in the end, where the goal says nothing else."""
+        return {
+            i: rest
+            for symbol, i in self.slots.items()
+            if (rest := self.kinds[symbol.situation].rest) is not None and symbol not in self.problem.goal
+        }
+
+    def wanting(self, goal: Mapping[Symbol, str]) -> Interpreter:
+        """Return the interpreter of the same problem with another goal."""
+        other = copy(self)
+        other.problem = replace(self.problem, goal=goal)
+        other.rests = other.unsettled()
+        return other
 
     # ------------------------------------------------------------------------------------------------------ conditions
 
@@ -348,7 +360,7 @@ class Interpreter:
         Raises
         ------
         TooManyStatesError
-            More than `most` nodes can be reached, and none of the first is wanted.
+            More than `most` nodes can be reached, and none of the first is wanted, or nothing is.
         """
         actions = [(outcome, action) for action in self.actions(level) for outcome in action.outcomes]
         watched = dict(self.rests) if rests else {}
@@ -382,7 +394,7 @@ class Interpreter:
                 follower = after, still
                 if follower not in done and cost + price < costs.get(follower, math.inf):
                     if len(costs) >= most:
-                        if least is not None:
+                        if least is not None and self.problem.goal:
                             return Truth(costs, least)
                         raise TooManyStatesError
                     costs[follower] = cost + price

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import signal
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 from time import process_time
@@ -22,10 +22,12 @@ from confab.planning import NO_ENGINE, plan
 from confab.scene import Scene, load
 from planner.acting.episode import End
 from planner.plan import Outcome, Plan, Status
+from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.language import DomainError
 from reasoner.limits import LimitError
 from reasoner.symbols import Symbol
+from worlds.corrupted import corrupted, numbered, random_steps
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import World
 from worlds.scenes import scene
@@ -35,7 +37,7 @@ SECONDS, CPU = 3.0, 4.0
 """The time limit of a call, and the CPU time after which it is taken for one that doesn't return."""
 MOST = 5_000
 """So many nodes are searched for the truth."""
-EXPORTS, EXECUTIONS, LESSONS, READERS = 4, 4, 8, 40
+EXPORTS, EXECUTIONS, LESSONS, READERS = 8, 6, 8, 250
 """One of so many worlds is exported and imported, carried out, planned in with a memory, and read by unified-planning."""
 T = TypeVar("T")
 
@@ -86,10 +88,12 @@ def limited(seconds: float) -> Iterator[None]:
 class Judge:
     """Judges one world: by the sample that its seed draws, with everything, or in one mode only."""
 
-    def __init__(self, world: World, folder: Path, every: bool = False, only: str = "") -> None:
+    def __init__(
+        self, world: World, folder: Path, every: bool = False, only: str = "", meant: Interpreter | None = None
+    ) -> None:
         self.world, self.folder, self.every, self.only = world, folder, every or bool(only), only
         self.found = Judged()
-        self.meant = Interpreter(world.problem)
+        self.meant = meant or Interpreter(world.problem)
         self.rng = Random(f"judge {world.seed}")
 
     def complain(self, kind: str, mode: str, text: object = "") -> None:
@@ -165,24 +169,26 @@ class Judge:
         modes: dict[str, dict[str, Any]] = {"guarded": {}, "optimal": {"mode": "optimal"}, "paper": {"mode": "paper"}}
         if len(self.world.problem.domain.levels) > 1:
             modes["strict levels"] = {"leave_levels": False}
-        if self.only:
-            modes = {mode: its for mode, its in modes.items() if mode in (self.only, "guarded") or "/" in self.only}
-            if self.only in modes:
-                modes = {self.only: modes[self.only]}
+        if self.only and "/" not in self.only and self.only != "checker":
+            first = self.only if self.only in modes else "guarded"
+            modes = {first: modes[first]}
         results = {mode: self.outcome(read, mode, **options) for mode, options in modes.items()}
-        first = results.get("guarded")
-        if first is not None and first.plan is not None and self.sampled(LESSONS, "lesson", "lead", "learn"):
-            self.with_a_lesson(read, first.plan)
+        guarded = results.get("guarded")
+        if guarded is not None and guarded.plan is not None and self.sampled(LESSONS, "lesson", "lead", "learn"):
+            self.with_a_lesson(read, guarded.plan)
         refused = {mode for mode, status in self.found.status.items() if status == "refused" and mode in modes}
         if refused and len(refused) < sum(mode in self.found.status for mode in modes):
             self.complain("refused by some modes only", "/".join(sorted(refused)), self.found.remarks[-1].text)
         if refused:
             return
+        if not self.only or self.only == "checker":
+            plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
+            self.call("checker", lambda: self.checker(read, plans))
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.call(f"export {level}", lambda level=level: self.export(read, level))  # type: ignore[misc]
         if self.sampled(EXECUTIONS, "execute", "execute"):
-            self.execution(read, first)
+            self.execution(read, guarded)
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan, and judge what comes of it."""
@@ -231,6 +237,20 @@ class Judge:
         if outcome.certificate is None:
             self.complain("uncertified", mode, outcome.reason.text if outcome.reason else "")
 
+    def checker(self, read: Scene, plans: Sequence[Plan]) -> None:
+        """Hold the checker of plans against the interpreter, in plans that are mostly none."""
+        problem = read.reading.problem
+        drawn = [corrupted(plan, problem, self.rng) for plan in plans for _ in range(2)]
+        for steps in [*drawn, random_steps(self.meant, self.rng)]:
+            if max((step.level for step in steps.walk()), default=0) != problem.domain.levels[-1]:
+                continue  # the checker takes a plan of upper levels alone, as engines make them
+            said, meant = validate(problem, numbered(steps, problem)), faults(self.meant, steps)
+            if bool(said) is not bool(meant):
+                what = "the checker takes it for a plan" if meant else "the checker doesn't take it for a plan"
+                text = "; ".join(f"{step.path} {step.behavior} {' '.join(step.arguments)}" for step in steps.walk())
+                self.complain(what, "checker", f"{meant[:1]} {[one.text for one in said[:1]]}: {text}")
+                return
+
     def with_a_lesson(self, read: Scene, first: Plan) -> None:
         """Plan with a memory that has learned one plan."""
         from confab.memory import Memory
@@ -265,10 +285,13 @@ class Judge:
             if self.world.problem.domain.situations[symbol.situation].rest == self.meant.initial[slot]
             and self.world.problem.first_level(symbol) <= level
         }
-        flat = Interpreter(replace(self.world.problem, goal={**rested, **self.world.problem.goal}))
+        flat = self.meant.wanting({**rested, **self.world.problem.goal})
         try:
             wanted = flat.explored(level, MOST, rests=False).least
-            got = again.explored(again.problem.domain.levels[-1], 4 * MOST, rests=False).least
+            if again.problem.domain.levels:
+                got = again.explored(again.problem.domain.levels[-1], 4 * MOST, rests=False).least
+            else:
+                got = 0 if again.wanted(again.initial) else None
         except TooManyStatesError:
             return
         if (wanted is None) != (got is None):

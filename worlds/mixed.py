@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 from random import Random
+from typing import Any
 
 from reasoner.amounts import Quantity, written
 from reasoner.symbols import (
@@ -40,9 +41,13 @@ MOST = 600
 """So many nodes of the lowest level may be reachable in most worlds."""
 UNBOUNDED = 0.03
 """The share of worlds that may be larger: there the truth may stay unknown."""
+FEW = 12
+"""Worlds with fewer states are mostly drawn again."""
 EXCLUDED = 0.4
 """In this share of worlds it is tried to want what no state has."""
 TRIES = 6
+UPDATES = 0.15
+"""In this share of worlds some behaviours are written as SPARQL updates, which take long to read."""
 
 
 @dataclass(frozen=True)
@@ -65,32 +70,45 @@ class World:
 
 def mixed(seed: int) -> World:
     """Return a random world; the same for the same seed."""
+    return drawn(seed)[0]
+
+
+def drawn(seed: int) -> tuple[World, Interpreter]:
+    """Return the random world of a seed, and an interpreter of it."""
     rng = Random(f"mixed {seed}")
+    most, least = (MOST, FEW if rng.random() < 0.8 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
         world = _Draft(rng, seed).world()
-        most = MOST if rng.random() > UNBOUNDED else 50
         interpreter = Interpreter(world.problem)
         try:
-            states = [node[0] for node in interpreter.explored(world.problem.domain.levels[-1], most, False).costs]
+            costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
         except TooManyStatesError:
-            if most == MOST:
+            if least:
                 continue
-            states = [interpreter.initial]
-        goal = _Wishes(rng, interpreter, states).goal(rng.random() < EXCLUDED)
+            costs = {(interpreter.initial, frozenset()): 0}
+        if len(costs) < least:
+            continue
+        goal = _Wishes(rng, interpreter, {node[0]: cost for node, cost in costs.items()}).goal(rng.random() < EXCLUDED)
         if goal:
-            return replace(world, problem=replace(world.problem, goal=goal))
+            meant = interpreter.wanting(goal)
+            return replace(world, problem=meant.problem), meant
 
 
 class _Wishes:
     """Draws what is wanted."""
 
-    def __init__(self, rng: Random, interpreter: Interpreter, states: Sequence[State]) -> None:
-        self.rng, self.of, self.states = rng, interpreter, states
+    def __init__(self, rng: Random, interpreter: Interpreter, costs: Mapping[State, Any]) -> None:
+        self.rng, self.of = rng, interpreter
+        self.states = sorted(costs, key=lambda state: float(costs[state]))
+        self.first: dict[tuple[int, Any], Any] = {}  # the least cost at which a value can be had
+        for state in self.states:
+            for fact in enumerate(state):
+                self.first.setdefault(fact, costs[state])
 
     def goal(self, excluded: bool) -> dict[Symbol, str]:
         """Return a goal that doesn't hold at first, one that no state has if that is asked for and found; or nothing."""
         for _ in range(TRIES):
-            goal = self.drawn("random" if self.rng.random() < 0.3 else "two" if excluded else "one")
+            goal = self.drawn("random" if self.rng.random() < 0.12 else "two" if excluded else "one")
             states = self.states if excluded else self.states[:1]
             if goal and not any(all(self.of.meets(state, s, v) for s, v in goal.items()) for state in states):
                 return goal
@@ -100,7 +118,7 @@ class _Wishes:
     def drawn(self, kind: str) -> dict[Symbol, str]:
         """Return what some states have: one, two mixed, or any values at all."""
         rng = self.rng
-        sources = [rng.choice(self.states[-1 - len(self.states) // 4 :])]
+        sources = [rng.choice(self.states[-1 - len(self.states) // 6 :])]
         sources += [rng.choice(self.states)] if kind == "two" else []
         found: dict[Symbol, str] = {}
         for _ in range(rng.choice((1, 1, 2, 2, 3, 4)) + (kind == "two")):
@@ -111,6 +129,10 @@ class _Wishes:
             if not changed:
                 return {}
             symbol = rng.choice(changed)
+            if kind != "random" and rng.random() < 0.6:  # what is reached last
+                symbol = max(
+                    changed, key=lambda s: (self.first[self.of.slots[s], source[self.of.slots[s]]], rng.random())
+                )
             value = self.random(symbol) if kind == "random" else self.of.value(source, symbol)
             found.setdefault(symbol, self.said(symbol, value))
         return dict(sorted(found.items()))
@@ -142,6 +164,7 @@ class _Draft(Vocabulary):
         self.pairs: set[str] = set()
         self.axioms: dict[str, tuple[str, ...]] = {}
         self.initial: dict[Symbol, str] = {}
+        self.made: list[ValueEffect] = []
 
     def chance(self, p: float) -> bool:
         return self.rng.random() < p
@@ -158,7 +181,7 @@ class _Draft(Vocabulary):
         self.levels = max(used)
         domain = Domain(self.situations, {b.name: b for b in behaviors}, rules=self.rules)
         problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
-        updates = frozenset(b.name for b in behaviors) if self.chance(0.25) else frozenset()
+        updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
         return World(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
 
     def individuals(self) -> None:
@@ -351,7 +374,11 @@ class _Draft(Vocabulary):
         parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2)))]
         bound = list(parameters)
         conditions = writer.conditions(bound, rng.choice((0, 0, 1, 1, 2)), 1)
-        return self.with_effects(name, level, writer, parameters, bound, conditions, rng.choice((1, 1, 2, 3)))
+        if self.made and self.chance(0.5) and (link := writer.link(bound, rng.choice(self.made))):
+            conditions.append(link)
+        found = self.with_effects(name, level, writer, parameters, bound, conditions, rng.choice((1, 1, 2, 3)))
+        self.made += [effect for effect in found.effects if not effect.value.startswith("?")]
+        return found
 
     def with_effects(
         self,

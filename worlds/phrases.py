@@ -231,6 +231,14 @@ class Phrases:
         terms = [self.term(bound, of) for of in situation.arguments]
         return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
 
+    def link(self, bound: Sequence[str], effect: ValueEffect) -> Condition | None:
+        """Return that what another behaviour makes so is so, of some individuals; nothing if this level doesn't see it."""
+        situation = self.draft.situations[effect.situation]
+        terms = [self.term(bound, kind) for kind in situation.arguments]
+        if situation.level > self.level or None in terms or self.draft.values.get(effect.value, 1) > self.level:
+            return None
+        return ValueCondition(effect.situation, tuple(map(str, terms)), effect.value)
+
     # ----------------------------------------------------------------------------------------------------------- effects
 
     def effect(self, bound: Sequence[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
