@@ -76,7 +76,7 @@ def mixed(seed: int) -> World:
 def drawn(seed: int) -> tuple[World, Interpreter]:
     """Return the random world of a seed, and an interpreter of it."""
     rng = Random(f"mixed {seed}")
-    most, least = (MOST, FEW if rng.random() < 0.8 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
+    most, least = (MOST, FEW if rng.random() < 0.6 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
         world = _Draft(rng, seed).world()
         interpreter = Interpreter(world.problem)

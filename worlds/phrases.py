@@ -237,6 +237,8 @@ class Phrases:
         terms = [self.term(bound, kind) for kind in situation.arguments]
         if situation.level > self.level or None in terms or self.draft.values.get(effect.value, 1) > self.level:
             return None
+        if situation.boolean:
+            return ValueCondition(effect.situation, tuple(map(str, terms)), TRUE, negated=effect.value == FALSE)
         return ValueCondition(effect.situation, tuple(map(str, terms)), effect.value)
 
     # ----------------------------------------------------------------------------------------------------------- effects
