@@ -25,6 +25,7 @@ from reasoner.memory.links import Links
 from reasoner.reading.goals import with_goals
 from reasoner.reading.problem import Reading, read
 from reasoner.reading.relevance import recognise
+from reasoner.refining import never_done
 from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -153,6 +154,8 @@ def _plan(
     problem = with_goals(seen.problem, goals) if observed or mode == "paper" else seen.problem
     quantified = perf_counter() - begin
     check_goal(scene.iri, problem)
+    for behavior, why in never_done(problem):
+        raise KnowledgeError(why, seen.names.iri(behavior.name))
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from reasoner.amounts import Measure, inside, terms_of
+from reasoner.amounts import Measure, inside, situations_in, terms_of
 from reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -61,6 +61,17 @@ def terms(condition: Condition) -> tuple[str, ...]:
             return (*terms_of(one), *terms_of(other))
         case Witness() | AnyOf():
             return ()
+
+
+def situations_of(condition: Condition) -> frozenset[str]:
+    """Return the situation types of which a condition itself speaks, not those inside it."""
+    match condition:
+        case ValueCondition(situation):
+            return frozenset({situation})
+        case Comparison(one, _, other):
+            return situations_in(one) | situations_in(other)
+        case RelationCondition() | ClassCondition() | EqualityCondition() | Witness() | AnyOf():
+            return frozenset()
 
 
 def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:

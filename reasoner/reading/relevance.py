@@ -23,7 +23,7 @@ import pyoxigraph as ox
 
 from reasoner.amounts import situations_in, terms_of
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.language import terms
+from reasoner.language import situations_of, terms
 from reasoner.limits import check
 from reasoner.names import local_name
 from reasoner.reading.goals import BOUNDS, with_goals
@@ -36,7 +36,6 @@ from reasoner.symbols import (
     AmountEffect,
     AnyOf,
     Behavior,
-    Comparison,
     Condition,
     Effect,
     RelationCondition,
@@ -164,7 +163,7 @@ class _Doing:
             self.effects.append((effect, _scopes((*behavior.preconditions, *effect.when), kinds), _terms_in(effect)))
         amounts = [situations_in(effect.amount) for effect in behavior.amounts]
         scopes = [*self.asks, *(scope for _, scopes, _ in self.effects for scope in scopes)]
-        asked = (s for scope in scopes for condition in scope.conditions for s in _situations(condition))
+        asked = (s for scope in scopes for condition in scope.conditions for s in situations_of(condition))
         self.situations = behavior.changes.union(asked, *amounts)
         self.spanned = set[tuple[int, frozenset[str]]]()
 
@@ -311,13 +310,6 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
                 constants=constants,
                 looks_up=None if alone or situation is None else (situation.name, at),
             )
-
-
-def _situations(condition: Condition) -> Iterable[str]:
-    """Return the situation types of which a condition that isn't nested speaks."""
-    if isinstance(condition, Comparison):
-        return situations_in(condition.left) | situations_in(condition.right)
-    return (condition.situation,) if isinstance(condition, ValueCondition) else ()
 
 
 # ------------------------------------------------------------------------------------------------- 2. following it

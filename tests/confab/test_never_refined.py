@@ -1,0 +1,78 @@
+"""A behaviour that can be in no plan is an error of `plan` at once, in every mode, with its name, its level and the remedy."""
+
+from pathlib import Path
+
+import pytest
+
+import confab
+from planner.plan import Status
+from reasoner.graph.knowledge import KnowledgeError
+from tests.reasoner.worlds import HEAD
+
+WORLD = """
+w:x a owl:NamedIndividual, w:Thing ; w:at w:nowhere .
+w:s0 a owl:NamedIndividual, w:Spot .
+w:task a owl:NamedIndividual, :Task ; :goal w:task.g .
+w:task.g a owl:NamedIndividual, :ValueCondition ; :about w:x ; :situationType w:COLOR ; :value w:blue .
+w:DYE a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:DYE.x ; :postcondition w:DYE.blue .
+w:DYE.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+w:DYE.blue a owl:NamedIndividual, :ValueEffect ; :about w:DYE.x ; :situationType w:COLOR ; :value w:blue .
+w:DIP a owl:NamedIndividual, :Behavior ; :level 2 ; :parameter w:DIP.x ; :postcondition w:DIP.done .
+w:DIP.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+w:WET a owl:Class, owl:NamedIndividual, :SituationType ; :fromLevel 2 ; :restValue :false .
+w:Thing :hasSituationType w:WET .
+"""
+DIPPED = "w:DIP.done a owl:NamedIndividual, :ValueEffect ; :about w:DIP.x ; :situationType w:WET ; :value :true .\n"
+DYED = "w:DIP.done a owl:NamedIndividual, :ValueEffect ; :about w:DIP.x ; :situationType w:COLOR ; :value w:blue .\n"
+WETTED = "w:DIP :postcondition w:DIP.wet .\nw:DIP.wet" + DIPPED.removeprefix("w:DIP.done")
+DRIED = """
+w:DRY a owl:NamedIndividual, :Behavior ; :level 2 ; :parameter w:DRY.x ; :postcondition w:DRY.done .
+w:DRY.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+w:DRY.done a owl:NamedIndividual, :ValueEffect ; :about w:DRY.x ; :situationType w:WET ; :value :false .
+"""
+MODES = pytest.mark.parametrize(
+    "options", [{}, {"leave_levels": False}, {"mode": "optimal"}, {"mode": "paper"}], ids=lambda o: str([*o.values()])
+)
+
+
+def scene(folder: Path, *texts: str) -> confab.Scene:
+    (folder / "world.ttl").write_text(HEAD + WORLD + "".join(texts), encoding="utf-8")
+    return confab.load(folder / "world.ttl")
+
+
+@MODES
+def test_what_no_level_below_changes_so(tmp_path: Path, options: dict[str, object]) -> None:
+    with pytest.raises(
+        KnowledgeError, match="DYE of level 1 can never be refined: it makes COLOR blue.*from level 2 on"
+    ):
+        scene(tmp_path, DIPPED).plan(**options)  # type: ignore[arg-type]
+
+
+@MODES
+def test_a_rest_value_that_nothing_brings_back(tmp_path: Path, options: dict[str, object]) -> None:
+    with pytest.raises(
+        KnowledgeError, match="DIP of level 2 can be in no plan: it makes WET true.*level 2.*back to false"
+    ):
+        scene(tmp_path, DYED, WETTED).plan(**options)  # type: ignore[arg-type]
+
+
+@MODES
+def test_what_is_brought_back_is_planned(tmp_path: Path, options: dict[str, object]) -> None:
+    assert [step.behavior for step in scene(tmp_path, DYED, WETTED, DRIED).plan(**options).plan.primitives] == [  # type: ignore[arg-type]
+        "DIP",
+        "DRY",
+    ]
+
+
+def test_a_goal_may_want_what_is_not_at_rest(tmp_path: Path) -> None:
+    """Then it is for planning to find out: of the goal no rest value is asked."""
+    assert scene(tmp_path, DYED, WETTED).plan(["x WET true"]).outcome.status is Status.SOLVED
+
+
+def test_a_behaviour_that_the_task_cannot_need_is_no_error(tmp_path: Path) -> None:
+    unneeded = """
+    w:GO a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:GO.x ; :postcondition w:GO.there .
+    w:GO.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+    w:GO.there a owl:NamedIndividual, :ValueEffect ; :about w:GO.x ; :situationType w:AT ; :value w:s0 .
+    """
+    assert scene(tmp_path, DYED, unneeded).plan().outcome.status is Status.SOLVED
