@@ -43,7 +43,7 @@ def scene(folder: Path, *texts: str) -> confab.Scene:
 @MODES
 def test_what_no_level_below_changes_so(tmp_path: Path, options: dict[str, object]) -> None:
     with pytest.raises(
-        KnowledgeError, match="DYE of level 1 can never be refined: it makes COLOR blue.*from level 2 on"
+        KnowledgeError, match=r"DYE of level 1 can never be refined: it makes COLOR blue.*from level 2 on"
     ):
         scene(tmp_path, DIPPED).plan(**options)  # type: ignore[arg-type]
 
@@ -51,7 +51,7 @@ def test_what_no_level_below_changes_so(tmp_path: Path, options: dict[str, objec
 @MODES
 def test_a_rest_value_that_nothing_brings_back(tmp_path: Path, options: dict[str, object]) -> None:
     with pytest.raises(
-        KnowledgeError, match="DIP of level 2 can be in no plan: it makes WET true.*level 2.*back to false"
+        KnowledgeError, match=r"DIP of level 2 can be in no plan: it makes WET true.*level 2.*back to false"
     ):
         scene(tmp_path, DYED, WETTED).plan(**options)  # type: ignore[arg-type]
 
