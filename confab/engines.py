@@ -6,19 +6,14 @@ steps does what one of them says; `planner.validation` has the last word.
 
 from __future__ import annotations
 
-import io
 import logging
 import re
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from importlib.util import find_spec
-from os import killpg
 from pathlib import Path
 from pkgutil import iter_modules
-from signal import SIGKILL
-from subprocess import DEVNULL, Popen, TimeoutExpired
+from subprocess import DEVNULL, TimeoutExpired
 from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
@@ -32,6 +27,7 @@ from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline, within
 from reasoner.pddl.exporting import to_pddl
 from reasoner.symbols import Problem, Symbol
+from reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
 
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
@@ -127,27 +123,12 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
         unified-planning isn't installed, or has no such engine, or none for such a problem.
     """
     try:
-        from unified_planning import environment as environments
         from unified_planning.engines import PDDLPlanner
         from unified_planning.environment import Environment
-        from unified_planning.exceptions import UPException
-        from unified_planning.io import PDDLReader
     except ImportError:
         raise KnowledgeError("engines need unified-planning; install the extra pddl") from None
 
-    @contextmanager
-    def used_everywhere(environment: Environment) -> Iterator[None]:
-        """Have the reader make metrics in the environment that it was given, too, not in the one of the whole process."""
-        before = environments.GLOBAL_ENVIRONMENT
-        environments.GLOBAL_ENVIRONMENT = environment
-        try:
-            yield
-        finally:
-            environments.GLOBAL_ENVIRONMENT = before
-
-    environment = Environment()
-    environment.error_used_name, environment.credits_stream = False, None  # a type may be called as a predicate is
-    factory = environment.factory
+    factory = Environment().factory
     if engine is not None and engine not in factory.engines:
         known = ", ".join(name for name in factory.engines if factory.engine(name).is_oneshot_planner()) or "none"
         raise KnowledgeError(
@@ -160,11 +141,35 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
         raise KnowledgeError(f"{said} derived predicates, as what is defined would be; plan without --engine")
-    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+    late = first or "unified-planning", "TIMEOUT", list[str]()
+    _tell(late[0], deadline)
+    try:
+        seconds = CPU_SECONDS if deadline.left is None else deadline.left
+        found: Answer = call(solved, domain, problem, engine, deadline.left, seconds=seconds, timeout=deadline.left)
+    except TimeoutExpired:
+        return late
+    except WorkerError as error:
+        if error.late:
+            return late
+        raise KnowledgeError(f"{late[0]} ended without an answer ({error.status}): {error.said[-200:]}") from None
+    return found
+
+
+def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
+    """Return what unified-planning answers to a level that it reads itself, in the process of `reasoner.workers.call`."""
+    from unified_planning import environment as environments
+    from unified_planning.environment import Environment
+    from unified_planning.exceptions import UPException
+    from unified_planning.io import PDDLReader
+
+    environment = Environment()
+    environment.error_used_name, environment.credits_stream = False, None  # a type may be called as a predicate is
+    environments.GLOBAL_ENVIRONMENT = environment  # where its reader makes metrics
+    factory = environment.factory
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            with used_everywhere(environment):
-                task = PDDLReader(environment).parse_problem_string(domain, problem)
+            task = PDDLReader(environment).parse_problem_string(domain, problem)
         except Exception as error:  # its reader's asserts and pyparsing's errors among them: ours goes on without it
             said = " ".join(str(error).split())[:200]
             raise KnowledgeError(f"unified-planning can't read this level: {type(error).__name__}: {said}") from None
@@ -176,9 +181,8 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
                 planner.skip_checks = True  # some say no to action costs, which they take
+                result = planner.solve(task, timeout=seconds)
                 name = engine or planner.name
-                _tell(name, deadline)
-                result = planner.solve(task, timeout=deadline.left)
         except UPException as error:
             raise KnowledgeError(f"no engine takes this problem: {' '.join(str(error).split())}") from None
     actions = result.plan.actions if result.plan is not None else ()
@@ -203,8 +207,9 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         files = [Path(folder) / name for name in ("domain.pddl", "problem.pddl", "plan")]
         files[0].write_text(domain)
         files[1].write_text(problem)
-        process = Popen(  # in a session of its own, since it has children
-            planner._get_cmd(*map(str, files)), cwd=folder, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True
+        seconds = CPU_SECONDS if deadline.left is None else deadline.left
+        process = start(
+            planner._get_cmd(*map(str, files)), seconds, cwd=folder, stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL
         )
         code = None
         try:
@@ -212,9 +217,7 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         except TimeoutExpired:
             pass
         finally:
-            if process.poll() is None:
-                killpg(process.pid, SIGKILL)
-                process.wait()
+            end(process)
         written = [file for file in Path(folder).iterdir() if re.fullmatch(r"plan(\.\d+)?", file.name)]
         for file in sorted(written, key=lambda file: file.stat().st_mtime_ns, reverse=True):
             text = file.read_text()

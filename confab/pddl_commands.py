@@ -44,6 +44,8 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         found = imported(pddl, out.stem, level)
     except PddlError as error:
         raise KnowledgeError(str(error)) from error
+    except RecursionError as error:
+        raise KnowledgeError(f"{domain}, {problem}: formulas are nested too deeply; nest them less deeply") from error
     title = f"{pddl.problem} ({pddl.domain})"
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
     write_whole(out, stamped(IMPORTED, [text]), check=_check_turtle)

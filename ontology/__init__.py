@@ -6,6 +6,7 @@ ontology lies (OASIS XML Catalogs 1.1, the format that Protégé reads and write
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -46,5 +47,5 @@ def catalog(path: Path) -> dict[str, Path]:
     for element in root.iter("{urn:oasis:names:tc:entity:xmlns:xml:catalog}uri"):
         name, uri = element.get("name"), element.get("uri")
         if name and uri and "://" not in uri:
-            entries[name] = (path.parent / uri).resolve()
+            entries[name] = Path(os.path.realpath(path.parent / uri))  # raises nothing where links go in circles
     return entries

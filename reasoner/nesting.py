@@ -1,39 +1,65 @@
-"""How deeply a document is nested, bounded from its bytes: the time or memory of some parsers grows with the square of it."""
+"""How deeply documents are nested: the time, memory or stack of some parsers grows much faster than the depth."""
 
 from __future__ import annotations
+
+import re
+from contextlib import suppress
+from xml.parsers import expat
 
 MOST_NESTED = 1_000
 """Levels that every parser here reads without trouble; ontologies have some ten."""
 PIECE = 256
-"""Bytes that are looked at at once; by so much the bound may be too large."""
+"""Bytes that are counted at once; by so much a depth may be taken for larger than it is."""
+TURTLE = re.compile(
+    rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
+    rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
+    re.DOTALL,
+)
+"""Texts, IRIs and comments of Turtle and its relatives, whose brackets don't count."""
+JSON = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
+OPENING, CLOSING = (b"[", b"(", b"{", b"<<"), (b"]", b")", b"}", b">>")
 
 
-def nested(content: bytes) -> int:
-    """Return an upper bound of how many brackets are open at once; brackets inside texts count as well.
+def nested(content: bytes, quoted: re.Pattern[bytes] = TURTLE) -> int:
+    """Return an upper bound of how many brackets are open at once; `quoted` is what may hold brackets that don't count.
 
-    >>> nested(b"[" * 5000 + b"]" * 5000), nested(b"[]" * 5000)
-    (5000, 256)
+    >>> nested(b"[" * 5000 + b"]" * 5000), nested(b"[]" * 5000), nested(b'"[" ' * 5000)
+    (5000, 256, 0)
     """
-    return _bound(content, (b"[", b"(", b"{"), (b"]", b")", b"}"))
-
-
-def nested_elements(content: bytes) -> int:
-    """Return such a bound for the elements of an XML document.
-
-    >>> nested_elements(b"<a>" * 5000 + b"</a>" * 5000), nested_elements(b"<!-- b --><a><b/></a>" * 5000) < 256
-    (5000, True)
-    """
-    for sign, put in ((b"<!", b""), (b"<?", b""), (b"</", b"\0"), (b"/>", b"\0")):
-        content = content.replace(sign, put)
-    return _bound(content, (b"<",), (b"\0",))
-
-
-def _bound(content: bytes, opening: tuple[bytes, ...], closing: tuple[bytes, ...]) -> int:
+    if (brackets := sum(map(content.count, OPENING))) <= MOST_NESTED:
+        return brackets
+    content = quoted.sub(b"", content)
     depth = lowest = most = 0
     for begin in range(0, len(content), PIECE):
         piece = content[begin : begin + PIECE]
-        opened, closed = sum(map(piece.count, opening)), sum(map(piece.count, closing))
+        opened, closed = sum(map(piece.count, OPENING)), sum(map(piece.count, CLOSING))
         lowest = min(lowest, depth - closed)
         most = max(most, depth + opened - lowest)
         depth += opened - closed
+    return most
+
+
+def nested_elements(content: bytes) -> int:
+    """Return how deeply the elements of an XML document are nested, up to where it isn't well-formed.
+
+    >>> nested_elements(b"<a>" * 5000 + b"</a>" * 5000), nested_elements(b"<a>" + b"<b></b>" * 5000)
+    (5000, 2)
+    """
+    if content.count(b"<") <= MOST_NESTED:
+        return content.count(b"<")
+    depth = most = 0
+
+    def begin(*_: object) -> None:
+        nonlocal depth, most
+        depth += 1
+        most = max(most, depth)
+
+    def end(_: object) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    with suppress(expat.ExpatError):  # what reads the document says so
+        parser.Parse(content, True)
     return most

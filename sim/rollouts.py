@@ -17,8 +17,9 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from reasoner.embodiment.values import Embodiment
-from reasoner.limits import check, current
+from reasoner.limits import LimitError, check, current
 from reasoner.symbols import State
+from reasoner.workers import CPU_SECONDS, limit_cpu, tie
 from sim.engine import Engine
 from sim.staging import Perturbation
 from sim.verify import Rollout, verify
@@ -130,9 +131,12 @@ def _stream(trial: Trial, seeds: Sequence[int], workers: int | str) -> Iterator[
 def _work(connection: Connection, trial: Trial) -> None:
     """Run the seeds received through the connection until it closes; send each rollout, or the exception that it raised."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
+    if (parent := multiprocessing.parent_process()) is not None:
+        tie(parent.sentinel)
     try:
         while True:
             seed = connection.recv()
+            limit_cpu(CPU_SECONDS)
             try:
                 connection.send(trial.run(seed))
             except Exception as error:
@@ -207,6 +211,8 @@ class _Pool:
     def _replace(self, process: BaseProcess, seed: int) -> None:
         """Start a new process for the seed of a dead one, or raise `RuntimeError` after `TRIES` deaths."""
         process.join()
+        if process.exitcode == -signal.SIGXCPU:
+            raise LimitError(f"gave up: the rollout of seed {seed} took {CPU_SECONDS:,.0f} s of CPU time")
         self.deaths[seed] += 1
         if self.deaths[seed] >= TRIES:
             raise RuntimeError(

@@ -7,12 +7,22 @@ stood there.
 
 from __future__ import annotations
 
+import logging
+import os
 import re
 from collections import Counter
+from functools import lru_cache
 from pathlib import Path
+from subprocess import TimeoutExpired
 from xml.parsers import expat
 
 import pyoxigraph as ox
+
+from reasoner.limits import check, current
+from reasoner.nesting import JSON, MOST_NESTED, TURTLE, nested, nested_elements
+from reasoner.workers import WorkerError, call
+
+log = logging.getLogger(__name__)
 
 FORMATS = {
     ".ttl": ox.RdfFormat.TURTLE,
@@ -36,6 +46,8 @@ SIGNS = (
 )
 """How files begin that are called .owl, or .rdf, and hold something else."""
 REMOTE = re.compile(rb'"@context"\s*:\s*(\[\s*)?"')
+SECONDS, MEGABYTES = 60.0, 1_000
+"""CPU time and memory of parsing a document in a process of its own."""
 MOST_EXPANDED = 50_000_000
 """Bytes that all references to entities of a document may stand for."""
 PLAIN = re.compile(r"[^\s<>&%\"']*")
@@ -73,7 +85,57 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
         )
     if form == ox.RdfFormat.JSON_LD and REMOTE.search(content):
         raise DocumentError("its @context lies elsewhere, and nothing is fetched; put the context itself into the file")
-    return (plain_xml(content) if form == ox.RdfFormat.RDF_XML else content), form
+    if form == ox.RdfFormat.RDF_XML:
+        content = plain_xml(content)
+    return safe(content, form, Path(os.path.realpath(file)).as_uri())
+
+
+def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFormat]:
+    """Return a document, and its format, that a parser reads in time and memory in proportion to its size.
+
+    What is nested too deeply is refused in every format. JSON-LD, in which each level may repeat all that its context says, is
+    parsed in a process of its own and returned as TriG.
+
+    Raises
+    ------
+    DocumentError
+        It is nested too deeply, or takes too much time or memory.
+    SyntaxError
+        It isn't in its format.
+    """
+    json = form == ox.RdfFormat.JSON_LD
+    xml = form == ox.RdfFormat.RDF_XML
+    if (nested_elements(content) if xml else nested(content, JSON if json else TURTLE)) > MOST_NESTED:
+        what = "elements" if xml else "brackets"
+        raise DocumentError(
+            f"refused, since its {what} are nested more than {MOST_NESTED:,} deep; say it in a flat way"
+        )
+    return (_parsed_apart(content, form.media_type, base), ox.RdfFormat.TRIG) if json else (content, form)
+
+
+@lru_cache(maxsize=8)
+def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
+    left = current().left
+    try:
+        parsed: bytes = call(as_trig, content, media_type, base, seconds=SECONDS, megabytes=MEGABYTES, timeout=left)
+    except TimeoutExpired:
+        check("reading a document")
+        raise
+    except WorkerError as error:
+        log.debug("%s", error)
+        raise DocumentError(
+            f"can't be read within {SECONDS:.0f} s and {MEGABYTES:,} MB; give it one context, or save it as Turtle"
+        ) from error
+    return parsed
+
+
+def as_trig(content: bytes, media_type: str, base: str) -> bytes:
+    """Return a document as TriG."""
+    form = ox.RdfFormat.from_media_type(media_type)
+    assert form is not None
+    quads = ox.parse(content, format=form, base_iri=base)
+    found = list(quads)
+    return ox.serialize(found, format=ox.RdfFormat.TRIG, prefixes=dict(quads.prefixes)) or b""
 
 
 def plain_xml(content: bytes) -> bytes:

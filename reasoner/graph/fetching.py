@@ -19,7 +19,7 @@ from urllib3.exceptions import HTTPError, LocationValueError, MaxRetryError
 
 import ontology
 from reasoner.files import write_whole
-from reasoner.graph.documents import DocumentError, plain_xml
+from reasoner.graph.documents import DocumentError, plain_xml, safe
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.vocabulary import OWL
 
@@ -81,7 +81,8 @@ def fetch(url: str, folder: Path) -> Fetched:
     try:
         if suffix == ".owl":
             content = plain_xml(content)
-        triples = [quad.triple for quad in ox.parse(content, format=FORM[suffix], base_iri=url)]
+        safely, form = safe(content, FORM[suffix], url)
+        triples = [quad.triple for quad in ox.parse(safely, format=form, base_iri=url)]
     except DocumentError as error:
         raise KnowledgeError(f"{url}: {error}") from error
     except SyntaxError as error:

@@ -19,6 +19,7 @@ from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
 from reasoner.memory.experience_file import Lines, lines
 from reasoner.memory.links import Links
 from reasoner.names import Names
+from reasoner.nesting import MOST_NESTED, nested
 from reasoner.symbols import FALSE, TRUE, Symbol
 from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, RDFS, XSD
 
@@ -126,7 +127,10 @@ def memory_lines(path: Path) -> Lines:
     if not path.is_file():
         raise KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one")
     try:
-        return lines(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        if nested(text.encode()) > MOST_NESTED:
+            raise KnowledgeError(f"{path}: no memory: its brackets are nested more than {MOST_NESTED:,} deep")
+        return lines(text)
     except UnicodeDecodeError as error:
         raise KnowledgeError(f"{path}: broken memory: {error}; plan with --no-memory, or restore a copy") from error
     except OSError as error:

@@ -6,6 +6,7 @@ say in the same way stays, with a note why.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -107,7 +108,7 @@ def convert(path: Path, form: Form) -> Converted:
     KnowledgeError
         It is no Turtle file, it or what it imports can't be read, or an update in it has a fault.
     """
-    path = path.resolve()
+    path = Path(os.path.realpath(path))
     if path.suffix != ".ttl":
         raise KnowledgeError(f"{path}: only Turtle files are converted; save it as Turtle (Protégé: File, Save as …)")
     graph = load(scene_file(path))

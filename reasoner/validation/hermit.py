@@ -16,21 +16,24 @@ import contextlib
 import io
 import re
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from signal import SIGXCPU
+from subprocess import PIPE, TimeoutExpired
 from typing import Any
 
 import pyoxigraph as ox
 
 from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph
+from reasoner.limits import LimitError, check, current
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.symbols import Behavior, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
 from reasoner.vocabulary import OWL, RDF
+from reasoner.workers import CPU_SECONDS, end, start
 
 PROTOTYPE = "urn:confab:prototype:"
 NUMBER = "urn:confab:number:"
@@ -156,12 +159,21 @@ def _run(triples: Iterable[ox.Triple], *asked: str) -> str | None:
             "org.semanticweb.HermiT.cli.CommandLine",
             *asked,
         ]
-        done = subprocess.run([java(), *options, file.as_uri()], capture_output=True, text=True, encoding="utf-8")
-    if done.returncode == 0:
-        return done.stdout
-    if "Inconsistent ontology" in (complaint := done.stdout + done.stderr):
+        process = start([java(), *options, file.as_uri()], stdout=PIPE, stderr=PIPE)
+        try:
+            said, complaint = (text.decode("utf-8", "replace") for text in process.communicate(timeout=current().left))
+        except TimeoutExpired:
+            check("HermiT classifies")
+            raise
+        finally:
+            end(process)
+    if process.returncode == 0:
+        return said
+    if "Inconsistent ontology" in (complaint := said + complaint):
         return None
-    words = next((line for line in complaint.splitlines() if line.strip()), f"exit code {done.returncode}")
+    if process.returncode == -SIGXCPU:
+        raise LimitError(f"gave up: HermiT took {CPU_SECONDS:,.0f} s of CPU time; validate without --deep")
+    words = next((line for line in complaint.splitlines() if line.strip()), f"exit code {process.returncode}")
     raise KnowledgeError(f"HermiT can't work on this ontology: {words.strip()}")
 
 

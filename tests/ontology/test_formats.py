@@ -8,6 +8,7 @@ import pytest
 import confab
 from confab.authoring import new_domain
 from reasoner.graph.knowledge import KnowledgeError, load
+from reasoner.updates.converting import convert
 
 FORMS = {
     "nt": ox.RdfFormat.N_TRIPLES,
@@ -69,3 +70,53 @@ def test_a_context_elsewhere_is_not_fetched(tmp_path: Path) -> None:
     (tmp_path / "a.jsonld").write_text('{"@context": "https://schema.org/", "@id": "https://e.org/a"}')
     with pytest.raises(KnowledgeError, match="nothing is fetched"):
         load(tmp_path / "a.jsonld")
+
+
+DEEP = 20_000
+NESTED = {
+    "ttl": "<urn:a> <urn:p> " + "[<urn:p> " * DEEP + "1" + "]" * DEEP + " .",
+    "nt": "<urn:a> <urn:p> " + "<<( <urn:a> <urn:p> " * DEEP + "1" + ")>>" * DEEP + " .",
+    "trig": "<urn:a> <urn:p> " + '( "]))" ' * DEEP + ")" * DEEP + " .",
+    "jsonld": '{"@id": "urn:a", "urn:p": ' * DEEP + "1" + "}" * DEEP,
+    "owl": '<r:RDF xmlns:r="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns="urn:x#">'
+    + '<a x="/>"><b>' * DEEP
+    + "</b></a>" * DEEP
+    + "</r:RDF>",
+}
+
+
+@pytest.mark.parametrize("ending", NESTED)
+def test_what_is_nested_too_deeply_is_refused_in_every_form(tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"deep.{ending}"
+    file.write_text(NESTED[ending])
+    with pytest.raises(KnowledgeError, match="nested more than 1,000 deep"):
+        load(file)
+
+
+def test_brackets_in_texts_and_many_that_are_closed_are_no_depth(tmp_path: Path) -> None:
+    file = tmp_path / "flat.ttl"
+    file.write_text("<urn:a> a <http://www.w3.org/2002/07/owl#Ontology> . " + '<urn:a> <urn:p> "((", [] , () . ' * 2000)
+    assert load(file).scene == "urn:a"
+
+
+def test_json_ld_that_explodes_is_parsed_where_it_takes_nothing_along(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("reasoner.graph.documents.MEGABYTES", 300)
+    terms = ",".join(f'"t{i}": "urn:t{i}"' for i in range(10_000))
+    level = '{"@context": {"x": "urn:x"}, "@id": "urn:b", "t2":'
+    file = tmp_path / "wide.jsonld"
+    file.write_text(f'{{"@context": {{{terms}}}, "@id": "urn:a", "t1":' + level * 400 + "1" + "}" * 401)
+    with pytest.raises(KnowledgeError, match="can't be read within 60 s and 300 MB"):
+        load(file)
+
+
+def test_a_catalog_that_names_a_link_to_itself_is_one_line(scene: Path) -> None:
+    catalog, loop = scene.with_name("catalog-v001.xml"), scene.with_name("loop.ttl")
+    loop.symlink_to("loop.ttl")
+    catalog.write_text(catalog.read_text().replace('uri="tearoom.ttl"', 'uri="loop.ttl"'))
+    with pytest.raises(KnowledgeError, match=r"loop\.ttl, which is a link that leads to no file; mend the entry"):
+        load(scene)
+    for call in (load, confab.validate, lambda file: convert(file, "sparql")):
+        with pytest.raises((KnowledgeError, OSError)):
+            call(loop)

@@ -1,0 +1,193 @@
+"""Processes that end with the process that started them, however that ends, and have a limit of CPU time of their own.
+
+Each gets one end of a pipe whose other end the starting process holds. The kernel is asked to kill the started process, with the
+processes that it starts in turn, as soon as that other end is closed (Linux). After kill -9 or a crash no code has to run
+for that, and it doesn't matter which thread started the process.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import resource
+import select
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from subprocess import Popen
+
+LAUNCHER = os.path.abspath(__file__)  # noqa: PTH100 - in a fast start
+CPU_SECONDS = 3_600.0
+"""CPU time of a process for which nothing else is said."""
+MOST_SECONDS = 1e9
+TEXT_BYTES = 2_000
+"""How much of what a process says on stderr is handed on, from the end."""
+
+
+class WorkerError(RuntimeError):
+    """A process ended without an answer.
+
+    Parameters
+    ----------
+    said : str
+        What it said on stderr.
+    status : int
+        Its exit code, negative for a signal.
+    """
+
+    def __init__(self, said: str, status: int) -> None:
+        super().__init__(f"ended with {status}: {said}")
+        self.said, self.status = said, status
+
+    @property
+    def late(self) -> bool:
+        """Whether its limit of CPU time ended it."""
+        return self.status == -signal.SIGXCPU
+
+    @property
+    def too_large(self) -> bool:
+        """Whether it asked for more memory than its limit."""
+        return self.status == -signal.SIGABRT or "memory" in self.said.lower()
+
+
+def tie(end: int, group: bool = False) -> None:
+    """Have the kernel kill this process, or its process group, when the other end of a pipe is closed.
+
+    Parameters
+    ----------
+    end : int
+        The reading end, from which nothing is read.
+    group : bool
+    """
+    if sys.platform == "linux":
+        fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp() if group else os.getpid())
+        fcntl.fcntl(end, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
+    if select.select([end], [], [], 0)[0]:  # it was closed before
+        os._exit(1)
+
+
+def limit_cpu(seconds: float) -> None:
+    """Allow this process so many more seconds of CPU time."""
+    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    soft = int(used + min(seconds, MOST_SECONDS)) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
+
+
+def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) -> Popen[bytes]:
+    """Start a command in a session of its own; it ends with this process, however that ends.
+
+    Parameters
+    ----------
+    command : sequence of str
+    seconds : float
+        CPU time, of each process of the command.
+    **options
+        Of `subprocess.Popen`.
+    """
+    import weakref
+    from subprocess import Popen
+
+    ours, theirs = os.pipe()[::-1]
+    try:
+        limit = str(int(min(seconds, MOST_SECONDS)) + 1)
+        launcher = [sys.executable, "-ISs", LAUNCHER, str(theirs), limit, *command]
+        process = Popen(launcher, pass_fds=[theirs], start_new_session=True, **options)
+    except BaseException:
+        os.close(ours)
+        raise
+    finally:
+        os.close(theirs)
+    weakref.finalize(process, os.close, ours)
+    return process
+
+
+def end(process: Popen[bytes]) -> None:
+    """Kill a process that was started here, with all that it started, and wait for it."""
+    from contextlib import suppress
+
+    with suppress(OSError), process, suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def call(
+    function: Callable[..., Any],
+    *arguments: Any,
+    seconds: float = CPU_SECONDS,
+    megabytes: int | None = None,
+    timeout: float | None = None,
+) -> Any:
+    """Return what a function returns in a process of its own.
+
+    Parameters
+    ----------
+    function : callable
+        Of a module; what it prints is lost.
+    *arguments
+        Are pickled, as what is returned or raised.
+    seconds : float
+        CPU time.
+    megabytes : int, optional
+        Memory.
+    timeout : float, optional
+        Seconds that may pass.
+
+    Raises
+    ------
+    WorkerError
+        The process ended before the function.
+    subprocess.TimeoutExpired
+        The time has passed.
+    """
+    import pickle
+    from subprocess import PIPE
+
+    code = "import sys; sys.path[:] = sys.argv[2:]; from reasoner.workers import answer; answer(int(sys.argv[1]))"
+    process = start(
+        [sys.executable, "-c", code, str(megabytes or 0), *sys.path], seconds, stdin=PIPE, stdout=PIPE, stderr=PIPE
+    )
+    try:
+        said, complaint = process.communicate(pickle.dumps((function, arguments)), timeout)
+    finally:
+        end(process)
+    if process.returncode or not said:
+        raise WorkerError(complaint.decode("utf-8", "replace")[-TEXT_BYTES:], process.returncode)
+    done, result = pickle.loads(said)
+    if not done:
+        raise result
+    return result
+
+
+def answer(megabytes: int) -> None:
+    """Call the function that stdin names, and write to stdout whether it returned, and what it returned or raised."""
+    import pickle
+
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what the function prints
+    if megabytes:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 1_000_000,) * 2)
+    function, arguments = pickle.load(sys.stdin.buffer)
+    try:
+        result = True, function(*arguments)
+    except MemoryError:
+        raise
+    except Exception as error:
+        result = False, error
+    out.write(pickle.dumps(result))
+    out.close()
+
+
+def main(end: int, seconds: int, command: list[str]) -> None:
+    """Become a command that ends with the process which holds the other end of a pipe."""
+    tie(end, group=True)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    os.execvp(command[0], command)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])

@@ -1,0 +1,125 @@
+"""Nothing outlives the process that started it, and every process has a limit of its own."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from reasoner.workers import WorkerError, call, end, start, tie
+
+SLEEP = "import subprocess, time; subprocess.Popen(['sleep', '60']); print('up', flush=True); time.sleep(60)"
+PARENT = f"""
+import ctypes, os, signal, subprocess, sys, threading, time
+from reasoner.workers import start
+found = []
+def begin():
+    found.append(start([sys.executable, "-c", {SLEEP!r}], stdout=subprocess.PIPE))
+thread = threading.Thread(target=begin)  # which ends before the process that it starts
+thread.start()
+thread.join()
+found[0].stdout.readline()
+print(found[0].pid, flush=True)
+if sys.argv[1] == "crash":
+    ctypes.string_at(0)
+elif sys.argv[1] == "abort":
+    os.abort()
+elif sys.argv[1] == "exit":
+    sys.exit()
+time.sleep(60)
+"""
+
+
+def group(number: int) -> list[str]:
+    """Return the processes of a group that still run."""
+    listed = subprocess.run(["ps", "-eo", "pgid=,stat=,args="], capture_output=True, text=True, check=True).stdout
+    rows = (line.split(None, 2) for line in listed.splitlines())
+    return [row[2] for row in rows if row[0] == str(number) and not row[1].startswith("Z")]
+
+
+def ended(number: int) -> bool:
+    """Whether a group ends within two seconds."""
+    for _ in range(40):
+        if not group(number):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's part is Linux's")
+@pytest.mark.parametrize("how", ["kill", "crash", "abort", "exit", "ctrl-c"])
+def test_a_process_ends_with_all_that_it_started_when_its_parent_ends_in_any_way(how: str) -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, how], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    assert parent.stdout is not None
+    number = int(parent.stdout.readline())
+    if how in ("kill", "ctrl-c"):
+        assert len(group(number)) == 2
+        parent.send_signal(signal.SIGKILL if how == "kill" else signal.SIGINT)
+    parent.communicate()
+    assert ended(number)
+
+
+def test_the_end_of_a_process_is_that_of_all_that_it_started() -> None:
+    process = start([sys.executable, "-c", SLEEP], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.readline()
+    end(process)
+    assert ended(process.pid)
+    end(process)  # again does nothing
+
+
+def test_who_ties_itself_to_a_pipe_that_is_closed_ends_at_once() -> None:
+    reading, writing = os.pipe()
+    os.close(writing)
+    process = multiprocessing.get_context("fork").Process(target=tie, args=(reading,))
+    process.start()
+    process.join(5)
+    os.close(reading)
+    assert process.exitcode == 1
+
+
+def endless(_: object = None) -> None:
+    while True:
+        pass
+
+
+def test_every_process_has_a_limit_of_cpu_time_and_memory() -> None:
+    with pytest.raises(WorkerError) as late:
+        call(endless, seconds=0.0)
+    assert late.value.late
+    with pytest.raises(WorkerError) as large:
+        call(bytearray, 10**10, megabytes=500)
+    assert large.value.too_large
+    with pytest.raises(subprocess.TimeoutExpired):
+        call(time.sleep, 60, timeout=0.3)
+
+
+def test_a_call_returns_or_raises_what_its_function_does_and_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    assert call(sorted, [2, 1]) == [1, 2]
+    assert call(print, "aside") is None
+    with pytest.raises(KeyError, match="'b'"):
+        call(dict.__getitem__, {"a": 1}, "b")
+    assert capfd.readouterr().out == ""
+
+
+def test_a_command_that_isnt_there_is_an_exit_code(tmp_path: Path) -> None:
+    process = start([str(tmp_path / "none")], stderr=subprocess.PIPE)
+    said = process.communicate()[1]
+    assert process.returncode and b"No such file" in said
+
+
+def test_a_thread_may_end_before_the_process_that_it_started() -> None:
+    found: list[subprocess.Popen[bytes]] = []
+    thread = threading.Thread(target=lambda: found.append(start(["sleep", "60"])))
+    thread.start()
+    thread.join()
+    time.sleep(0.1)
+    assert found[0].poll() is None
+    end(found[0])
