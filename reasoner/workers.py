@@ -14,6 +14,7 @@ import select
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -106,12 +107,16 @@ def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) 
     return process
 
 
-def end(process: Popen[bytes]) -> None:
-    """Kill a process that was started here, with all that it started, and wait for it."""
-    from contextlib import suppress
-
-    with suppress(OSError), process, suppress(ProcessLookupError):
+def kill(process: Popen[bytes]) -> None:
+    """Kill a process that was started here, with all that it started."""
+    with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
+
+
+def end(process: Popen[bytes]) -> None:
+    """Kill a process as `kill` does, and wait for it."""
+    with suppress(OSError), process:
+        kill(process)
 
 
 def call(

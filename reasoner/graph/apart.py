@@ -6,15 +6,16 @@ of the planner itself are asked of the store directly.
 
 from __future__ import annotations
 
+import math
 import pickle
 import re
 import signal
-import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import PIPE, Popen
 from threading import Event, Lock, Timer
 from types import TracebackType
 from typing import Any, TypeAlias
@@ -25,6 +26,7 @@ from reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, Know
 from reasoner.limits import LimitError, current
 from reasoner.names import nearest
 from reasoner.vocabulary import CORE
+from reasoner.workers import end, kill, start
 
 UNION = tuple(BASE + name for name in (*GRAPHS, DERIVED))
 PROCESS = Path(__file__).with_name("asked_apart.py")
@@ -101,7 +103,7 @@ class QueryWorker:
 
     def __init__(self, graph: KnowledgeGraph, limits: QueryLimits, nice: int = 0) -> None:
         self.graph, self.limits, self.nice = graph, limits, nice
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Popen[bytes] | None = None
         self._sending = Lock()
 
     def __enter__(self) -> QueryWorker:
@@ -115,8 +117,7 @@ class QueryWorker:
     def close(self) -> None:
         """End the process, if it has started; a query that it answers ends, too."""
         if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
+            end(self._process)
             self._process = None
 
     def start(self) -> None:
@@ -145,30 +146,25 @@ class QueryWorker:
     def _answer(self, query: str, dataset: Dataset) -> Answer:
         late = Event()
 
-        def end() -> None:
+        def interrupt() -> None:
             late.set()
             self.interrupt()
 
         with self._sending:
             if self._process is None:
-                self._process = subprocess.Popen(
-                    [sys.executable, str(PROCESS)],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                    start_new_session=True,  # Ctrl-C is for us, who end it
-                )
+                command = [sys.executable, str(PROCESS)]
+                self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # it limits each query
                 self._send(self._setup())
             self._send((query, *dataset))
         left, process = current().left, self._process
         assert process.stdout is not None
-        timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), end)
+        timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), interrupt)
         timer.start()
         try:
             found = pickle.load(process.stdout)
         except (EOFError, pickle.UnpicklingError):
             self._process = None
-            process.kill()
+            kill(process)
             said = process.communicate()[1].decode("utf-8", "replace")
             raise self._why(process.returncode, said, late.is_set()) from None
         finally:
