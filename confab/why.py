@@ -11,6 +11,7 @@ from confab.labels import Labels
 from confab.report.markup import Markup, styled, tag
 from planner.causal_links import Change, Kind, Need, Purpose
 from planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
+from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Status, Step
 from planner.plan_costs import cost_of
 from reasoner.graph.knowledge import KnowledgeError
@@ -88,7 +89,8 @@ class Because:
 class WhyNot:
     """Why an alternative isn't what is done: what it lacks, or what plan follows from it and what that costs more.
 
-    `answer` says it. `plan` is the plan that follows, from the beginning to the end, where there is one; `more` what it costs more.
+    `answer` says it. `plan` is the plan that follows, from the beginning to the end, where there is one; `more` what it costs more;
+    `breaks` what levels above ask that this plan breaks and the present one doesn't.
     """
 
     asked: str
@@ -97,6 +99,7 @@ class WhyNot:
     plan: Plan | None = None
     more: float | None = None
     steps: tuple[str, ...] = ()
+    breaks: tuple[str, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """Return it as JSON data."""
@@ -107,13 +110,14 @@ class WhyNot:
             "asked": self.asked,
             "answer": self.answer,
             "lacks": list(self.lacks),
+            "breaks": list(self.breaks),
             "more": self.more,
             "steps": steps,
         }
 
     def __str__(self) -> str:
         """Return it in a few lines."""
-        return "\n".join([self.answer, *(f"  {line}" for line in (*self.lacks, *self.steps))])
+        return "\n".join([self.answer, *(f"  {line}" for line in (*self.lacks, *self.breaks, *self.steps))])
 
     def __repr__(self) -> str:
         """Return it in a few lines."""
@@ -126,7 +130,9 @@ class WhyNot:
     def _repr_html_(self) -> str:
         return styled(
             tag("p", self.answer),
-            tag("ul", [tag("li", line) for line in self.lacks], class_="bad") if self.lacks else None,
+            tag("ul", [tag("li", line) for line in (*self.lacks, *self.breaks)], class_="bad")
+            if self.lacks or self.breaks
+            else None,
             tag("ol", [tag("li", line) for line in self.steps]) if self.steps else None,
         )
 
@@ -443,4 +449,30 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
     count = f"{len(found.plan.primitives)} primitives in the place of {len(plan.primitives)}"
     said = f"costs {more:g} more" if more > 0 else "costs as much" if more == 0 else f"would cost {-more:g} less"
     steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
+    if breaks := _breaks(problem, plan, found.plan, labels):
+        said = f"it can be done only against what a level above asks, and {said} ({count}):"
+        return WhyNot(asked, f"{what}: {said}", (), found.plan, more, steps, breaks)
     return WhyNot(asked, f"{what}: it can be done, and {said} ({count}):", (), found.plan, more, steps)
+
+
+def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:
+    """Return what a level asks that another plan breaks and this one doesn't, in sentences."""
+    first = problem.domain.levels[0]
+    if all(step.level == first for step in other.steps):
+        return ()  # no level is left
+    known = {(one.change, one.conditions) for left in levels_left(problem, plan) for one in left.broken}
+    found = []
+    for level, one in ((left.level, one) for left in levels_left(problem, other) for one in left.broken):
+        if (one.change, one.conditions) in known:
+            continue
+        what = f"{labels.fact(one.change)}: "
+        if one.behavior is None:
+            found.append(f"{what}no behaviour of level {level} brings it about")
+            continue
+        behavior = problem.domain.behaviors[one.behavior]
+        terms = dict(zip((p.name for p in behavior.parameters), one.arguments, strict=True))
+        doing = labels.behavior(behavior, {term: value for term, value in terms.items() if not value.startswith("?")})
+        found.append(
+            f"{what}“{doing}” of level {level} asks that {' and '.join(map(labels.condition, one.conditions))}"
+        )
+    return tuple(dict.fromkeys(found))

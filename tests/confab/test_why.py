@@ -92,6 +92,25 @@ def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Resu
     assert (behavior, tuple(arguments)) in {(s.behavior, s.arguments) for s in told.plan.walk()}
 
 
+def test_what_a_level_above_asks_and_an_alternative_breaks_is_said_first(serving: confab.Result) -> None:
+    """A cup that is filled where it stands is then carried filled, which level 1 forbids and level 2 doesn't know."""
+    told = serving.why_not("B1_POUR bottle1 cup1", 0)
+    (broken,) = told.breaks
+    assert "only against what a level above asks" in told.answer
+    assert broken.startswith(
+        "cup 1 is at location 7: “move cup 1 to location 7” of level 1 asks that (cup 1 carries no beverage"
+    )
+    assert str(told).splitlines()[1].strip() == broken
+    assert told.json()["breaks"] == [broken]
+
+
+def test_an_alternative_that_keeps_its_levels_breaks_nothing(serving: confab.Result) -> None:
+    told = serving.why_not("cup2 LOCATION location8")
+    assert told.plan is not None
+    assert told.breaks == ()
+    assert "it can be done, and" in told.answer
+
+
 def test_who_takes_part_can_be_asked(serving: confab.Result) -> None:
     told = serving.why_not("cup1 LOCATION location7 by right_hand")
     assert told.plan is not None
