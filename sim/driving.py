@@ -70,7 +70,7 @@ class Roller:
         return free(self.at(q), self.radii, self.around, self.margin)
 
     def follow(self, poses: Array) -> Array | None:
-        """Return where the base is along poses, or None if the robot would touch something."""
+        """Return the base's x, y, yaw along poses, or None if the robot touches something there."""
         q = poses[:, BASE]
         return q if self.free(q).all() else None
 

@@ -406,18 +406,20 @@ class Engine:
                 return name
         return None
 
-    def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> int:
-        """Return the number of beads, of one filling or all, inside a vessel at its true pose, or its perceived one if `sensed`."""
+    def inside(self, vessel: str, filling: str | None = None, sensed: bool = False) -> list[Bead]:
+        """Return the beads, of one filling or all, inside a vessel at its true pose, or its perceived one if `sensed`."""
         shape = self.bodies[vessel].shape
         beads = [bead for bead in self.beads if filling is None or bead.filling == filling]
         if shape.kind != "vessel" or not beads:
-            return 0
+            return []
         rotation, base = self.sense(vessel) if sensed else self.truth(vessel)
-        local = (self._places_of(beads) - base) @ rotation
+        local = (self.positions_of(beads) - base) @ rotation
         within = np.hypot(local[:, 0], local[:, 1]) < inner_radius(shape, local[:, 2]) + 0.001
-        return int(np.sum(within & (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)))
+        within &= (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)
+        return [bead for bead, inside in zip(beads, within, strict=True) if inside]
 
-    def _places_of(self, beads: Sequence[Bead]) -> Array:
+    def positions_of(self, beads: Sequence[Bead]) -> Array:
+        """Return the positions (n, 3) of beads."""
         get = pybullet.getBasePositionAndOrientation
         return np.array([get(bead.body, physicsClientId=self.client)[0] for bead in beads])
 
@@ -428,7 +430,7 @@ class Engine:
         seen = self.perceives(vessel)
         if seen or (vessel in self.bodies and (vessel, filling) not in self.told):
             inside = self.inside(vessel, filling, sensed=seen)
-            self.told[vessel, filling] = inside / self.embodiment.fillings[filling].serving
+            self.told[vessel, filling] = len(inside) / self.embodiment.fillings[filling].serving
         return self.told.get((vessel, filling), 0.0)
 
     def servings(self, vessel: str) -> Fraction:
@@ -441,7 +443,7 @@ class Engine:
 
     def stray(self) -> int:
         """Return the number of beads outside all vessels."""
-        return len(self.beads) - sum(self.inside(name) for name in self.bodies)
+        return len(self.beads) - sum(len(self.inside(name)) for name in self.bodies)
 
     # ------------------------------------------------------------------------------------------------- surroundings
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, Place
+from sim.arms import turn
 from sim.collision import Solid
 from sim.urdf import Array, UrdfModel, read_model, rotation
 
@@ -40,18 +41,10 @@ def moved(mechanism: Mechanism, model: UrdfModel, name: str, values: Mapping[str
         if joint.kind == "prismatic":
             shift = shift + turned @ joint.axis * value
         elif joint.kind in ("revolute", "continuous"):
-            local = about(joint.axis, value)
+            local = turn(joint.axis, np.array(value))
             shift = shift + turned @ (joint.origin - local @ joint.origin)
             turned = turned @ local
     return turned, shift
-
-
-def about(axis: Array, angle: float) -> Array:
-    """Return the rotation matrix about a unit axis."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    matrix: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-    return matrix
 
 
 def solids(mechanism: Mechanism, model: UrdfModel, values: Mapping[str, float], aside: Array = HERE) -> Iterator[Solid]:

@@ -19,8 +19,8 @@ from planner.plan import Step
 from reasoner.embodiment.values import Body, PerceiverUse
 from reasoner.possible import refuse_impossible
 from reasoner.symbols import Fact, Problem, State, Symbol
-from sim.bodies import KINDS, center_height, inner_radius, vessel_height
-from sim.engine import Bead, Engine, Thing
+from sim.bodies import KINDS, center_height
+from sim.engine import Engine, Thing
 from sim.linkage import wide
 from sim.perception import tilt_of
 from sim.skills import perform
@@ -212,9 +212,9 @@ def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     for hand in world.hands:
         if world.held(hand) == name:
             world.hands[hand].open()
-    beads = contents(world, name)
+    beads = world.inside(name)
     rotation, base = world.truth(name)
-    inside = [(world_position(world, bead) - base) @ rotation for bead in beads]
+    inside = [(point - base) @ rotation for point in world.positions_of(beads)]
     place = world.place(value)
     thing = world.bodies[name]
     _set(world, thing.body, np.array([*place[:2], place[2] + center_height(thing.shape)]))
@@ -224,7 +224,7 @@ def move(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
 
 def fill(world: World, use: PerceiverUse, symbol: Symbol, value: str) -> None:
     """Empty a vessel, and fill it with the value unless that is `empty`."""
-    for bead in contents(world, symbol.arguments[0]):
+    for bead in world.inside(symbol.arguments[0]):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
     if value != use.values.get("empty"):
@@ -253,7 +253,7 @@ def take_away(world: World, name: str) -> None:
     """Remove an object and its contents from the world, if it is still there."""
     if name not in world.bodies:
         return
-    for bead in contents(world, name):
+    for bead in world.inside(name):
         pybullet.removeBody(bead.body, physicsClientId=world.client)
         world.beads.remove(bead)
     for hand in world.hands:
@@ -262,23 +262,6 @@ def take_away(world: World, name: str) -> None:
     thing = world.bodies.pop(name)
     del world.names[thing.body]
     pybullet.removeBody(thing.body, physicsClientId=world.client)
-
-
-def contents(world: World, vessel: str) -> list[Bead]:
-    """Return the beads inside a vessel."""
-    shape = world.bodies[vessel].shape
-    if shape.kind != "vessel" or not world.beads:
-        return []
-    rotation, base = world.truth(vessel)
-    local = (np.array([world_position(world, bead) for bead in world.beads]) - base) @ rotation
-    within = np.hypot(local[:, 0], local[:, 1]) < inner_radius(shape, local[:, 2]) + 0.001
-    within &= (local[:, 2] > 0) & (local[:, 2] < vessel_height(shape) + 0.002)
-    return [bead for bead, inside in zip(world.beads, within, strict=True) if inside]
-
-
-def world_position(world: World, bead: Bead) -> Array:
-    """Return a bead's position (3,)."""
-    return np.array(pybullet.getBasePositionAndOrientation(bead.body, physicsClientId=world.client)[0])
 
 
 def _set(world: World, body: int, position: Array) -> None:

@@ -77,13 +77,13 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     filling = _filling(world, source)
     serving = world.embodiment.fillings[filling].serving if filling is not None else 1
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
-    had, got = world.inside(source), world.inside(target)
+    had, got = len(world.inside(source)), len(world.inside(target))
     enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
     enough += numbers["along"] * max(had / serving - round(had / serving) - SPARE, NEARLY - enough)
     nearly = max(NEARLY * enough, numbers["least_poured"] + 1 / serving)  # one bead may be lost
 
     def poured() -> float:
-        return (had - world.inside(source)) / serving
+        return (had - len(world.inside(source))) / serving
 
     servo.turn(numbers["hold_back"], numbers["fast"])
     steepest, more = 0.0, True
@@ -99,7 +99,7 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     if abs(measured["tilt_rad"] - numbers["hold_back"]) > numbers["angle_tolerance"]:
         raise SkillError("tracking error", world.touching(attempt.hand), **measured)
     if world.beads:
-        measured["poured"] = (world.inside(target) - got) / serving
+        measured["poured"] = (len(world.inside(target)) - got) / serving
         measured["spilled"] = (world.stray() - attempt.stray) / serving
         _check_pour(source, target, measured, numbers)
     elif filling is not None:

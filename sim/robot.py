@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +54,6 @@ class Manipulator:
     pace: float = 1.0
     limit: float = math.inf
     deadline: float = math.inf
-    links: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def limits(self) -> MotionLimits:
@@ -226,7 +225,6 @@ def _manipulator(
         tuple(efforts[name] for name in hand.arm),
         efforts[hand.fingers[0]],
         np.array(hand.home),
-        links=links,
     )
 
 
