@@ -48,7 +48,7 @@ ROUNDED = 3
 THIN = 0.01
 """Opening in metres of fingers that are closed around a handle."""
 
-WARY = 0.5
+WITHDRAWAL_SPEED = 0.5
 """Share of its speed at which a stopped hand withdraws."""
 
 SAMPLES = 1500
@@ -80,7 +80,7 @@ class Attempt:
         before = {}
         for name in world.bodies:
             carrier = world.carried_by(name)
-            before[name] = carrier, _seen_from(world, carrier, name)
+            before[name] = carrier, _position_in(world, carrier, name)
         return cls(world, world.hands[hand], world.held(hand), before, world.stray())
 
     def released(self) -> Attempt:
@@ -236,7 +236,7 @@ class Attempt:
         now = self.hand.measured()
         self.hand.command(now)
         passed = q[: int(np.abs(q - now).max(1).argmin()) + 1]
-        self.follow(np.concatenate([now[None], passed[::-1]]), WARY)
+        self.follow(np.concatenate([now[None], passed[::-1]]), WITHDRAWAL_SPEED)
 
     def straight(
         self,
@@ -303,10 +303,10 @@ class Attempt:
     def check_others(self, numbers: Numbers, *moved: str) -> None:
         """Raise `SkillError` if a body other than the `moved` and the held one was shifted or toppled."""
         for name, (carrier, position) in self.before.items():
-            if name in (*moved, self.held, *self.world.elsewhere) or name not in self.world.bodies:
+            if name in (*moved, self.held, *self.world.moved_by_others) or name not in self.world.bodies:
                 continue
             rotation = self.world.truth(name)[0]
-            shift = float(np.linalg.norm(_seen_from(self.world, carrier, name) - position))
+            shift = float(np.linalg.norm(_position_in(self.world, carrier, name) - position))
             if tilt_of(rotation) > 0.5:
                 raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
             if shift > numbers["disturbance"]:
@@ -339,7 +339,7 @@ def rounding(reacher: Reacher, q: Array) -> int:
     return next((n for n in range(ROUNDED, 0, -1) if reacher.free(smooth(q, n)).all()), 0)
 
 
-def _seen_from(world: Engine, carrier: str, body: str) -> Array:
+def _position_in(world: Engine, carrier: str, body: str) -> Array:
     """Return a body's position in the frame of its carrier."""
     turned, origin = world.carrier(carrier)
     local: Array = (world.truth(body)[1] - origin) @ turned

@@ -74,7 +74,7 @@ def read_base(client: int, body: int, robot: Robot, miss: float) -> Base:
     return base
 
 
-def astray(base: Base, stand: Stand) -> tuple[float, float]:
+def offset_from_stand(base: Base, stand: Stand) -> tuple[float, float]:
     """Return the distance in metres and the angle in radians between a base and a stand."""
     x, y, yaw = base.pose() - np.array([*stand.position[:2], stand.yaw])
     return float(np.hypot(x, y)), abs(float(np.angle(np.exp(1j * yaw))))

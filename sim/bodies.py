@@ -86,7 +86,7 @@ def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) 
         planks="\n".join(planks),
     )
     body = load_written(text, position, orientation, mesh, useMaximalCoordinates=True, physicsClientId=client)
-    return _rub(client, shape, body)
+    return _with_friction(client, shape, body)
 
 
 def load_written(text: str, position: ArrayLike, orientation: ArrayLike, mesh: str = "", **options: Any) -> int:
@@ -194,7 +194,7 @@ def make_turned(client: int, shape: Shape, position: Array, orientation: Array) 
     inertia = shape.mass * (radius**2 / 4 + height**2 / 12)
     text = TURNED.format(center=center_height(shape), mass=shape.mass, inertia=inertia, solids="\n".join(lines))
     body = load_written(text, position, orientation, useMaximalCoordinates=True, physicsClientId=client)
-    return _rub(client, shape, body)
+    return _with_friction(client, shape, body)
 
 
 TURNED = """<robot name="turned"><link name="turned">
@@ -251,10 +251,10 @@ def _body(client: int, shape: Shape, collision: int, visual: int, position: Arra
         useMaximalCoordinates=True,
         physicsClientId=client,
     )
-    return _rub(client, shape, body)
+    return _with_friction(client, shape, body)
 
 
-def _rub(client: int, shape: Shape, body: int) -> int:
+def _with_friction(client: int, shape: Shape, body: int) -> int:
     """Set a body's friction, and return the body."""
     pybullet.changeDynamics(
         body,

@@ -27,10 +27,10 @@ BASE = np.array([0, 1, 3])
 MARGIN = 0.02
 """Margin in metres between a driving robot and its obstacles."""
 
-GENTLY = 0.8
+RAMP_SECONDS = 0.8
 """Seconds in which a base reaches its speed; slow enough that no load slips and no full cup spills."""
 
-ASTRAY = 0.03
+STOPPED_LAG = 0.03
 """Lag in metres or radians behind its command from which on a base counts as stopped."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
@@ -114,8 +114,8 @@ def drive(engine: Engine, robot: str, stand: str) -> None:
         engine.run(1)
         if engine.steps % 6 == 0:
             _check(engine, base, pose, tuple(loads))
-    engine.run(round(GENTLY * engine.rate / 4))
-    take_up(engine, base)
+    engine.run(round(RAMP_SECONDS * engine.rate / 4))
+    update_kinematics(engine, base)
     for hand, load in loads.items():
         if load is not None and engine.held(hand) != load:
             raise SkillError("slip or drop", (load,), f"{load} was lost on the way")
@@ -144,7 +144,7 @@ def _planned(engine: Engine, base: Base, goal: Array, loads: dict[str, str | Non
         raise SkillError("no path", named(*things, *blame.objects), clearance_m=blame.clearance)
     q = polyline(reached[1])[:, BASE]
     top = np.array([base.robot.driving, base.robot.driving, base.robot.turning])
-    found = scheduled(q, q, top, top / GENTLY, engine.rate)[0]
+    found = scheduled(q, q, top, top / RAMP_SECONDS, engine.rate)[0]
     engine.clock.planning += time.process_time() - begin
     return found
 
@@ -155,12 +155,12 @@ def _check(engine: Engine, base: Base, wanted: Array, hands: tuple[str, ...]) ->
     if engine.steps > hand.deadline:
         raise SkillError("too slow", (base.robot.name,), seconds=hand.limit)
     lag = float(np.abs(base.pose() - wanted).max())
-    if lag > ASTRAY:
-        take_up(engine, base)
+    if lag > STOPPED_LAG:
+        update_kinematics(engine, base)
         raise SkillError("tracking error", engine.touching(hand) or (base.robot.name,), base_lag_m=lag)
 
 
-def take_up(engine: Engine, base: Base) -> None:
+def update_kinematics(engine: Engine, base: Base) -> None:
     """Update the kinematics of a robot's arms to the present pose of its base."""
     robot = base.robot
     model = read_robot(robot, base.pose())

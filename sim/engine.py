@@ -31,7 +31,7 @@ from sim.verdict import SkillError
 RATE = 240.0
 """Simulation steps per second."""
 
-CLINGING = 0.005
+CONTACT_SHIFT = 0.005
 """Metres that two bodies may shift along each other before Bullet drops their contact and detects it anew.
 
 Bullet's default of 2 cm suits larger bodies: a finger that has left a ledge would still press where the ledge was.
@@ -46,7 +46,7 @@ LOOKS = 6
 STEADY = 5.0
 """Standard deviations of the perceived position within which a body counts as unmoved."""
 
-BESIDE = 0.05
+NEAR_PLACE = 0.05
 """Maximum distance in metres between a place and a body that is at it."""
 
 
@@ -110,13 +110,13 @@ class Engine:
         self.known: dict[
             str, tuple[str, Array, Array]
         ] = {}  # by body: its carrier when last seen, and its rotation and base in the carrier's frame
-        self.told: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
+        self.last_amounts: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
         self.sighted: tuple[int, Sight] | None = None
         self.remembered: dict[str, int] = {}
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.filled: dict[str, float] = {}
-        self.elsewhere: set[str] = set()  # bodies that other hands or interventions move during the present skill
+        self.moved_by_others: set[str] = set()  # bodies that other hands or interventions move during the present skill
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
             raise RuntimeError("PyBullet could not start a physics server")
@@ -125,7 +125,7 @@ class Engine:
             fixedTimeStep=1 / RATE,
             numSolverIterations=50,
             deterministicOverlappingPairs=1,
-            contactBreakingThreshold=CLINGING,
+            contactBreakingThreshold=CONTACT_SHIFT,
             physicsClientId=self.client,
         )
 
@@ -376,7 +376,7 @@ class Engine:
         base = self.truth(name)[1] if base is None else base
         gaps = {place.name: float(np.linalg.norm(self.place(place.name) - base)) for place in carried}
         best = min(gaps, key=gaps.__getitem__, default="")
-        return self.embodiment.places[best].carrier if best and gaps[best] < BESIDE else ""
+        return self.embodiment.places[best].carrier if best and gaps[best] < NEAR_PLACE else ""
 
     def top(self, name: str) -> Array:
         """Return the middle of a body's perceived top, which for a vessel is the mouth."""
@@ -389,7 +389,7 @@ class Engine:
         gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
         below = {name: float(point[2] - where[2]) for name, where in points.items()}
         best = min(
-            gaps, key=lambda name: (below[name] < -BESIDE, round(gaps[name], 2), max(below[name], 0.0), gaps[name])
+            gaps, key=lambda name: (below[name] < -NEAR_PLACE, round(gaps[name], 2), max(below[name], 0.0), gaps[name])
         )
         return best, gaps[best]
 
@@ -428,10 +428,10 @@ class Engine:
         if not self.beads:
             return float(filling in self.contents.get(vessel, ()))
         seen = self.perceives(vessel)
-        if seen or (vessel in self.bodies and (vessel, filling) not in self.told):
+        if seen or (vessel in self.bodies and (vessel, filling) not in self.last_amounts):
             inside = self.inside(vessel, filling, sensed=seen)
-            self.told[vessel, filling] = len(inside) / self.embodiment.fillings[filling].serving
-        return self.told.get((vessel, filling), 0.0)
+            self.last_amounts[vessel, filling] = len(inside) / self.embodiment.fillings[filling].serving
+        return self.last_amounts.get((vessel, filling), 0.0)
 
     def servings(self, vessel: str) -> Fraction:
         """Return the perceived number of servings in a vessel; without beads, the counted number."""

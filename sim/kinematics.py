@@ -73,11 +73,13 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
     upper = np.stack([u, normal, cross(u, normal)], -1) @ zero.T
     elbow = side * _arccos(np.einsum("ni,ni->n", u, f)) - bent
     hand = np.swapaxes(upper @ turn(arm.axes[3], elbow), -1, -2) @ last
-    q = np.concatenate([_gentler(arm, upper, 0), elbow[:, None], _gentler(arm, hand, 4)], -1)
+    q = np.concatenate(
+        [_angles_far_from_limits(arm, upper, 0), elbow[:, None], _angles_far_from_limits(arm, hand, 4)], -1
+    )
     return q, valid
 
 
-def _gentler(arm: Arm, r: Array, first: int) -> Array:
+def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
     """Return the angles (n, 3) of the spherical joint from joint `first` on; with parallel axes, those farther from the limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)

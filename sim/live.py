@@ -83,7 +83,7 @@ class LiveWorld:
         try:
             verdict = self.world.execute(step)
         finally:
-            self.concerned, self.world.elsewhere = set(), set()
+            self.concerned, self.world.moved_by_others = set(), set()
         if not verdict.ok:
             self.take_stock()
         return verdict
@@ -154,7 +154,7 @@ class LiveWorld:
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
             self._interfere(intervention)
-            self.world.elsewhere = self.world.elsewhere | _named(intervention)  # the hand didn't disturb these
+            self.world.moved_by_others |= _named(intervention)  # the hand didn't disturb these
             happened = happened or not _named(intervention).isdisjoint(self.concerned)
         if happened:
             raise SkillError("interrupted", tuple(sorted(self.concerned)), "an intervention changed an object of it")

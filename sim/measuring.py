@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reasoner.embodiment.values import Guard, Phase
-from sim.base import astray
+from sim.base import offset_from_stand
 from sim.perception import tilt_of
 from sim.running import Run
 from sim.verdict import SkillError
@@ -70,8 +70,8 @@ def _value(run: Run) -> float:
     return mechanic.values()[link]
 
 
-def _astray(run: Run) -> float:
-    return max(astray(run.world.bases[run.roles["robot"]], run.world.embodiment.stands[run.roles["target"]]))
+def _stand_offset(run: Run) -> float:
+    return max(offset_from_stand(run.world.bases[run.roles["robot"]], run.world.embodiment.stands[run.roles["target"]]))
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ QUANTITIES: Mapping[str, MeasuredQuantity] = {
     "push": MeasuredQuantity(lambda run: run.attempt.hand.push(), "force_n", "stuck"),
     "grip": MeasuredQuantity(_grip, "grip_n", "slip or drop"),
     "bearing": MeasuredQuantity(_bearing, "bearing_n", "misplaced"),
-    "astray": MeasuredQuantity(_astray, "off_stand_m", "misplaced"),
+    "astray": MeasuredQuantity(_stand_offset, "off_stand_m", "misplaced"),
     "leaning": MeasuredQuantity(
         lambda run: tilt_of(run.world.truth(run.feature_of("target")[0])[0]), "tilt_rad", "toppled"
     ),

@@ -30,7 +30,7 @@ COARSE = 6
 JUMP = 0.35
 """Maximum motion in radians of a joint between neighbouring poses of a path; more indicates a singularity."""
 
-TREMBLE = 0.001
+APPROACH_TOLERANCE = 0.001
 """Metres by which a hand that leaves an obstacle within the margin may still approach it."""
 
 FEWEST = 5
@@ -109,16 +109,16 @@ class Reacher:
     def follow(self, poses: Array) -> Array | None:
         """Return the postures along sampled poses, or None if one is out of reach, in collision or past a singularity."""
         q, valid = self.solve(poses)
-        return q if self._goes(q, valid) else None
+        return q if self._feasible(q, valid) else None
 
     def first(self, ways: Sequence[Array]) -> int | None:
         """Return the number of the first of some paths that can be followed, or None. All are solved at once, which is faster."""
         q, valid = self.solve(np.concatenate(ways))
         ends = np.cumsum([len(way) for way in ways])[:-1]
         pairs = zip(np.split(q, ends), np.split(valid, ends), strict=True)
-        return next((i for i, pair in enumerate(pairs) if self._goes(*pair)), None)
+        return next((i for i, pair in enumerate(pairs) if self._feasible(*pair)), None)
 
-    def _goes(self, q: Array, valid: Flags) -> bool:
+    def _feasible(self, q: Array, valid: Flags) -> bool:
         """Return whether postures are within reach, continuous and free."""
         if not valid.all() or (len(q) > 1 and np.abs(np.diff(q, axis=0)).max() > JUMP):
             return False
@@ -238,7 +238,7 @@ def leave(reacher: Reacher, start: Array) -> Array | None:
             goal[:3] += metres * way / np.linalg.norm(way)
             q, valid = reacher.solve(line(start, goal))
             gaps = reacher.mover.clearances(q, reacher.around).values()
-            rising = all((gap >= min(gap[0], reacher.margin) - TREMBLE).all() for gap in gaps)
+            rising = all((gap >= min(gap[0], reacher.margin) - APPROACH_TOLERANCE).all() for gap in gaps)
             if valid.all() and rising and all(gap[-1] > reacher.margin for gap in gaps):
                 return goal
     return None

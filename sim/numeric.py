@@ -52,16 +52,16 @@ def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: flo
             break
         q = found[left]
         if start is None:
-            q = _led(arm, q, last[left], p[left], low, high)
+            q = _led_postures(arm, q, last[left], p[left], low, high)
         else:
             free = _free(arm)
             q[:, free] = start[free]
-        q, good = _searched(arm, q, last[left], p[left], low, high, STEPS)
+        q, good = _search(arm, q, last[left], p[left], low, high, STEPS)
         found[left[good]], valid[left[good]] = q[good], True
         left = left[~good]
     if fold and valid.any():
         some = np.flatnonzero(valid)
-        valid[some] = _least(arm, found[some]) > SINGULAR * np.sin(fold)
+        valid[some] = _least_singular_value(arm, found[some]) > SINGULAR * np.sin(fold)
     return found, valid
 
 
@@ -70,7 +70,7 @@ def _free(arm: Arm) -> list[int]:
     return [i for i in range(len(arm.joints)) if not (arm.swivels and i == REDUNDANT)]
 
 
-def _led(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> Array:
+def _led_postures(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> Array:
     """Return the postures (n, k) near the goal poses that the arm reaches when the hand is led there from postures `q`."""
     axis, foot = arm.axes[0], arm.origins[0]
     ahead, wanted = hand_frames(arm, q)[1] - foot, p - foot
@@ -81,11 +81,11 @@ def _led(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array) -> 
     first = r @ arm.tip_rotation.T
     turned = _angle(last @ np.swapaxes(first, -1, -2))
     for share in np.linspace(0.0, 1.0, STRETCHES + 1)[1:]:
-        q, _ = _searched(arm, q, turn_about(turned * share) @ first, begin + share * (p - begin), low, high, EACH)
+        q, _ = _search(arm, q, turn_about(turned * share) @ first, begin + share * (p - begin), low, high, EACH)
     return q
 
 
-def _searched(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array, steps: int) -> tuple[Array, Flags]:
+def _search(arm: Arm, q: Array, last: Array, p: Array, low: Array, high: Array, steps: int) -> tuple[Array, Flags]:
     """Return the postures (n, k) at which searches from `q` end, and which of them reach the goal.
 
     The goal is the rotation `last` of the last link relative to the zero posture, and the hand's point `p`.
@@ -128,7 +128,7 @@ def _angle(r: Array) -> Array:
     return np.asarray(skew * (angle / np.maximum(sine, 1e-12))[:, None])
 
 
-def _least(arm: Arm, q: Array) -> Array:
+def _least_singular_value(arm: Arm, q: Array) -> Array:
     """Return the least singular values (n,) of the Jacobian, with lengths in units of half the arm's length."""
     jacobian = _error(arm, q, np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3)))[1]
     jacobian[:, :3] /= arm.length / 2

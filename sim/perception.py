@@ -18,7 +18,7 @@ import numpy as np
 from reasoner.amounts import written
 from reasoner.embodiment.values import PerceiverUse
 from reasoner.symbols import FALSE, TRUE
-from sim.base import astray
+from sim.base import offset_from_stand
 from sim.bodies import height_of
 from sim.engine import Engine
 from sim.urdf import Array
@@ -214,7 +214,7 @@ def observe_stand(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     if arguments[0] not in world.bases:
         return None
     for name, stand in world.embodiment.stands.items():
-        away, turned = astray(world.bases[arguments[0]], stand)
+        away, turned = offset_from_stand(world.bases[arguments[0]], stand)
         if away < use.numbers["nearness"] and turned < use.numbers["angle_tolerance"]:
             return name
     return None

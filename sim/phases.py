@@ -95,16 +95,16 @@ def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
 
 def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     if phase.motion == "free":
-        _looking(run, phase, lambda: _free(run, phase, later))
+        _with_looks(run, phase, lambda: _free(run, phase, later))
     else:
         FINGERS[phase.fingers](run, phase)
-        _looking(run, phase, lambda: MOTIONS[phase.motion](run, phase))
+        _with_looks(run, phase, lambda: MOTIONS[phase.motion](run, phase))
     run.world.run(round(run.number(phase.wait) * run.world.rate))
     for guard in phase.checks:
         check(run, phase, guard)
 
 
-def _looking(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
+def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
     """Do a motion; with noisy perception, look again and repeat it if it was blocked or stopped by a known body."""
     world, hand = run.world, run.attempt.hand
     for looks in range(1, LOOKS + 1):

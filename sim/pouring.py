@@ -31,10 +31,10 @@ FOLD = 0.1
 SHARES = (1.0, 0.95, 0.9, 0.8)
 """Shares, tried in turn, of the shift that keeps the lip in place while a hand rolls back."""
 
-LONGEST = 2400
+MOST_STEPS = 2400
 """Maximum number of simulation steps of one roll."""
 
-PATIENCE = 6
+LAG_CHECK = 6
 """Steps between checks of the arm's lag."""
 
 LOOK = 4
@@ -43,10 +43,10 @@ LOOK = 4
 FLOWING = 0.1
 """Seconds over which the flow's rate is measured."""
 
-NEARLY = 0.9
+SUFFICIENT = 0.9
 """Share of the wanted amount that suffices when the flow stops."""
 
-SPARE = 0.25
+SURPLUS = 0.25
 """Fraction of a serving beyond whole ones that should stay in the source: half of the tolerance of rounding. Beads stuck in a neck
 come
 all at once and cannot be put back, whereas too little only takes another tilt."""
@@ -79,8 +79,8 @@ def tilt(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> Mapping[s
     servo = _Servo(world, attempt.hand, _plan(attempt, source, target, numbers))
     had, got = len(world.inside(source)), len(world.inside(target))
     enough = numbers["cut_off"] - numbers["early"] * max(had / serving - 2.0, 0.0)
-    enough += numbers["along"] * max(had / serving - round(had / serving) - SPARE, NEARLY - enough)
-    nearly = max(NEARLY * enough, numbers["least_poured"] + 1 / serving)  # one bead may be lost
+    enough += numbers["along"] * max(had / serving - round(had / serving) - SURPLUS, SUFFICIENT - enough)
+    nearly = max(SUFFICIENT * enough, numbers["least_poured"] + 1 / serving)  # one bead may be lost
 
     def poured() -> float:
         return (had - len(world.inside(source))) / serving
@@ -133,7 +133,7 @@ def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> 
         shifts[:, 2] += height * (np.maximum(np.cos(angles), 0) - max(np.cos(angle), 0))
     servo = _Servo(world, hand, _way_back(attempt, angles, poses, shifts), angle)
     servo.turn(0.0, numbers["fast"])
-    world.run(2 * PATIENCE)
+    world.run(2 * LAG_CHECK)
     measured = {"tilt_rad": tilt_of(hand.frame()[0])} | attempt.check_grip(numbers)
     if measured["tilt_rad"] > numbers["upright_angle"]:
         raise SkillError("tracking error", world.touching(hand), **measured)
@@ -254,13 +254,13 @@ class _Servo:
 
     def turn(self, goal: float, speed: float) -> None:
         """Roll to an angle."""
-        for step in range(LONGEST):
+        for step in range(MOST_STEPS):
             if self.angle == goal:
                 return
             self._approach(goal, speed)
-            if step % PATIENCE == 0:
+            if step % LAG_CHECK == 0:
                 self.world.check_course(self.hand)
-        raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+        raise SkillError("too slow", (self.hand.hand.name,), seconds=MOST_STEPS * self.tick)
 
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
         """Roll on slowly while nothing flows, and wait while beverage flows; return whether `enough` is `poured`.
@@ -270,7 +270,7 @@ class _Servo:
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))
-        for step in range(LONGEST):
+        for step in range(MOST_STEPS):
             if step % LOOK == LOOK - 1:
                 looks = [*looks[1:], poured()]
             now, rate = looks[-1], (looks[-1] - looks[0]) / FLOWING
@@ -281,9 +281,9 @@ class _Servo:
             if still > numbers["wait"] / self.tick:
                 return False
             self._approach(numbers["pour_angle"], numbers["slow"] if flowing <= 0 else 0.0)
-            if step % PATIENCE == 0:
+            if step % LAG_CHECK == 0:
                 self.world.check_course(self.hand)
-        raise SkillError("too slow", (self.hand.hand.name,), seconds=LONGEST * self.tick)
+        raise SkillError("too slow", (self.hand.hand.name,), seconds=MOST_STEPS * self.tick)
 
     def _approach(self, goal: float, speed: float) -> None:
         """Advance for one simulation step towards an angle, at most at `speed`."""

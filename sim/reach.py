@@ -135,10 +135,10 @@ def fingerprint(embodiment: Embodiment) -> str:
     """Return a SHA-256 hash of all inputs of reach: files by content, numbers by value."""
     parts = [VERSION]
     for robot in embodiment.robots:
-        values = _told(asdict(robot), ("driving", "turning") if not robot.driving else ())
+        values = _without(asdict(robot), ("driving", "turning") if not robot.driving else ())
         bare = ("gripper", "flange", "mounting")
         values["hands"] = tuple(
-            {**hand, "gripper": _content(hand["gripper"])} if hand["gripper"] else _told(hand, bare)
+            {**hand, "gripper": _content(hand["gripper"])} if hand["gripper"] else _without(hand, bare)
             for hand in values["hands"]
         )
         values["urdf"] = _content(robot.urdf)
@@ -167,8 +167,9 @@ def _content(file: Path | str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
-def _told(values: dict[str, Any], without: Sequence[str]) -> dict[str, Any]:
-    return {name: value for name, value in values.items() if name not in without}
+def _without(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return values without some names."""
+    return {name: value for name, value in values.items() if name not in names}
 
 
 def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel, solids: Sequence[Solid]) -> Reacher:

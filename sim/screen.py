@@ -17,7 +17,7 @@ import pybullet
 from sim.engine import Engine
 from sim.picture import view_of
 
-OFTEN = 4
+PACE_CHECK = 4
 """Simulation steps between comparisons with the clock."""
 
 
@@ -71,7 +71,7 @@ class Screen:
         if world.current != self._current:
             self._current = world.current
             self._write(world)
-        if world.steps % OFTEN == 0:
+        if world.steps % PACE_CHECK == 0:
             begin, steps = self._begin
             ahead = (world.steps - steps) / world.rate / self.speed - (time.monotonic() - begin)
             if ahead > 0:

@@ -11,7 +11,7 @@ import pybullet
 from reasoner.embodiment.values import Fixture, Mechanism, Shape
 from sim.base import read_base
 from sim.bodies import KINDS, packed
-from sim.driving import take_up
+from sim.driving import update_kinematics
 from sim.engine import Bead, Engine, Thing
 from sim.mechanisms import load_mechanism
 from sim.perception import Draft
@@ -88,7 +88,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
             )
         there = engine.embodiment.stands[stand]
         engine.bases[robot].set(np.array([*there.position[:2], there.yaw]))
-        take_up(engine, engine.bases[robot])
+        update_kinematics(engine, engine.bases[robot])
     for name, place in draft.places.items():
         if place not in engine.embodiment.places:
             raise ValueError(
@@ -107,7 +107,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
         for name, filling in ((name, filling) for name, all_in in draft.contents.items() for filling in all_in):
             pour_in(engine, name, filling, perturb)
     engine.run(SETTLING)
-    doze(engine)
+    put_to_sleep(engine)
     engine.steps = 0
 
 
@@ -163,7 +163,7 @@ def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | Non
         engine.beads.append(Bead(bead, filling))
 
 
-def doze(engine: Engine) -> None:
+def put_to_sleep(engine: Engine) -> None:
     """Put bodies and beads to sleep until something touches them, so that beads at rest cost no time."""
     for body in [*[thing.body for thing in engine.bodies.values()], *[bead.body for bead in engine.beads]]:
         for state in (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_SLEEP):

@@ -49,7 +49,7 @@ class _Job:
 
     def __init__(self, world: World, step: Step, position: int, worker: str) -> None:
         self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
-        self.elsewhere: set[str] = set()
+        self.moved_by_others: set[str] = set()
         self.verdict: Verdict | None = None
         self.error: BaseException | None = None
         self.go, self.paused = Semaphore(0), Semaphore(0)
@@ -95,7 +95,7 @@ def perform_together(
     """
     order, workers = partial_order(problem, primitives), workers_of(problem)
     urgency = urgency_of(order)
-    where = [_where(world, step) for step in primitives]
+    where = [_workplace(world, step) for step in primitives]
     index = {id(step): i for i, step in enumerate(primitives)}
 
     def flowing(step: Step) -> bool:
@@ -127,8 +127,8 @@ def perform_together(
             for job in list(jobs):
                 for other in jobs:
                     if other is not job:
-                        job.elsewhere |= _seen_to(world, other.step)
-                world.elsewhere = job.elsewhere
+                        job.moved_by_others |= _moved_bodies(world, other.step)
+                world.moved_by_others = job.moved_by_others
                 current.append(job)
                 job.advance()
                 current.pop()
@@ -140,7 +140,7 @@ def perform_together(
             if world.steps % LOOKING == 0 and arms_touch(world):
                 touching += LOOKING
     finally:
-        world.run, world.elsewhere = step_once, set()  # type: ignore[method-assign]
+        world.run, world.moved_by_others = step_once, set()  # type: ignore[method-assign]
     ordered = sorted(done.values(), key=lambda pair: (pair[0].begin, pair[0].position))
     return Performance(
         tuple(slot for slot, _ in ordered), tuple(verdict for _, verdict in ordered), touching / world.rate
@@ -160,14 +160,14 @@ def arms_touch(world: World) -> bool:
     return False
 
 
-def _seen_to(world: World, step: Step) -> set[str]:
+def _moved_bodies(world: World, step: Step) -> set[str]:
     """Return the bodies that a primitive may move: those that it names, and the loads of its hands."""
     named = {*step.arguments, *step.bindings.values()}
     held = {world.held(hand) for hand in named & world.hands.keys()}
     return {name for name in named | held if name is not None and name in world.bodies}
 
 
-def _where(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
+def _workplace(world: World, step: Step) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
     """Return a function that returns a primitive's present place of work (2,): its last body or place, else its hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)

@@ -100,7 +100,7 @@ class Timeline:
             found = by_first if len(by_first) <= MOST_HANDS else found
         return dict(sorted(found.items()))
 
-    def told(self) -> list[Symbol]:
+    def shown_symbols(self) -> list[Symbol]:
         """Return the symbols that change or have a goal, those with a goal first."""
         goal = self.problem.goal
         symbols = {s for s, phases in self.phases.items() if len(phases) > 1} | set(goal)

@@ -114,7 +114,7 @@ def timeline(course: Timeline, labels: Labels | None = None, speed: float | None
     """
     if not course.bars:
         return Markup("")
-    symbols = course.told()
+    symbols = course.shown_symbols()
     late = any(phase.begin >= course.end for s in symbols for phase in course.phases[s])
     end = (course.end or 1.0) * (1 + LAST if late else 1)  # leaves room for the last primitive's effects
     rows: list[Markup] = []

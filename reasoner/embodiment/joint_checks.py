@@ -68,7 +68,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
         own = {part.name: part for part in link.parts if part.kind != "mesh"}
         for feature in link.features.values():
             touched = [part for name in feature.parts if (part := own.get(name)) is not None]
-            away = min((_apart(feature, part) for part in touched), default=0.0)
+            away = min((_least_distance(feature, part) for part in touched), default=0.0)
             if len(touched) == len(feature.parts) and away > max(openings):
                 yield (
                     touched[0].name,
@@ -79,7 +79,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
                 )
 
 
-def _apart(feature: Feature, part: Part) -> float:
+def _least_distance(feature: Feature, part: Part) -> float:
     """Return the distance of a feature from the sphere around a part, a lower bound of that from the part."""
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
@@ -105,8 +105,10 @@ def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
     grounds = {mechanism.name: mechanism for mechanism in embodiment.mechanisms}
     for place in embodiment.places.values():
         parts = bodies.get(place.carrier, ())
-        near = [part for part in parts if _beside(part, place.position) <= 0]
-        if not parts or any(_odd(part) for part in parts if math.dist(part.position, place.position) < max(part.size)):
+        near = [part for part in parts if _distance_beside(part, place.position) <= 0]
+        if not parts or any(
+            _without_flat_top(part) for part in parts if math.dist(part.position, place.position) < max(part.size)
+        ):
             continue
         x, y, z = place.position
         tops = [part.position[2] + part.size[2] / 2 for part in near]
@@ -134,12 +136,12 @@ def _bodies(embodiment: Embodiment) -> Iterator[tuple[str, tuple[Part, ...]]]:
             yield from ((link.name, link.parts) for link in mechanism.links)
 
 
-def _odd(part: Part) -> bool:
+def _without_flat_top(part: Part) -> bool:
     """Return whether a solid has no horizontal top, or one that is not computed here."""
     return part.kind not in ("box", "cylinder") or any(abs(angle) > 1e-6 for angle in part.turned[:2])
 
 
-def _beside(part: Part, point: tuple[float, float, float]) -> float:
+def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
     """Return the horizontal distance of a point from an upright solid; at most 0 if it is above, below or inside."""
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":

@@ -16,7 +16,7 @@ JOINTS = ("revolute", "prismatic", "fixed")
 
 def mechanisms(facts: BodyFacts, names: Callable[[str], str], folders: Sequence[Path]) -> tuple[Mechanism, ...]:
     """Return the mechanisms of a scene, each with its links."""
-    _all_hang(facts)
+    _check_parents(facts)
     return tuple(_mechanism(facts, node, names, folders) for node in facts.members("Mechanism"))
 
 
@@ -32,7 +32,7 @@ def _mechanism(facts: BodyFacts, node: str, names: Callable[[str], str], folders
     )
 
 
-def _all_hang(facts: BodyFacts) -> None:
+def _check_parents(facts: BodyFacts) -> None:
     """Raise `EmbodimentError` if a link is part of no mechanism, or of itself."""
     mechanisms = {*facts.members("Mechanism")}
     for node in facts.ordered(node for node, links in facts.links.items() if "part_of" in links):
@@ -40,11 +40,11 @@ def _all_hang(facts: BodyFacts) -> None:
         while above[-1] not in mechanisms:
             parents = facts.linked(above[-1], "part_of")
             if len(parents) != 1 or parents[0] in above:
-                raise EmbodimentError(_unhung(above, parents), node)
+                raise EmbodimentError(_no_mechanism(above, parents), node)
             above.append(parents[0])
 
 
-def _unhung(above: Sequence[str], parents: Sequence[str]) -> str:
+def _no_mechanism(above: Sequence[str], parents: Sequence[str]) -> str:
     """Return the message for a link whose chain of parents, `above`, does not end at a mechanism."""
     if not parents:
         why = f"{above[-1]} is neither an e:Mechanism nor part of one"

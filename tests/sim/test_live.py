@@ -38,7 +38,7 @@ def test_a_hand_is_not_to_blame_for_what_a_person_moves_meanwhile(live: LiveWorl
     live.announce((put("cup2", "location6", at=0.4),))
     assert live.execute(REACH).ok
     assert live.observe()[Symbol("LOCATION", ("cup2",))] == "location6"
-    assert live.world.elsewhere == set()
+    assert live.world.moved_by_others == set()
 
 
 def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) -> None:
