@@ -154,8 +154,9 @@ class LiveWorld:
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
             self._interfere(intervention)
-            self.world.moved_by_others |= _named(intervention)  # the hand didn't disturb these
-            happened = happened or not _named(intervention).isdisjoint(self.concerned)
+            named = _named(intervention)
+            self.world.moved_by_others = self.world.moved_by_others | named  # the hand didn't disturb these
+            happened = happened or not named.isdisjoint(self.concerned)
         if happened:
             raise SkillError("interrupted", tuple(sorted(self.concerned)), "an intervention changed an object of it")
 
