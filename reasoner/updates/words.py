@@ -6,7 +6,7 @@ written, and its place. What else there is in the tree (groups, filters, unions)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
@@ -226,7 +226,7 @@ def triples(block: Sequence[Any]) -> Iterator[Triple]:
 
 
 def _value(value: Any, cells: Mapping[object, list[Any]], at: int) -> Value:
-    if value not in cells:
+    if not isinstance(value, Hashable) or value not in cells:  # a text is a part of the tree, which has no hash
         return term(value, at)
     found = []
     while str(value) != NIL:
@@ -250,8 +250,15 @@ def term(value: Any, at: int) -> Said:
         return Truth(said)
     if isinstance(said, int | float | Decimal):
         return Number(Fraction(str(value)))
-    shown = f"'{value}'" if type(value).__name__ == "Literal" else "something without a name"
-    raise UpdateError(f"{shown} stands where an individual belongs", "name an individual, or use a variable", at)
+    text = value if type(value).__name__ == "Literal" else getattr(value, "string", None)
+    if text is None:
+        raise UpdateError(
+            "something without a name stands where an individual belongs", "name an individual, or use a variable", at
+        )
+    remedy = f"write {text} without quotation marks" if str(text) in ("true", "false") else ""
+    raise UpdateError(
+        f"the text '{text}' stands where an individual belongs", remedy or "name an individual, or use a variable", at
+    )
 
 
 def _predicate(path: Any) -> Word:

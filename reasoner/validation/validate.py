@@ -31,7 +31,7 @@ from reasoner.embodiment.facts import EmbodimentError
 from reasoner.embodiment.reading import read_embodiment
 from reasoner.files import silent_about_numbers
 from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file
+from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file, text
 from reasoner.names import local_name
 from reasoner.reading.problem import Reading, read
 from reasoner.updates.compiling import Fault
@@ -155,7 +155,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     done(f"reading {path.name} as the planner does")
     reading, problem = _read(graph)
     case = Case(graph, reading)
-    unread = {fault.place.behavior for fault in faults}
+    unread = _extending(graph, {fault.place.behavior for fault in faults})
     if faults:
         found = [f for f in found if f.node not in unread and f.rule not in NEEDS_ALL_BEHAVIORS]
     yield from _sure(found, case)
@@ -173,6 +173,15 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
         for rule, node, what, why, remedy in deep_faults(graph):
             yield places.finding(rule, node, what, why, remedy)
+
+
+def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
+    """Return some behaviours and all that extend them, whose own updates can't be read without theirs."""
+    pairs = [(text(one), text(other)) for one, other in graph.select("SELECT ?one ?other { ?one :extends ?other }")]
+    found = set(behaviors)
+    while more := {one for one, other in pairs if other in found} - found:
+        found |= more
+    return found
 
 
 def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
