@@ -11,10 +11,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from planner.levels import said
 from planner.plan import Step
 from reasoner.graph.knowledge import KnowledgeGraph, text
 from reasoner.names import Names
+from reasoner.sentences import said
 from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from confab.labels import Labels, denied
-from planner.levels import said as plainly
 from reasoner.amounts import LESS, MORE
 from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
+from reasoner.sentences import said as plainly
 from reasoner.symbols import (
     AnyOf,
     ClassCondition,

@@ -12,9 +12,9 @@ from dataclasses import replace
 from planner.grounded.reachability import Reached
 from planner.grounded.schemas import Atom, Schema, schemas
 from planner.grounded.task import Task
-from planner.levels import said
 from planner.plan import Reason, TooLargeError
 from reasoner.language import is_variable
+from reasoner.sentences import said
 from reasoner.symbols import (
     TRUE,
     Behavior,

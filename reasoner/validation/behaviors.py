@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 
 from reasoner.amounts import terms_of
 from reasoner.language import mentions
+from reasoner.sentences import said
 from reasoner.symbols import (
     FALSE,
+    TRUE,
     AmountEffect,
     AnyOf,
     Behavior,
@@ -18,8 +20,11 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
 from reasoner.validation.case import Case, Fault
+from reasoner.validation.contradictions import dead
+from reasoner.validation.quantities import some
 
 EVERY_OTHER = re.compile(r"\?each\d")
 """Who a class stands for where another one stands for somebody already (`reasoner.reading.parts`)."""
@@ -95,46 +100,103 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
-    """Find behaviours that ask for a value which is neither there at first nor the effect of any behaviour."""
+    """Find values that behaviours or goals ask for, which are neither there at first nor the effect of any behaviour.
+
+    What can't be reached only because something else can't be is said with that.
+    """
     if case.reading is None or not case.reading.problem.initial:
         return
     problem, names = case.reading.problem, case.reading.names
-    there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
-    there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
-    present = {symbol.situation for symbol in problem.initial}
-    changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
-    for situation in (
-        problem.domain.situations.values()
-    ):  # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
-        if situation.name not in changed or situation.name not in present:
-            there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
-    waiting = dict(problem.domain.behaviors)
-    while True:
-        ready = [b for b in waiting.values() if all(_possible(c, b, problem, there) for c in b.preconditions)]
-        if not ready:
-            break
+    contradictory = dead(problem)
+    there = _there_at_first(problem)
+    waiting = {name: b for name, b in problem.domain.behaviors.items() if name not in contradictory}
+    given = {name: _given(b, problem) for name, b in problem.domain.behaviors.items()}
+    while ready := [b for b in waiting.values() if all(_possible(c, b, problem, there) for c in b.preconditions)]:
         for behavior in ready:
             del waiting[behavior.name]
-            there |= {(e.situation, v) for e in behavior.effects for v in _individuals(e.value, behavior, problem)}
-    for name, behavior in waiting.items():
-        lacking = [c for c in behavior.preconditions if not _possible(c, behavior, problem, there)]
-        said = "; ".join(sorted(_words(c) for c in lacking))
-        yield (
-            names.iri(name),
-            f"{name} can never be chosen: nothing leads to {said}",
-            "neither the initial situation nor any behaviour gives what its precondition asks for",
-            "add a behaviour with that effect, state it in the scene, or drop the precondition",
+            there |= given[behavior.name]
+    lacking = {name: [c for c in b.preconditions if not _possible(c, b, problem, there)] for name, b in waiting.items()}
+    wanted = {
+        (symbol.situation, value): symbol
+        for symbol, value in problem.goal.items()
+        if problem.domain.situations[symbol.situation].quantity
+        is None  # what it can come to is for planning to find out
+        and problem.initial.get(symbol, FALSE) != value
+        and (symbol.situation, value) not in there
+    }
+    needs = {
+        name: {
+            other
+            for condition in conditions
+            for other in (*waiting, *contradictory)
+            if _possible(condition, problem.domain.behaviors[name], problem, there | given[other])
+        }
+        for name, conditions in lacking.items()
+    }
+    why = "neither the initial situation nor any behaviour gives what its precondition asks for"
+    mend = "add a behaviour with that effect, state it in the scene, or drop the precondition"
+    for group in _first(needs):
+        first, *others = [name for name in problem.domain.behaviors if name in group]
+        conditions = dict.fromkeys(
+            _words(c, problem.domain.behaviors[name]) for name in (first, *others) for c in lacking[name]
         )
-    for symbol, value in problem.goal.items():
-        if problem.domain.situations[symbol.situation].quantity is not None:
-            continue  # what it can come to is for planning to find out
-        if problem.initial.get(symbol, FALSE) != value and (symbol.situation, value) not in there:
-            yield (
-                names.iri(symbol.arguments[0]),
-                f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
-                "neither the initial situation nor any behaviour gives what the goal asks for",
-                "add a behaviour with that effect, or drop the goal",
-            )
+        later = [name for name in waiting if name not in group and not group.isdisjoint(_reached(name, needs))]
+        more = f"; so neither can {some([*others, *later])}" if others or later else ""
+        yield (
+            names.iri(first),
+            f"{first} can never be chosen: nothing leads to {'; '.join(conditions)}{more}",
+            why,
+            mend,
+        )
+    for (situation, value), symbol in wanted.items():
+        if any((situation, value) in given[name] for name in (*waiting, *contradictory)):
+            continue  # it follows from what is said of these
+        yield (
+            names.iri(symbol.arguments[0]),
+            f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
+            "neither the initial situation nor any behaviour gives what the goal asks for",
+            "add a behaviour with that effect, or drop the goal",
+        )
+
+
+def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
+    """Return the values that are there before any behaviour was done, each with its situation type."""
+    there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
+    there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
+    changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
+    for situation in problem.domain.situations.values():
+        # what no behaviour changes, somebody else does; what no object of the scene has is no matter here
+        present = all(problem.classes.get(kind) for kind in situation.arguments)
+        if situation.name not in changed or not present:
+            there |= {(situation.name, value) for value in problem.classes.get(situation.range, ())}
+            there |= {(situation.name, TRUE)} if situation.boolean else set()
+    return there
+
+
+def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
+    """Return the values that a behaviour can give, each with its situation type."""
+    return {(e.situation, value) for e in behavior.effects for value in _individuals(e.value, behavior, problem)}
+
+
+def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
+    """Return the behaviours that one needs, directly or by way of others."""
+    found, left = set[str](), [name]
+    while left:
+        left += (more := {*needs.get(left.pop(), ())} - found)
+        found |= more
+    return found
+
+
+def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:
+    """Yield the groups of behaviours that need each other and nothing else: what is at fault with the others follows."""
+    seen = set[str]()
+    for name in needs:
+        reached = _reached(name, needs) | {name}
+        if name in seen or not reached <= needs.keys():
+            continue  # it needs a behaviour whose conditions exclude each other, of which another rule tells
+        if all(name in _reached(other, needs) for other in reached - {name}):
+            seen |= reached
+            yield reached
 
 
 def _possible(condition: Condition, behavior: Behavior, problem: Problem, there: set[tuple[str, str]]) -> bool:
@@ -158,10 +220,10 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
     return problem.classes.get(kinds.get(term, ""), ())
 
 
-def _words(condition: Condition) -> str:
-    if isinstance(condition, ValueCondition):
-        return f"{condition.situation} = {condition.value.lstrip('?')}"
-    return type(condition).__name__
+def _words(condition: Condition, behavior: Behavior) -> str:
+    """Return what a condition asks for, with classes in the place of its terms."""
+    kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
+    return said(substituted(condition, kinds)).replace("?", "")
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:

@@ -42,3 +42,9 @@ class Case:
             ):
                 found[triple.subject.value].add(triple.object.value)
         return found
+
+    @cached_property
+    def relative(self) -> frozenset[str]:
+        """The IRIs that were relative in their files: they begin where the files lie."""
+        parts = (part for triple in self.triples for part in (triple.subject, triple.predicate, triple.object))
+        return frozenset(p.value for p in parts if isinstance(p, ox.NamedNode) and p.value.startswith("file:"))

@@ -146,7 +146,7 @@ def conclusions_about_nobody(case: Case) -> Iterator[Fault]:
     for name, rules in domain.rules.items():
         for rule in rules:
             for parameter, wanted in zip(rule.parameters, domain.situations[name].arguments, strict=True):
-                of = next((kind for kind in _asked(rule, parameter, domain) if not _both(case, kind, wanted)), None)
+                of = next((kind for kind in _asked(rule, parameter, domain) if not both(case, kind, wanted)), None)
                 if of is not None:
                     said = ", ".join(p.name.removeprefix("?") for p in rule.parameters)
                     yield (
@@ -174,7 +174,7 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
                 pass
 
 
-def _both(case: Case, one: str, other: str) -> bool:
+def both(case: Case, one: str, other: str) -> bool:
     """Whether something is in both of two classes, each of which may be any of several, or could be: a class is below both."""
     assert case.reading is not None
     problem = case.reading.problem

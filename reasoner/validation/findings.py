@@ -132,6 +132,8 @@ class Places:
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
+            if node.startswith("file:") and f"<{relative(node, file)}>" in text:
+                return file
             short = f"<{node.removesuffix(name)}>" in text and re.search(rf":{re.escape(name)}\b", text)
             if short or f"<{node}>" in text:
                 return file
@@ -171,11 +173,23 @@ def _subjects(file: Path) -> dict[str, list[str]]:
     return found
 
 
+def relative(node: str, file: Path) -> str:
+    """Return an IRI as it stands in a file, where it is relative to that.
+
+    >>> relative("file:///tmp/a.ttl#x", Path("/tmp/a.ttl")), relative("file:///tmp/x", Path("/tmp/a.ttl"))
+    ('#x', 'x')
+    """
+    own = file.resolve().as_uri()
+    return node.removeprefix(own) if node.startswith(own) else node.removeprefix(f"{own.rpartition('/')[0]}/")
+
+
 def _line(file: Path | None, node: str) -> int:
     """Return the first line on which a Turtle file has the node as its subject, else on which it has its name."""
     if file is None or file.suffix != ".ttl":
         return 0
     text, short = file.read_text(encoding="utf-8"), local_name(node)
+    if node.startswith("file:") and (begin := text.find(f"<{relative(node, file)}>")) >= 0:
+        return text.count("\n", 0, begin) + 1
     name, space = re.escape(short), re.escape(node.removesuffix(short))
     prefixes = re.findall(rf"^\s*@?prefix\s+([\w.-]*):\s*<{space}>", text, re.MULTILINE | re.IGNORECASE)
     own = "|".join(map(re.escape, prefixes)) if prefixes else r"(?!)"

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from math import inf
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
+from reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
 from reasoner.language import groups, walk
+from reasoner.sentences import counted, said
 from reasoner.symbols import (
+    AmountEffect,
     Behavior,
     ClassCondition,
     Comparison,
@@ -47,18 +50,27 @@ def unlike_units(case: Case) -> Iterator[Fault]:
             case Fraction():
                 return "", ""
 
+    causes: dict[tuple[str, str], dict[str, str]] = defaultdict(
+        dict
+    )  # by what doesn't go together: behaviours, what they do
     for name, behavior in reading.problem.domain.behaviors.items():
         for left, right, does in _together(behavior):
             (one, wrong), (other, also) = unit(left), unit(right)
-            both = wrong or also or (f"{one} and {other}" if one and other and one != other else "")
-            if both:
-                about = " and ".join(sorted(situations_in(left) | situations_in(right)))
-                yield (
-                    reading.names.iri(name),
-                    f"{name} {does} {both} ({about})",
-                    "a number of one unit says nothing of an amount of another",
-                    "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
-                )
+            if both := wrong or also or (f"{one} and {other}" if one and other and one != other else ""):
+                parts = [part for side in (left, right) for part in inside(side)]
+                about = {part.situation for part in parts if isinstance(part, Amount)}
+                about |= {part.relation for part in parts if isinstance(part, Measure)}
+                cause = " and ".join(sorted(both.split(" and "))), " and ".join(sorted(about))
+                causes[cause].setdefault(name, f"{does} {both}")
+    for (_, named), done in causes.items():
+        first, *others = done
+        more = f"; so {'do' if len(others) > 1 else 'does'} {some(others)}" if others else ""
+        yield (
+            reading.names.iri(first),
+            f"{first} {done[first]} ({named}){more}",
+            "a number of one unit says nothing of an amount of another",
+            "name amounts of one unit, mend a :unit, or multiply by a number that leads from one unit to the other",
+        )
 
 
 def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]]:
@@ -149,3 +161,204 @@ def _measured(
             case _:
                 for group in groups(condition):
                     yield from _measured(group, among, problem)
+
+
+# --------------------------------------------------------------------------------------------------- what amounts come to
+
+Range = tuple[Fraction | float, Fraction | float]
+"""The least and the most that an amount comes to."""
+ANY: Range = (-inf, inf)
+ROUNDS = 4
+"""Rounds after which a range that still grows is taken to grow without end."""
+
+
+def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
+    """Find behaviours that can never be done, since the amounts that they ask for or lead to are never there."""
+    if case.reading is None or not case.reading.problem.initial:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    ranges = _Ranges(problem)
+    waiting = {name: b for name, b in problem.domain.behaviors.items() if b.amounts or _compares(b)}
+    for turn in range(ROUNDS + 2 * len(waiting)):
+        ready = [b for b in problem.domain.behaviors.values() if not ranges.lacking(b)]
+        grown = [ranges.extend(b, turn >= ROUNDS) for b in ready]
+        if not any(grown):
+            break
+    told: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    for name, behavior in waiting.items():
+        if lacking := ranges.lacking(behavior):
+            told[lacking[1]].append((name, lacking[0]))
+    for about, ((first, lacks), *others) in told.items():
+        more = f"; neither can {some([name for name, _ in others])}" if others else ""
+        yield (
+            names.iri(first),
+            f"{first} can never be done: {lacks}, and {about}{more}",
+            "that is so at first, and no behaviour that can be done leads to another amount",
+            "mend the amount or the bounds, state another amount in the scene, or add a behaviour that leads to one that does",
+        )
+
+
+def _compares(behavior: Behavior) -> bool:
+    return any(isinstance(condition, Comparison) for condition in behavior.preconditions)
+
+
+class _Ranges:
+    """For each situation type what its amounts come to, over all individuals and all behaviours done so far."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.quantities = {name: s.quantity for name, s in problem.domain.situations.items() if s.quantity is not None}
+        self.known: dict[str, Range] = {}
+        for symbol, value in problem.initial.items():
+            if symbol.situation in self.quantities:
+                self.widen(symbol.situation, (Fraction(value), Fraction(value)))
+        self.numbers = {
+            relation: (min(found), max(found))
+            for relation, rows in problem.relations.items()
+            if (found := [number for row in rows if (number := exact(row[-1])) is not None])
+        }
+
+    def widen(self, situation: str, more: Range, endlessly: bool = False) -> bool:
+        """Add amounts to those of a situation type; return whether some are new."""
+        old = self.known.get(situation)
+        low, high = more if old is None else (min(old[0], more[0]), max(old[1], more[1]))
+        if endlessly and old is not None:
+            low, high = (low if low == old[0] else -inf), (high if high == old[1] else inf)
+        quantity = self.quantities[situation]
+        low = low if quantity.least is None else max(low, quantity.least)
+        high = high if quantity.most is None else min(high, quantity.most)
+        self.known[situation] = low, high
+        return self.known[situation] != old
+
+    def of(self, expression: Expression, narrowed: Mapping[Expression, Range]) -> Range | None:
+        """Return what an expression comes to; None if nothing has such an amount."""
+        if expression in narrowed:
+            return narrowed[expression]
+        match expression:
+            case Amount(situation):
+                return self.known.get(situation)
+            case Measure(relation):
+                return self.numbers.get(relation)
+            case Calculation(sign, left, right):
+                one, other = self.of(left, narrowed), self.of(right, narrowed)
+                return None if one is None or other is None else _calculated(sign, one, other)
+            case Fraction():
+                return expression, expression
+
+    def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
+        """Return what keeps a behaviour from being done, and what the amounts in it come to; None if nothing does."""
+        narrowed: dict[Expression, Range] = {}
+        for condition in behavior.preconditions:
+            if not isinstance(condition, Comparison) or condition.negated:
+                continue
+            left, right = self.of(condition.left, narrowed), self.of(condition.right, narrowed)
+            if left is None or right is None:
+                continue  # what has no number is told by another rule
+            if not _possible(condition.operator, left, right):
+                return f"it requires that {_plain(condition)}", self.about(condition)
+            if isinstance(condition.left, Amount):
+                narrowed[condition.left] = _narrowed(condition.operator, left, right)
+            if isinstance(condition.right, Amount):
+                narrowed[condition.right] = _narrowed(CONVERSE[condition.operator], right, left)
+        for effect in behavior.amounts:
+            quantity = self.quantities.get(effect.situation)
+            after = self.after(effect, narrowed)
+            same = sum(other.situation == effect.situation for other in behavior.amounts)
+            if effect.when or quantity is None or after is None or same > 1:
+                continue
+            amount = _plain_amount(Amount(effect.situation, effect.arguments))
+            if quantity.most is not None and after[0] > quantity.most:
+                limit = f"of at most {written(quantity.most)}"
+                return f"it would make {amount}, {limit}, {_written(after[0])} or more", self.about(effect)
+            if quantity.least is not None and after[1] < quantity.least:
+                limit = f"of at least {written(quantity.least)}"
+                return f"it would make {amount}, {limit}, {_written(after[1])} or less", self.about(effect)
+        return None
+
+    def about(self, part: Comparison | AmountEffect) -> str:
+        """Return what the amounts that a condition or effect names come to, as a sentence."""
+        found = (
+            situations_in(part.left) | situations_in(part.right)
+            if isinstance(part, Comparison)
+            else situations_in(part.amount) | ({part.situation} if part.operation != "assign" else frozenset())
+        )
+        said = []
+        for situation in sorted(found):
+            low, high = self.known.get(situation, ANY)
+            said.append(
+                f"{situation} is always {_written(low)}"
+                if low == high
+                else f"{situation} is never less than {_written(low)}"
+                if high == inf
+                else f"{situation} is never more than {_written(high)}"
+                if low == -inf
+                else f"{situation} is always from {_written(low)} to {_written(high)}"
+            )
+        return " and ".join(said) or "that is never so"
+
+    def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
+        """Return what an effect makes of an amount."""
+        now, by = self.of(Amount(effect.situation, effect.arguments), narrowed), self.of(effect.amount, narrowed)
+        if now is None or by is None:
+            return None
+        sign = {"increase": "+", "decrease": "-", "scale": "*"}.get(effect.operation)
+        return by if sign is None else _calculated(sign, now, by)
+
+    def extend(self, behavior: Behavior, endlessly: bool) -> bool:
+        """Add what a behaviour makes of amounts; return whether that is new."""
+        found = [(effect.situation, self.after(effect, {})) for effect in behavior.amounts]
+        new = [self.widen(situation, after, endlessly) for situation, after in found if after is not None]
+        return any(new)
+
+
+CONVERSE = {"<": ">", "<=": ">=", "=": "=", ">=": "<=", ">": "<"}
+
+
+def _possible(sign: str, left: Range, right: Range) -> bool:
+    """Return whether some amount of one range compares with some of another as an operator says."""
+    match sign:
+        case "<":
+            return left[0] < right[1]
+        case "<=":
+            return left[0] <= right[1]
+        case ">":
+            return left[1] > right[0]
+        case ">=":
+            return left[1] >= right[0]
+        case _:
+            return left[0] <= right[1] and right[0] <= left[1]
+
+
+def _narrowed(sign: str, left: Range, right: Range) -> Range:
+    """Return the part of a range that compares with some amount of another as an operator says."""
+    low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
+    high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
+    return low, high
+
+
+def _calculated(sign: str, one: Range, other: Range) -> Range:
+    if sign == "+":
+        return one[0] + other[0], one[1] + other[1]
+    if sign == "-":
+        return one[0] - other[1], one[1] - other[0]
+    if sign == "/" or inf in (*map(abs, one), *map(abs, other)):
+        return ANY
+    products = [left * right for left in one for right in other]
+    return min(products), max(products)
+
+
+def _written(amount: Fraction | float) -> str:
+    return written(amount) if isinstance(amount, Fraction) else str(amount)
+
+
+def _plain(condition: Condition) -> str:
+    return said(condition).replace("?", "")
+
+
+def _plain_amount(amount: Amount) -> str:
+    return counted(amount).replace("?", "")
+
+
+def some(names: Sequence[str], most: int = 5) -> str:
+    """Return the first of some names as a list in a sentence."""
+    shown = [*names[:most], *(["others"] if len(names) > most else [])]
+    return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))

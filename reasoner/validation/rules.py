@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from reasoner.validation import behaviors, definitions, quantities, situations, terms
+from reasoner.validation import behaviors, contradictions, definitions, quantities, situations, terms
 from reasoner.validation.case import Case, Fault
 from reasoner.validation.exclusive import values_not_kept_exclusive
 
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undeclared-term": terms.undeclared_terms,
+    "relative-iri": terms.relative_iris,
     "missing-all-different": terms.individuals_not_different,
     "file-name-and-iri": terms.files_and_iris,
     "undetermined-variable": behaviors.undetermined_variables,
@@ -24,13 +25,18 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "not-exclusive": values_not_kept_exclusive,
     "definition-without-effect": definitions.definitions_without_effect,
     "axiom-not-watched": definitions.axioms_not_watched,
+    "contradiction": contradictions.contradictions,
+    "repeated-name": contradictions.repeated_names,
+    "amount-out-of-reach": quantities.amounts_out_of_reach,
     "unit-mismatch": quantities.unlike_units,
     "product-of-amounts": quantities.multiplied_amounts,
     "conclusion-outside-class": definitions.conclusions_about_nobody,
     "number-missing": quantities.numbers_missing,
     "defined": definitions.defined,
 }
-WARNINGS = frozenset({"axiom-not-watched", "crowded", "number-missing", "other-kind", "product-of-amounts"})
+WARNINGS = frozenset(
+    {"axiom-not-watched", "crowded", "number-missing", "other-kind", "product-of-amounts", "repeated-name"}
+)
 """Rules of what can be planned with all the same."""
 REMARKS = frozenset({"defined"})
 """Rules that tell of what isn't wrong."""

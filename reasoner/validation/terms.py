@@ -49,18 +49,30 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
         )
 
 
+def relative_iris(case: Case) -> Iterator[Fault]:
+    """Find IRIs that are relative: what they stand for depends on where the file lies."""
+    for node in sorted(case.relative):
+        name = local_name(node)
+        yield (
+            node,
+            f"{name} is written as a relative IRI",
+            f"it is read as <{node}>, which is another name as soon as the file lies elsewhere",
+            f"write it with a prefix, like :{name}, or write the whole IRI",
+        )
+
+
 def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
     """Yield each use of a term that isn't declared: the subject, the term, what it has to be, in words and as classes."""
     for triple in case.triples:
         for iri, wanted, kinds in _uses(triple, case.types.get(triple.predicate.value, set())):
             types = case.types.get(iri, set())
-            if not iri.startswith(BUILT_IN) and not (kinds & types if kinds else types):
+            if not iri.startswith((*BUILT_IN, "file:")) and not (kinds & types if kinds else types):
                 yield triple.subject, iri, wanted, kinds
 
 
 def misread(case: Case) -> set[str]:
     """Return what names a term that isn't declared, and what names that: other faults of these may follow from it."""
-    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)}
+    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
     return first | {
         triple.subject.value
         for triple in case.triples

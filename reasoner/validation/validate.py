@@ -38,6 +38,7 @@ from reasoner.updates.compiling import Fault
 from reasoner.validation.case import Case
 from reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
 from reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from reasoner.validation.situations import impossible_situations
 from reasoner.validation.terms import misread
 from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
@@ -56,10 +57,16 @@ CONSEQUENCES = {
     "relation-outside-range",
     "pair-outside-class",
     "tuple-outside-class",
+    "not-a-named-individual",
 }
 """What isn't said of a node that names an undeclared term, or names one that does: it may be right once the name is mended."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
 """Checks that don't speak of a node of which another one does: who follows the remedy of the first makes it worse."""
+WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
+WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
+"""Checks that find facts or bounds at fault, as `impossible-situation` does, too."""
+FROM_FACTS = {"unreachable", "amount-out-of-reach"}
+"""Rules that ask what comes of the initial situation: they wait until its facts are right."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
 """What isn't said as long as the update of some behaviour can't be read."""
 
@@ -116,7 +123,8 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
     if problem and not found:
         found.append(_unreadable(graph, places, problem))
     case = Case(graph, reading)
-    return unique(finding for finding in (*_sure(found, case), *_by_rules(case, places)) if finding.serious)
+    sure = [*_sure(found, case)]
+    return unique(finding for finding in (*sure, *_by_rules(case, places, sure)) if finding.serious)
 
 
 def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
@@ -125,8 +133,12 @@ def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
     yield from (finding for finding in found if finding.rule not in CONSEQUENCES or finding.node not in unsure)
 
 
-def _by_rules(case: Case, places: Places) -> Iterator[Finding]:
+def _by_rules(case: Case, places: Places, found: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield what our own rules find, but for what may only follow from facts that are at fault."""
+    wrong_facts = any(finding.rule in WRONG_FACTS for finding in found)
     for rule, faults in RULES.items():
+        if rule in FROM_FACTS and (wrong_facts or next(impossible_situations(case), None) is not None):
+            continue
         for node, what, why, remedy in faults(case):
             severity = WARNING if rule in WARNINGS else REMARK if rule in REMARKS else ERROR
             yield places.finding(rule, node, what, why, remedy, severity)
@@ -158,15 +170,16 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     unread = _extending(graph, {fault.place.behavior for fault in faults})
     if faults:
         found = [f for f in found if f.node not in unread and f.rule not in NEEDS_ALL_BEHAVIORS]
-    yield from _sure(found, case)
+    found = [*_sure(found, case)]
+    yield from found
     if faults:
-        yield from (finding for finding in _by_rules(case, places) if finding.rule == "undeclared-term")
+        yield from (finding for finding in _by_rules(case, places, found) if finding.rule == "undeclared-term")
         return
     if problem and not any(finding.serious for finding in found):
         yield _unreadable(graph, places, problem)
     if not any(finding.serious for finding in found):
         yield from _measured(graph, places, reading)
-    yield from _by_rules(case, places)
+    yield from _by_rules(case, places, found)
     if deep:
         done(f"asking HermiT about {path.name}")
         from reasoner.validation.hermit import faults as deep_faults

@@ -1,0 +1,232 @@
+"""Rules of conditions that exclude each other, and of conditions that ask what is so, or isn't so, anyway."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from reasoner.amounts import COMPARING, Amount
+from reasoner.language import groups
+from reasoner.sentences import said
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    ValueCondition,
+    Witness,
+)
+from reasoner.validation.case import Case, Fault
+from reasoner.validation.definitions import both
+
+Clash = tuple[Condition, Condition]
+"""Two conditions that no state satisfies together."""
+
+
+def contradictions(case: Case) -> Iterator[Fault]:
+    """Find behaviours, effects and rules whose conditions exclude each other; those that inherit them aren't named again."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    told: dict[Clash, str] = {}
+    rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
+    for name, behavior in (*problem.domain.behaviors.items(), *rules):
+        consequence = (
+            "nothing follows from the rule" if name in problem.domain.rules else "the behaviour can never be done"
+        )
+        for clash, where in _clashes(behavior, problem):
+            if clash in told:
+                continue
+            told[clash] = name
+            one, other = clash
+            yield (
+                names.iri(name),
+                f"{name} requires{where} that {_plain(one)} and that {_plain(other)}",
+                f"no state has both, so that {'the effect never happens' if where else consequence}",
+                "take one of the two conditions out, or mend what it names",
+            )
+
+
+def dead(problem: Problem) -> frozenset[str]:
+    """Return the behaviours whose preconditions exclude each other."""
+    return frozenset(
+        name for name, b in problem.domain.behaviors.items() if any(not where for _, where in _clashes(b, problem))
+    )
+
+
+def _clashes(behavior: Behavior, problem: Problem) -> Iterator[tuple[Clash, str]]:
+    """Yield conditions that exclude each other, and where they stand, if these aren't the preconditions."""
+    if clash := clashing(behavior.preconditions, problem, behavior.kinds):
+        yield clash, ""
+        return
+    for effect in behavior.every_effect:
+        if effect.when and (clash := clashing((*behavior.preconditions, *effect.when), problem, behavior.kinds)):
+            yield clash, f" for its effect on {effect.situation}"
+    for condition in behavior.preconditions:
+        yield from (
+            (clash, f" of each {inner.kind}" if inner.negated else f" of a {inner.kind}")
+            for inner in _witnesses(condition)
+            if (clash := clashing(inner.conditions, problem, {**behavior.kinds, inner.variable: inner.kind}))
+        )
+
+
+def _witnesses(condition: Condition) -> Iterator[Witness]:
+    if isinstance(condition, Witness):
+        yield condition
+    for group in groups(condition):
+        for inner in group:
+            yield from _witnesses(inner)
+
+
+def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[str, str]) -> Clash | None:
+    """Return two conditions of a conjunction that no state satisfies together; None if each two of them can hold.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    problem : Problem
+    kinds : mapping of term to class
+    """
+    parts = [*_conjuncts(conditions, problem)]
+    for place, one in enumerate(parts):
+        if isinstance(one, EqualityCondition) and one.negated and one.left == one.right:
+            return one, replace(one, negated=False)
+        for other in parts[:place]:
+            if _exclude(other, one, problem, kinds):
+                return other, one
+    return None
+
+
+def _conjuncts(conditions: Sequence[Condition], problem: Problem) -> Iterator[Condition]:
+    """Yield what a conjunction requires, each as simply as it can be said."""
+    for condition in conditions:
+        match condition:
+            case AnyOf(((only,),), True):
+                yield from _conjuncts((replace(only, negated=not only.negated),), problem)
+            case AnyOf((group,), False):
+                yield from _conjuncts(group, problem)
+            case AnyOf(alternatives, True) if all(len(group) == 1 for group in alternatives):
+                for (one,) in alternatives:
+                    yield from _conjuncts((replace(one, negated=not one.negated),), problem)
+            case ValueCondition(situation, _, value, True) if problem.domain.situations[
+                situation
+            ].boolean and value in (TRUE, FALSE):
+                yield replace(condition, value=FALSE if value == TRUE else TRUE, negated=False)
+            case _:
+                yield condition
+
+
+def _exclude(one: Condition, other: Condition, problem: Problem, kinds: Mapping[str, str]) -> bool:
+    match one, other:
+        case ValueCondition(), ValueCondition() if (one.situation, one.arguments) == (other.situation, other.arguments):
+            if one.negated or other.negated:
+                return one.value == other.value and one.negated != other.negated
+            return not _may_be_one(one.value, other.value, problem, kinds)
+        case Comparison(), Comparison():
+            return _apart(one, other)
+        case EqualityCondition(), EqualityCondition():
+            same = {one.left, one.right} == {other.left, other.right}
+            return same and one.negated != other.negated
+        case (
+            (RelationCondition(), RelationCondition())
+            | (ClassCondition(), ClassCondition())
+            | (Witness(), Witness())
+            | (AnyOf(), AnyOf())
+        ):
+            return replace(one, negated=not one.negated) == other
+        case _:
+            return False
+
+
+def _may_be_one(one: str, other: str, problem: Problem, kinds: Mapping[str, str]) -> bool:
+    """Return whether two terms may stand for the same value."""
+    if one[:1] != "?" and other[:1] != "?":
+        return one == other
+    for term, value in ((one, other), (other, one)):
+        if term[:1] == "?" and value[:1] != "?" and term in kinds:
+            return value in problem.members(kinds[term]) or not problem.members(kinds[term])
+    return True
+
+
+def _apart(one: Comparison, other: Comparison) -> bool:
+    """Return whether two comparisons of one amount with numbers exclude each other."""
+    if one.left != other.left or not isinstance(one.left, Amount):
+        return False
+    if not isinstance(one.right, Fraction) or not isinstance(other.right, Fraction):
+        return False
+    limits = sorted({one.right, other.right})
+    points = [*limits, limits[0] - 1, limits[-1] + 1, sum(limits, Fraction(0)) / len(limits)]
+    return not any(
+        all(COMPARING[c.operator](point, c.right) != c.negated for c in (one, other) if isinstance(c.right, Fraction))
+        for point in points
+    )
+
+
+def _plain(condition: Condition) -> str:
+    return said(condition).replace("?", "")
+
+
+# ------------------------------------------------------------------------------------------- what is so, or isn't, anyway
+
+
+@dataclass(frozen=True)
+class _Inner:
+    """A class condition inside a condition that is negated, about a term from outside."""
+
+    term: str
+    kind: str
+
+
+def repeated_names(case: Case) -> Iterator[Fault]:
+    """Find negated conditions that give an outer term its class again: a name is used twice, for what should be another one."""
+    if case.reading is None:
+        return
+    problem, names = case.reading.problem, case.reading.names
+    told = set[_Inner]()
+    rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
+    for name, behavior in (*problem.domain.behaviors.items(), *rules):
+        for condition in behavior.conditions:
+            for one in _inside_negated(condition, False):
+                outer = behavior.kinds.get(one.term)
+                if outer is None or one in told:
+                    continue
+                told.add(one)
+                term, anyway = one.term[1:], _below(outer, one.kind, problem)
+                if not anyway and both(case, outer, one.kind):
+                    continue
+                yield (
+                    names.iri(name),
+                    f"{name} says inside of a negated condition that {term} is a {one.kind}, "
+                    f"which {f'{term} is anyway' if anyway else f'no {outer} is'}",
+                    f"{term} means there what it means outside: the condition is about that one {outer}, and about no other",
+                    f"give the {one.kind} that is meant inside another name than {term}; if {term} itself is meant, leave its "
+                    "class out there",
+                )
+
+
+def _inside_negated(condition: Condition, negated: bool) -> Iterator[_Inner]:
+    for group in groups(condition):
+        for inner in group:
+            if (
+                isinstance(inner, ClassCondition)
+                and not inner.negated
+                and (negated or condition.negated)
+                and len(group) > 1
+            ):
+                yield _Inner(inner.term, inner.kind)
+            yield from _inside_negated(inner, negated or condition.negated)
+
+
+def _below(kind: str, other: str, problem: Problem) -> bool:
+    found, waiting = {kind}, [kind]
+    while waiting:
+        waiting += (more := {*problem.parents.get(waiting.pop(), ())} - found)
+        found |= more
+    return other in found
