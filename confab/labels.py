@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from planner.plan import Step
 from reasoner.graph.knowledge import KnowledgeGraph, text
 from reasoner.names import Names
-from reasoner.sentences import said
+from reasoner.sentences import denied, said
 from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
@@ -117,23 +117,6 @@ def _chosen(verb: str, value: str) -> str:
     """
     first, _, alternatives = verb.partition(" ")
     return f"{first} {value}" if value in alternatives.split(" or ") and " or " in alternatives else verb
-
-
-DENIALS = {"is": "isn't", "has": "doesn't have", "can": "can't", "holds": "doesn't hold", "carries": "doesn't carry"}
-"""What says the opposite, by the first word that says what is so."""
-
-
-def denied(sentence: str) -> str:
-    """Return the opposite of a sentence.
-
-    >>> denied("cup 1 is at location 7"), denied("ferry EMPTY")
-    ("cup 1 isn't at location 7", 'not: ferry EMPTY')
-    """
-    words = sentence.split(" ")
-    place = next((i for i, word in enumerate(words) if i and word in DENIALS), None)
-    if place is None:
-        return f"not: {sentence}"
-    return " ".join((*words[:place], DENIALS[words[place]], *words[place + 1 :]))
 
 
 def _joined(parts: Sequence[str]) -> str:

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-from confab.labels import Labels, denied
+from confab.labels import Labels
 from reasoner.amounts import LESS, MORE
 from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
 from reasoner.sentences import said as plainly
 from reasoner.symbols import (
-    AnyOf,
-    ClassCondition,
-    Comparison,
     Condition,
     Domain,
-    EqualityCondition,
     Fact,
     RelationCondition,
     Symbol,
-    ValueCondition,
     Witness,
 )
 
@@ -61,41 +55,10 @@ class Sayings:
 
     def condition(self, condition: Condition) -> str:
         """Return a condition as a sentence."""
-        match condition:
-            case Witness(variable, kind, inner, negated):
-                return self._somebody(variable, kind, inner, "no" if negated else "some")
-            case ValueCondition() | RelationCondition():
-                text = plainly(replace(condition, negated=False), self._words)
-                return denied(text) if condition.negated else text
-            case AnyOf(alternatives, False):
-                return " or ".join(" and ".join(map(self.condition, those)) for those in alternatives)
-            case AnyOf() | ClassCondition() | EqualityCondition() | Comparison():
-                return plainly(condition, self._words)
+        return plainly(condition, self._words)
 
     def _words(self, what: object) -> str:
         return self.fact(what) if isinstance(what, Fact) else self.name(str(what))
-
-    def _somebody(self, variable: str, kind: str, conditions: Sequence[Condition], which: str) -> str:
-        """Return that somebody is so, or nobody, or everybody: "no movable but the cup is at the location"."""
-        but = [
-            c for c in conditions if isinstance(c, EqualityCondition) and c.negated and variable in (c.left, c.right)
-        ]
-        asked = sorted((c for c in conditions if c not in but), key=lambda c: getattr(c, "negated", False))
-        if not asked:
-            return f"there is {which} {self.name(kind)}"
-        last = asked.pop()
-        if which == "no" and isinstance(last, ValueCondition | RelationCondition) and last.negated:
-            which, last = "every", replace(last, negated=False)  # nobody isn't: everybody is
-        others = " and ".join(self.name(c.right if c.left == variable else c.left) for c in but)
-        who = f"{which} {self.name(kind)}{f' but {others}' if but else ''}"
-        subject = f"{self.name(variable)} "
-        said, end = list(map(self.condition, asked)), self.condition(last)
-        if not all(text.startswith(subject) for text in (*said, end)):
-            if which == "every" and said:
-                return f"{who} such that {' and '.join(said)} is such that {end}"
-            return f"{who} is such that {' and '.join((*said, end))}"
-        that = " and ".join(text.removeprefix(subject) for text in said)
-        return f"{who}{f' that {that}' if that else ''} {end.removeprefix(subject)}"
 
     def fact(self, fact: Fact) -> str:
         """Return a fact about roles."""

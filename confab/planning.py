@@ -308,7 +308,7 @@ class Result:
         L2#0  pick cup 1 with left hand
           gives   left hand holds cup 1 (before: nothing)
           gives   cup 1 is in a hand (before: location 2)
-          because “place cup 1 in left hand to location 7” (L2#1) asks that left hand holds cup 1
+          because “place cup 1 in left hand to location 7” (L2#1) requires that left hand holds cup 1
         """
         from confab.why import because, find_step
 

@@ -300,8 +300,8 @@ def _sentence(need: Need, steps: Mapping[tuple[int, ...], Step], plan: Plan, lab
     if not asks:
         return f"{by} does what it does because {facts}"
     if asks == facts:
-        return f"{by} asks that {asks}"
-    return f"{by} asks that {asks}; {_instead(need.gives, labels)}"
+        return f"{by} requires that {asks}"
+    return f"{by} requires that {asks}; {_instead(need.gives, labels)}"
 
 
 def _instead(changes: Sequence[Change], labels: Labels) -> str:
@@ -389,7 +389,7 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
         return WhyNot(
             asked,
-            f"“{what}” can't be done; where the fewest conditions fail, in the place of {place}, it asks that",
+            f"“{what}” can't be done; where the fewest conditions fail, in the place of {place}, it requires that",
             lacks,
         )
     if found.plan is not None:

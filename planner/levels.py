@@ -108,9 +108,7 @@ class _Watch:
                 found, asked = self.nearest(level, behavior, effect, terms, change.symbol)
                 arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
                 if best is None or len(asked) < len(best.conditions):
-                    text = (
-                        f"{change}: {' '.join((behavior.name, *arguments))} asks that {' and '.join(map(said, asked))}"
-                    )
+                    text = f"{change}: {' '.join((behavior.name, *arguments))} requires that {' and '.join(map(said, asked))}"
                     best = Broken(step.path, change, behavior.name, arguments, asked, text)
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level brings it about")
 

@@ -110,7 +110,7 @@ class Broken:
     """A change for which the level above asks what doesn't hold: `behavior` comes nearest to making it, but for `conditions`.
 
     `step` is the path of the primitive that makes the change. No behaviour: the level has none that could make this change.
-    `text` says it, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 asks that …``.
+    `text` says it, e.g. ``cup1 LOCATION location7: B1_MOVE cup1 location7 requires that …``.
     """
 
     step: tuple[int, ...]

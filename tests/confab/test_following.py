@@ -24,11 +24,11 @@ def test_a_goal_that_is_defined_needs_what_it_follows_from() -> None:
 
 
 def test_a_condition_that_is_defined_is_told_with_what_changed_it() -> None:
-    asks = "“put ring into casket” (L1#1) asks that not casket is out of reach; before: chest is shut"
+    asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; before: chest is shut"
     assert asks in needs("packing-small", "L1#0")
 
 
 def test_a_condition_on_all_of_a_class_says_so() -> None:
     asked = needs(THEATRE, "unload cloud")
-    assert asked[0] == "it is wanted that not cloud is stowed: that follows since cart doesn't carry cloud"
-    assert re.match(r"“switch (back|front) on” \(L1#15\) asks that of each prop: not the prop is stowed", asked[1])
+    assert asked[0] == "it is wanted that cloud isn't stowed: that follows since cart doesn't carry cloud"
+    assert re.match(r"“switch (back|front) on” \(L1#15\) requires that no prop is stowed", asked[1])

@@ -75,7 +75,7 @@ def test_where_a_level_is_left_what_only_that_level_asks_is_named() -> None:
     (broken,) = left.broken
     assert broken.step == (1, 1)
     assert str(broken) == (
-        "cup1 LOCATION location7: B1_MOVE cup1 location7 asks that (cup1 BEVERAGE no_beverage or cup1 is no Cup)"
+        "cup1 LOCATION location7: B1_MOVE cup1 location7 requires that (cup1 BEVERAGE no_beverage or cup1 is no Cup)"
     )
 
 
