@@ -473,6 +473,6 @@ def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[
         terms = dict(zip((p.name for p in behavior.parameters), one.arguments, strict=True))
         doing = labels.behavior(behavior, {term: value for term, value in terms.items() if not value.startswith("?")})
         found.append(
-            f"{what}“{doing}” of level {level} asks that {' and '.join(map(labels.condition, one.conditions))}"
+            f"{what}“{doing}” of level {level} requires that {' and '.join(map(labels.condition, one.conditions))}"
         )
     return tuple(dict.fromkeys(found))

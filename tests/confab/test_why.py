@@ -98,7 +98,7 @@ def test_what_a_level_above_asks_and_an_alternative_breaks_is_said_first(serving
     (broken,) = told.breaks
     assert "only against what a level above asks" in told.answer
     assert broken.startswith(
-        "cup 1 is at location 7: “move cup 1 to location 7” of level 1 asks that (cup 1 carries no beverage"
+        "cup 1 is at location 7: “move cup 1 to location 7” of level 1 requires that (cup 1 carries no beverage"
     )
     assert str(told).splitlines()[1].strip() == broken
     assert told.json()["breaks"] == [broken]
