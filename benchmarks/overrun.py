@@ -1,10 +1,10 @@
-"""How long `confab plan --time-limit N` goes on after its limit, ending with exit 3; how long `confab validate` takes.
+"""How long commands and calls go on after their time limit; how long `confab validate` takes.
 
-    python -m benchmarks.overrun              every call, as docs/promises.md has it
-    python -m benchmarks.overrun validated    what validation takes
+    python -m benchmarks.overrun [--limits 1,5] [FILE.ttl …]    every command and call, in hard scenes and in the files
+    python -m benchmarks.overrun validated                      what validation takes
 
 The limit is one of the clock, so a call is watched from outside: what CPU time it has used when the limit is over, and in the end,
-with that of an engine that it runs.
+with that of all processes that it runs.
 On a busy machine the limit comes at another step, but a step takes the CPU time that it takes.
 """
 
@@ -14,6 +14,8 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from time import sleep
@@ -22,55 +24,96 @@ SCENES = {
     "1,000 objects": ("served", "--objects", "1000"),
     "10,000 objects": ("served", "--objects", "10000"),
     "100,000 irrelevant objects": ("served", "--objects", "4", "--clutter", "100000"),
-    "200 objects": ("served", "--objects", "200"),
+    "200 objects in a ring": ("rotate", "--objects", "200"),
+    "full shelves": ("full", "--objects", "60"),
+    "1,000 in each other's way": ("blocked", "--objects", "1000"),
 }
+"""Generated scenes that aren't planned in within five seconds, most of them."""
 VALIDATED = ("1,000 objects", "10,000 objects")
-"""These scenes are validated, which has no limit."""
-MEMORY = "FILE"
-"""Stands for a memory of `TAUGHT`."""
-TAUGHT = ("served", "--objects", "8")
-CALLS: tuple[tuple[str, float, tuple[str, ...]], ...] = (
-    ("1,000 objects", 1, ()),
-    ("1,000 objects", 2, ("--mode", "optimal")),
-    ("10,000 objects", 2, ()),
-    ("10,000 objects", 5, ()),
-    ("10,000 objects", 10, ()),
-    ("100,000 irrelevant objects", 2, ()),
-    ("100,000 irrelevant objects", 5, ()),
-    ("200 objects", 1, ("--mode", "paper")),
-    ("200 objects", 3, ("--mode", "paper")),
-    ("1,000 objects", 5, ("--mode", "paper")),
-    ("1,000 objects", 1, ("--memory", MEMORY)),
-    ("1,000 objects", 2, ("--memory", MEMORY)),
-    ("10,000 objects", 5, ("--memory", MEMORY)),
-    ("200 objects", 2, ("--engine", "fast-downward")),
-    ("200 objects", 5, ("--engine", "fast-downward")),
-    ("1,000 objects", 5, ("--engine", "fast-downward")),
+EASY, TABLE = "200 objects", "the paper's table"
+EVERY = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
+COMMANDS: tuple[tuple[str, ...], ...] = (
+    ("plan", "SCENE"),
+    ("plan", "SCENE", "--engine", "none"),
+    ("plan", "SCENE", "--engine", "fast-downward"),
+    ("plan", "SCENE", "--mode", "optimal"),
+    ("plan", "SCENE", "--mode", "paper"),
+    ("plan", "SCENE", "--levels", "strict"),
+    ("plan", "SCENE", "--memory", "MEMORY"),
+    ("execute", "SCENE"),
+    ("execute", "SCENE", "--mode", "paper"),
+    ("execute", TABLE, "--world", "pybullet"),
+    ("explain", "SCENE"),
+    ("explain", EASY, "--not", "cup1 LOCATION location3"),
+    ("learn", "SCENE", "--memory", "NEW.ttl"),
+    ("query", "SCENE", EVERY),
+    ("query", "SCENE", "--affords", "all"),
+    ("validate", "SCENE"),
+    ("export", "SCENE", "-o", "NEW"),
+    ("run", "SCENE", "--no-video", "-o", "NEW"),
+    ("run", TABLE, "--no-video", "-o", "NEW"),
+    ("verify", TABLE, "PLAN.json", "--rollouts", "100"),
+    ("verify", TABLE, "PLAN.json", "--rollouts", "100", "--workers", "2"),
 )
-"""In which scene, with how many seconds, and with which other options."""
-WATCHED = """
+"""Commands; each is tried with each limit, SCENE being one hard scene after the other."""
+CALLS: tuple[tuple[str, str], ...] = (
+    ("SCENE", "scene.plan(time_limit=S)"),
+    ("SCENE", "scene.plan(time_limit=S, engine='none')"),
+    ("SCENE", "scene.plan(time_limit=S, optimal=True)"),
+    ("SCENE", "scene.plan(time_limit=S, mode='paper')"),
+    ("SCENE", "scene.explain(time_limit=S)"),
+    ("SCENE", "scene.execute(time_limit=S)"),
+    (TABLE, "scene.execute(time_limit=S, world='pybullet')"),
+    (TABLE, "result.verify(100, time_limit=S)"),
+    (EASY, "result.why_not('cup1 LOCATION location3', seconds=S)"),
+    (EASY, "within: result.explain()"),
+    (EASY, "within: confab.Memory.of(scene).teach(scene, result)"),
+    ("SCENE", "within: confab.load(scene.knowledge.path)"),
+    ("SCENE", "within: scene.affordances()"),
+    ("SCENE", "within: scene.query(EVERY)"),
+    ("SCENE", "within: confab.validate(scene.knowledge.path)"),
+    ("SCENE", "within: scene.problem"),
+)
+"""Calls in Python with the scene in which they are made; `within` stands for a block of `confab.within(S)`."""
+BEGUN = """
 import os, sys
 from reasoner.limits import Deadline
 begin = Deadline.after.__func__
 def after(cls, seconds):
-    os.write(int(os.environ["WATCH"]), b"!")
+    if seconds == SECONDS:
+        os.write(int(os.environ["WATCH"]), b"!")
     return begin(cls, seconds)
 Deadline.after = classmethod(after)
-from confab.start import main
-main()
 """
-"""The command, which says when it begins to count."""
+"""Says when a call begins to count."""
+COMMAND = "from confab.start import main; main()"
+CALL = """
+import confab
+scene, EVERY, S = confab.load(sys.argv[1]), sys.argv[2], SECONDS
+if 'result.' in sys.argv[3] or 'result)' in sys.argv[3]:
+    result = scene.plan()
+try:
+    if sys.argv[3].startswith("within: "):
+        with confab.within(S):
+            eval(sys.argv[3].removeprefix("within: "))
+    else:
+        eval(sys.argv[3])
+except Exception as error:
+    from reasoner.limits import LimitError
+    os._exit(3 if isinstance(error, LimitError) else print(repr(error)[:300], file=sys.stderr) or 4)
+os._exit(0)
+"""
 
 
-def overrun(arguments: list[str], seconds: float) -> tuple[int, float]:
-    """Return how a command ended, and the CPU seconds that it used after its limit."""
+def overrun(code: str, arguments: Sequence[str], seconds: float) -> tuple[int, float]:
+    """Return how a process ended that runs a code, and the CPU seconds that it used after its limit."""
     told, tell = os.pipe()
     with subprocess.Popen(
-        [sys.executable, "-c", WATCHED, *arguments, "--time-limit", f"{seconds:g}"],
+        [sys.executable, "-c", (BEGUN + code).replace("SECONDS", repr(seconds)), *arguments],
         pass_fds=(tell,),
         env={**os.environ, "WATCH": str(tell)},
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=None if "-v" in sys.argv else subprocess.DEVNULL,
     ) as process:
         os.close(tell)
         os.read(told, 1)
@@ -103,23 +146,39 @@ def confab(*arguments: str) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def main() -> None:
-    """Print a row for each call."""
+def main(limits: Sequence[float], files: Sequence[str]) -> None:
+    """Print a row for each command and call with each limit."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
-        files = {name: Path(folder) / f"{number}.ttl" for number, name in enumerate(SCENES)}
-        for name, file in files.items():
-            confab("generate", *SCENES[name], "-o", str(file))
-        taught, memory = (str(Path(folder) / name) for name in ("taught.ttl", "memory.ttl"))
-        confab("generate", *TAUGHT, "-o", taught)
+        scenes = {Path(file).stem: file for file in files}
+        for number, (name, family) in enumerate({**SCENES, EASY: ("served", "--objects", "200")}.items()):
+            scenes[name] = str(Path(folder, f"scene{number}.ttl"))
+            confab("generate", *family, "-o", scenes[name])
+        memory, plan = (str(Path(folder, name)) for name in ("memory.ttl", "plan.json"))
+        taught = str(Path(folder, "taught.ttl"))
+        confab("generate", "served", "--objects", "8", "-o", taught)
         confab("learn", taught, "--memory", memory)
-        print("| scene | options | limit, s | exit | CPU s after it | share of the limit |\n|---|---|---|---|---|---|")
-        for name, seconds, options in CALLS:
-            code, after = overrun(["plan", str(files[name]), *(memory if o == MEMORY else o for o in options)], seconds)
-            said = " ".join(options)
-            print(
-                f"| {name} | {f'`{said}`' if said else ''} | {seconds:g} | {code} | {after:.2f} | {after / seconds:.0%} |",
-                flush=True,
-            )
+        confab("plan", "beverage-serving", "-o", plan)
+        known = {**scenes, TABLE: "beverage-serving", "MEMORY": memory, "PLAN.json": plan}
+        hard, new = [name for name in scenes if name != EASY], count()
+        print("| call | scene | limit, s | exit | CPU s after it | share of the limit |\n|---|---|---|---|---|---|")
+        for turn, seconds in enumerate(limits):
+            for number, words in enumerate(COMMANDS + CALLS):
+                where = words[1] if words in COMMANDS else words[0]
+                name = hard[(number + turn * 5) % len(hard)] if where == "SCENE" else where
+                if words in COMMANDS:
+                    said = [word for word in words if word != where]
+                    put = {
+                        **known,
+                        "SCENE": known[name],
+                        **{w: str(Path(folder, f"{next(new)}{w}")) for w in ("NEW", "NEW.ttl")},
+                    }
+                    arguments = [put.get(word, word) for word in words]
+                    code, after = overrun(COMMAND, [*arguments, "--time-limit", f"{seconds:g}"], seconds)
+                    call = f"confab {' '.join(said)}" if EVERY not in said else "confab query (every three triples)"
+                else:
+                    call = words[1]
+                    code, after = overrun(CALL, [known[name], EVERY, call], seconds)
+                print(f"| `{call}` | {name} | {seconds:g} | {code} | {after:.2f} | {after / seconds:.0%} |", flush=True)
 
 
 def validated() -> None:
@@ -133,4 +192,9 @@ def validated() -> None:
 
 
 if __name__ == "__main__":
-    validated() if sys.argv[1:] == ["validated"] else main()
+    given = [word for word in sys.argv[1:] if word != "-v"]
+    if given == ["validated"]:
+        validated()
+    else:
+        asked = given.pop(given.index("--limits") + 1) if "--limits" in given else "1,5,20"
+        main([float(one) for one in asked.split(",")], [word for word in given if word != "--limits"])

@@ -18,7 +18,6 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-from confab.pddl_commands import read_pddl_plan
 from planner.hierarchical.regrouping import under_the_levels_above
 from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Reason, Status
@@ -85,6 +84,8 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
         return outcome(Status.UNSOLVABLE, reason=f"no plan exists on level {level}")
     if not said.startswith("SOLVED"):
         return outcome(Status.GAVE_UP, reason=said.lower().replace("_", " "))
+    from confab.pddl_commands import read_pddl_plan
+
     found = read_pddl_plan(wanted, level, "".join(f"({line})\n" for line in lines), regroup=True, shorten=True)
     for plan in (under_the_levels_above(problem, found), found):
         faults = validate(problem, plan)

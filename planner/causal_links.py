@@ -20,6 +20,7 @@ from planner.checked_conditions import Arguments
 from planner.plan import Plan, Step
 from planner.validation import Cell, Facts, Rules
 from reasoner.amounts import meets, written
+from reasoner.limits import check
 from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 
 Path = tuple[int, ...]
@@ -150,6 +151,7 @@ class _Course:
         deeds: list[tuple[int, int, tuple[Change, ...], frozenset[Cell]]] = []
         open_: dict[Path, tuple[int, int, dict[Cell, str]]] = {}
         for number, step in enumerate(self.steps):
+            check("explaining the plan")
             for path, group in self.groups.items():
                 if group.steps[0].path == step.path:
                     open_[path] = number, len(self.facts.log), self.changes(group) or {}
@@ -209,6 +211,7 @@ class _Course:
         self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Mapping[str, str]
     ) -> tuple[tuple[Change, ...], tuple[Condition, ...], frozenset[Cell]] | None:
         """Return what breaks for a step if cells have the values that they had before they were written; None if nothing does."""
+        check("explaining the plan")
         facts, mark = self.facts, len(self.facts.log)
         now = {cell: str(facts.value(*cell)) for cell in cells}
         for cell in cells:

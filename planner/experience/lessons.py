@@ -25,7 +25,7 @@ from planner.hierarchical.subplans import Keep
 from planner.paper.learning import LearningError
 from planner.plan import Limits, Plan, Step
 from planner.transitions import Cell, Change, arguments_of
-from reasoner.limits import LimitError
+from reasoner.limits import LimitError, check
 from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
 from reasoner.symbols import Problem, Symbol
 
@@ -163,6 +163,7 @@ def tried(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     lesson, open_ = Lesson(), guide.open()
     with suppress(LimitError):
         by_rules(guide)
+    check("learning")  # without time for its rules nothing is shown
     for cell in open_:
         kinds = {rule.goals for rule in guide.by_goal.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [
@@ -210,6 +211,7 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
     """Do steps, and return how each was refined: the method, who was taken for it, and the rules."""
     lesson = Lesson()
     for step in steps:
+        check("learning")
         mark = len(call.table.trail)
         bindings, made = changes(call, (step.behavior, step.arguments))
         if not step.steps:
@@ -288,6 +290,7 @@ def chosen(
     later = grounds(steps)
     lesson = Lesson()
     for number, ground in enumerate(later):
+        check("learning")
         open_ = guide.open() if problem.domain.behaviors[ground[0]].level == guide.first else {}
         ready = {cell: value for cell, value in open_.items() if not guide.waits(cell)}
         tried_ = list(guide.every(ready)) or list(guide.every(open_))

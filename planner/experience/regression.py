@@ -23,6 +23,7 @@ from planner.validation import Facts, Rules
 from reasoner.amounts import Amount, inside, meets, towards
 from reasoner.derivation import strata
 from reasoner.language import terms, walk
+from reasoner.limits import check
 from reasoner.memory.experience import Ground, Order, Rule
 from reasoner.symbols import (
     FALSE,
@@ -77,6 +78,7 @@ class Course:
             self._do(number, name, arguments)
 
     def _do(self, number: int, name: str, arguments: tuple[str, ...]) -> None:
+        check("learning")
         behavior, facts = self.problem.domain.behaviors[name], self.facts
         given = {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
         bound = self.rules.satisfied(behavior.preconditions, given, behavior.kinds, facts)
@@ -157,6 +159,7 @@ class Course:
             if meets(later.value(s.situation, s.arguments), value)
         }
         for done in reversed(self.done):
+            check("learning")
             undo(facts, done.mark)
             before, served = self.needed(need, done, facts, later)
             if served:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from planner.paper.cogency import PAPER, PaperConstants, situation
 from planner.paper.transitions import Model, Values
 from planner.plan import Plan, Step
+from reasoner.limits import check
 from reasoner.memory.links import Conclusion, Links
 from reasoner.symbols import GroundBehavior, Problem, State
 
@@ -71,6 +72,7 @@ def reinforce(
     learning : float
         λ of eq. (2).
     """
+    check("learning")
     symbols = links.tables.setdefault(conclusion, {})
     for symbol, value, values in situation(state, problem, level):
         old = symbols.get(symbol) or dict.fromkeys(values, 1.0 / len(values))
