@@ -1,0 +1,121 @@
+"""Every command that takes `--time-limit`, and every call inside of `confab.within`, ends by then."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import confab
+from confab.cli import COMMANDS, app
+from confab.commands.options import Seconds
+from confab.execution import Execution
+from confab.planning import Result
+from confab.scene import Scene
+from confab.terminal import GAVE_UP
+from planner.plan import Status
+from reasoner.generate import write_scene
+from reasoner.limits import LimitError, OutOfTimeError
+
+SOON, SLACK = 0.1, 1.5
+"""The limit, and CPU seconds within which a call ends, imports included: without a limit each takes longer, or doesn't end."""
+WITHOUT = {"new", "fetch", "picture", "generate", "convert", "memory"}
+"""Commands that neither search nor simulate."""
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("scenes") / "large.ttl"
+    write_scene(file, "served", 400, 2, 0, 0)
+    return file
+
+
+@pytest.fixture(scope="module")
+def solved(large: Path) -> Result:
+    return confab.load(large).plan()
+
+
+def test_every_command_that_works_long_takes_a_time_limit() -> None:
+    without = set()
+    for name in COMMANDS:
+        command = app.get_command(click.Context(app), name)
+        assert command is not None
+        if not any(isinstance(option.type, Seconds) and "--time-limit" in option.opts for option in command.params):
+            without.add(name)
+    assert without == WITHOUT
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "plan SCENE", "plan SCENE --engine none", "plan SCENE --mode optimal", "plan SCENE --mode paper",
+        "execute SCENE", "execute SCENE --mode paper", "explain SCENE", "explain SCENE --not WHAT",
+        "learn SCENE --memory NEW.ttl", "query SCENE --affords all", "validate SCENE", "export SCENE -o NEW",
+        "run SCENE -o NEW", "verify SCENE PLAN.json",
+    ],
+)  # fmt: skip
+def test_a_command_ends_by_its_time_limit(words: str, large: Path, tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_text(json.dumps({"steps": []}))
+    put = {"SCENE": large, "WHAT": "cup1 LOCATION location3", "PLAN.json": tmp_path / "plan.json"}
+    put |= {"NEW": tmp_path / "new", "NEW.ttl": tmp_path / "new.ttl"}
+    begin = process_time()
+    done = CliRunner().invoke(app, [*(str(put.get(word, word)) for word in words.split()), "--time-limit", f"{SOON}"])
+    assert process_time() - begin < SLACK
+    assert isinstance(done.exception, LimitError) or done.exit_code == GAVE_UP
+    assert list(tmp_path.iterdir()) == [tmp_path / "plan.json"]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda scene, _: scene.plan(),
+        lambda scene, _: scene.plan(mode="paper"),
+        lambda scene, _: scene.plan(optimal=True),
+        lambda scene, _: scene.execute(),
+        lambda scene, _: scene.explain(),
+        lambda scene, _: scene.affordances(),
+        lambda scene, _: confab.load(scene.knowledge.path),
+        lambda scene, _: confab.validate(scene.knowledge.path),
+        lambda _, result: Result(result.scene, result.problem, result.outcome, {}).explain(),
+        lambda _, result: result.why_not("cup1 LOCATION location3"),
+        lambda scene, result: confab.Memory.of(scene).teach(scene, result),
+        lambda scene, result: confab.Memory.of(scene).learn(scene, result),
+    ],
+)
+def test_a_call_ends_by_the_limit_of_the_block_around_it(
+    call: Callable[[Scene, Result], object], large: Path, solved: Result
+) -> None:
+    scene = solved.scene
+    assert isinstance(scene, Scene)
+    begin = process_time()
+    with confab.within(SOON):
+        try:
+            found = call(scene, solved)
+        except OutOfTimeError:
+            found = None
+    assert process_time() - begin < SLACK
+    if isinstance(found, Result):
+        assert found.outcome.status is Status.GAVE_UP
+    if isinstance(found, Execution):
+        assert found.episode.status.value == "gave-up"
+
+
+def test_a_lesson_that_takes_too_long_teaches_nothing(solved: Result) -> None:
+    memory = confab.Memory.of(solved.scene)
+    with confab.within(SOON), pytest.raises(OutOfTimeError):
+        memory.teach(solved.scene, solved)
+    assert not memory.experience.episodes
+    assert not len(memory.links)
+
+
+def test_a_simulation_ends_by_its_time_limit() -> None:
+    pytest.importorskip("pybullet")
+    scene = confab.load("beverage-serving")
+    result = scene.plan()
+    begin = process_time()
+    with pytest.raises(OutOfTimeError, match="while simulating"):
+        scene.verify(result, 50, time_limit=1.0)
+    assert process_time() - begin < 4.0
