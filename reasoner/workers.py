@@ -54,17 +54,16 @@ class WorkerError(RuntimeError):
         return self.status == -signal.SIGABRT or "memory" in self.said.lower()
 
 
-def tie(end: int, group: bool = False) -> None:
-    """Have the kernel kill this process, or its process group, when the other end of a pipe is closed.
+def tie(end: int) -> None:
+    """Have the kernel kill the process group of this process when the other end of a pipe is closed.
 
     Parameters
     ----------
     end : int
         The reading end, from which nothing is read.
-    group : bool
     """
     if sys.platform == "linux":
-        fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp() if group else os.getpid())
+        fcntl.fcntl(end, fcntl.F_SETOWN, -os.getpgrp())
         fcntl.fcntl(end, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
     if select.select([end], [], [], 0)[0]:  # it was closed before
@@ -97,7 +96,8 @@ def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) 
     try:
         limit = str(int(min(seconds, MOST_SECONDS)) + 1)
         launcher = [sys.executable, "-ISs", LAUNCHER, str(theirs), limit, *command]
-        process = Popen(launcher, pass_fds=[theirs], start_new_session=True, **options)
+        passed = (theirs, *options.pop("pass_fds", ()))
+        process = Popen(launcher, pass_fds=passed, start_new_session=True, **options)
     except BaseException:
         os.close(ours)
         raise
@@ -188,7 +188,7 @@ def answer(megabytes: int) -> None:
 
 def main(end: int, seconds: int, command: list[str]) -> None:
     """Become a command that ends with the process which holds the other end of a pipe."""
-    tie(end, group=True)
+    tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     os.execvp(command[0], command)

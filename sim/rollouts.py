@@ -1,25 +1,27 @@
 """Many rollouts of a plan: in this process, in several processes, or on a Ray cluster.
 
-The result of a rollout depends only on its trial and seed, not on the place where it runs. Processes are spawned, not forked. If
-one dies, another process repeats its rollout.
+The result of a rollout depends only on its trial and seed, not on the place where it runs. If a process
+dies, another process repeats its rollout.
 """
 
 from __future__ import annotations
 
 import math
-import multiprocessing
+import pickle
 import signal
+import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from multiprocessing.connection import Connection, Pipe, wait
+from subprocess import DEVNULL, Popen
 from typing import Any
 
 from reasoner.embodiment.values import Embodiment
 from reasoner.limits import LimitError, check, current
 from reasoner.symbols import State
-from reasoner.workers import CPU_SECONDS, limit_cpu, tie
+from reasoner.workers import CPU_SECONDS, end, limit_cpu, start
 from sim.engine import Engine
 from sim.staging import Perturbation
 from sim.verify import Rollout, verify
@@ -90,7 +92,7 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     Parameters
     ----------
     trial : Trial
-        Pickled if there is more than one worker, so `prepare` must be a function or a `functools.partial` of one.
+        Pickled if there is more than one worker, so `prepare` must be a function of a module or a `functools.partial` of one.
     seeds : sequence of int
     workers : int or str
         Number of processes (1: this one); or ``ray`` for the Ray cluster of this machine, which is started if need be; or a
@@ -128,21 +130,22 @@ def _stream(trial: Trial, seeds: Sequence[int], workers: int | str) -> Iterator[
 # ------------------------------------------------------------------------------------------------- processes
 
 
-def _work(connection: Connection, trial: Trial) -> None:
-    """Run the seeds received through the connection until it closes; send each rollout, or the exception that it raised."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
-    if (parent := multiprocessing.parent_process()) is not None:
-        tie(parent.sentinel)
-    try:
+def work(descriptor: int) -> None:
+    """Receive a trial through a connection, then seeds until it closes; send each rollout, or the exception that it raised."""
+    connection = Connection(descriptor)
+    trial: Trial | None = None
+    with suppress(EOFError, ConnectionError):
         while True:
-            seed = connection.recv()
+            message = connection.recv_bytes()
             limit_cpu(CPU_SECONDS)
             try:
-                connection.send(trial.run(seed))
+                if trial is None:
+                    trial = pickle.loads(message)
+                    continue
+                result: Rollout | Exception = trial.run(pickle.loads(message))
             except Exception as error:
-                connection.send(error)
-    except (EOFError, OSError):
-        return
+                result = error
+            connection.send(result)
 
 
 @dataclass
@@ -153,7 +156,8 @@ class _Pool:
     seeds: Sequence[int]
     size: int
     waiting: deque[int] = field(init=False)
-    busy: dict[Connection, tuple[BaseProcess, int]] = field(default_factory=dict)
+    busy: dict[Connection, tuple[Popen[bytes], int]] = field(default_factory=dict)
+    started: list[Popen[bytes]] = field(default_factory=list)
     deaths: Counter[int] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -172,20 +176,23 @@ class _Pool:
                     if rollout is not None:
                         yield rollout
         finally:
-            for connection, (process, _) in self.busy.items():
+            for connection in self.busy:
                 connection.close()
-                process.kill()
+            for process in self.started:
+                end(process)
 
     def _start(self) -> None:
         """Start a process with the next seed."""
-        context = multiprocessing.get_context("spawn")
-        here, there = context.Pipe()
-        process = context.Process(target=_work, args=(there, self.trial), daemon=True)
-        process.start()
+        here, there = Pipe()
+        code = "import sys; sys.path[:] = sys.argv[2:]; from sim.rollouts import work; work(int(sys.argv[1]))"
+        command = [sys.executable, "-c", code, str(there.fileno()), *sys.path]
+        process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)  # it limits each rollout
+        self.started.append(process)
         there.close()
+        here.send(self.trial)
         self._give(here, process)
 
-    def _give(self, connection: Connection, process: BaseProcess) -> None:
+    def _give(self, connection: Connection, process: Popen[bytes]) -> None:
         """Send a process its next seed, or close its connection if none is left."""
         if not self.waiting:
             connection.close()
@@ -208,15 +215,15 @@ class _Pool:
         self._give(connection, process)
         return result
 
-    def _replace(self, process: BaseProcess, seed: int) -> None:
+    def _replace(self, process: Popen[bytes], seed: int) -> None:
         """Start a new process for the seed of a dead one, or raise `RuntimeError` after `TRIES` deaths."""
-        process.join()
-        if process.exitcode == -signal.SIGXCPU:
+        status = process.wait()
+        if status == -signal.SIGXCPU:
             raise LimitError(f"gave up: the rollout of seed {seed} took {CPU_SECONDS:,.0f} s of CPU time")
         self.deaths[seed] += 1
         if self.deaths[seed] >= TRIES:
             raise RuntimeError(
-                f"the rollout of seed {seed} was given up: {TRIES} processes died at it (the last with {process.exitcode})"
+                f"the rollout of seed {seed} was given up: {TRIES} processes died at it (the last with {status})"
             )
         self.waiting.appendleft(seed)
         self._start()

@@ -1,6 +1,5 @@
 """Nothing outlives the process that started it, and every process has a limit of its own."""
 
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.workers import WorkerError, call, end, start, tie
+from reasoner.workers import LAUNCHER, WorkerError, call, end, start
 
 SLEEP = "import subprocess, time; subprocess.Popen(['sleep', '60']); print('up', flush=True); time.sleep(60)"
 PARENT = f"""
@@ -75,14 +74,14 @@ def test_the_end_of_a_process_is_that_of_all_that_it_started() -> None:
     end(process)  # again does nothing
 
 
-def test_who_ties_itself_to_a_pipe_that_is_closed_ends_at_once() -> None:
+def test_what_is_tied_to_a_pipe_that_is_closed_already_never_begins(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(writing)
-    process = multiprocessing.get_context("fork").Process(target=tie, args=(reading,))
-    process.start()
-    process.join(5)
+    command = [sys.executable, "-ISs", LAUNCHER, str(reading), "1", "touch", str(tmp_path / "begun")]
+    done = subprocess.run(command, pass_fds=[reading], start_new_session=True, check=False)
     os.close(reading)
-    assert process.exitcode == 1
+    assert done.returncode == 1
+    assert not (tmp_path / "begun").exists()
 
 
 def endless(_: object = None) -> None:
