@@ -1,11 +1,12 @@
 """Commands that start processes, ended at any moment by kill -9, a crash or Ctrl-C: how many processes they leave behind.
 
-python -m benchmarks orphans             50 moments for each command and each end, as docs/promises.md quotes them
+python -m benchmarks.orphans             50 moments for each command and each end, as docs/promises.md quotes them
 python -m benchmarks.orphans query 5     so many for one command
 """
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import signal
 import sys
@@ -81,6 +82,7 @@ def begun(run: Callable[[], object]) -> int:
         code = 1
         try:
             os.setsid()
+            faulthandler.disable()
             signal.signal(signal.SIGINT, signal.default_int_handler)
             nowhere = os.open(os.devnull, os.O_RDWR)
             for stream in (0, 1, 2):

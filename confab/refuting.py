@@ -49,5 +49,5 @@ def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
     with suppress(FileNotFoundError):  # a scene that states reach by hand has no such file
         try:
             add_to_reach(file, scene.knowledge, triples)
-        except (PermissionError, KnowledgeError) as error:
+        except (PermissionError, FileExistsError, KnowledgeError) as error:
             log.warning("%s: %s; what was refuted isn't kept", file, error)
