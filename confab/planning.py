@@ -154,8 +154,16 @@ def _plan(
     problem = with_goals(seen.problem, goals) if observed or mode == "paper" else seen.problem
     quantified = perf_counter() - begin
     check_goal(scene.iri, problem)
-    for behavior, why in never_done(problem):
-        raise KnowledgeError(why, seen.names.iri(behavior.name))
+
+    def whole() -> Problem:
+        if "reading" not in scene.__dict__:
+            scene.reading = read(scene.knowledge, seen.schema)
+            scene.knowledge.confirm()
+        return with_goals(scene.problem, goals)
+
+    if any(never_done(problem)):  # of individuals that were left out a value may be that nothing makes
+        for behavior, why in never_done(problem if seen.whole else whole()):
+            raise KnowledgeError(why, seen.names.iri(behavior.name))
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
@@ -188,12 +196,9 @@ def _plan(
     if not seen.whole and (
         outcome.status is Status.UNSOLVABLE or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
     ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
-        if "reading" not in scene.__dict__:
-            scene.reading = read(scene.knowledge, seen.schema)
-            scene.knowledge.confirm()
-        whole = replace(scene.problem, goal=problem.goal)
-        if whole != problem:
-            problem, outcome = whole, search(whole)
+        anew = whole()
+        if anew != problem:
+            problem, outcome = anew, search(anew)
     queries = scene.knowledge.round_trips - asked
     return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries)
 

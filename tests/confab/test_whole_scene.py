@@ -110,3 +110,17 @@ def test_a_plan_that_the_scene_refuses_is_made_anew_in_the_whole_scene(forgetful
         forgetful.lost = None
     assert [step.behavior for step in result.plan.steps] == ["FILL", "BURN"]
     assert not validate(result.problem, result.plan)
+
+
+def test_a_goal_on_a_class_that_recognition_loses_a_member_of_is_reached_for_all(
+    forgetful: Forgetful, tmp_path: Path
+) -> None:
+    text = (CASES / "lamps.ttl").read_text(encoding="utf-8").replace("c:about :lamp2 ;", "c:about :Lamp ;")
+    (tmp_path / "lamps.ttl").write_text(text.replace(":hours 2 .", ":hours 3 ."), encoding="utf-8")
+    forgetful.lost = 1
+    try:
+        result = confab.load(tmp_path / "lamps.ttl").plan(mode="strict")
+    finally:
+        forgetful.lost = None
+    assert len(result.problem.goal) == 2
+    assert not validate(result.problem, result.plan)
