@@ -170,3 +170,49 @@ def test_a_class_that_a_swrl_rule_or_a_definition_names_is_declared(tmp_path: Pa
 def test_a_cost_in_quotes_is_no_negative_one(tmp_path: Path) -> None:
     (said,) = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ':PUSH c:cost "2" ; a owl:NamedIndividual,', "")
     assert (said.rule, local_name(said.node)) == ("not-a-number", "PUSH")
+
+
+MINI = """
+@prefix : <https://example.org/mini#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix skos: <http://www.w3.org/2004/02/skos/core#> .
+@prefix dcterms: <http://purl.org/dc/terms/> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/mini> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ;
+  dcterms:title "Mini"@en ; dcterms:description "Boxes."@en .
+:Box a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :SHUT, :FILL ; rdfs:label "box"@en .
+:SHUT a owl:Class, owl:NamedIndividual, c:SituationType ; rdfs:label "shut"@en .
+:FILL a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :fill ; c:unit "kg" ; rdfs:label "fill"@en .
+:fill a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:range xsd:decimal ; rdfs:label "fill"@en .
+:size a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Box ;
+  rdfs:range xsd:decimal ; c:unit "{unit}" ; rdfs:label "size"@en .
+:CLOSE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; rdfs:label "close"@en ;
+  c:update "INSERT {{ ?box :SHUT true }} WHERE {{ ?box a :Box . ?box :SHUT {shut} }}" .
+:SEAL a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:extends :CLOSE ; rdfs:label "seal"@en ;
+  c:update "INSERT {{}} WHERE {{ ?box :fill ?n ; :size ?s FILTER(?n < ?s) }}" .
+:POUR a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 3 ; rdfs:label "pour"@en ;
+  c:update '''DELETE {{ ?box :fill ?n }} INSERT {{ ?box :fill ?m }}
+    WHERE {{ ?box a :Box ; :fill ?n ; :size ?s BIND(?n + ?s AS ?m) }}''' .
+:box a owl:NamedIndividual, :Box ; c:index 1 ; :fill 1.0 ; :size 2.0 ; rdfs:label "box"@en .
+"""
+
+
+@pytest.mark.parametrize(
+    ("said", "node", "what"),
+    [
+        ({"shut": "'false'", "unit": "kg"}, "CLOSE", "the text 'false' stands where an individual belongs"),
+        ({"shut": "~", "unit": "kg"}, "CLOSE", "this is no SPARQL update"),
+        ({"shut": "false", "unit": "litres"}, "SEAL", "SEAL compares kg and litres (FILL and size); so does POUR"),
+        ({"shut": "false . ?box :SHUT true", "unit": "kg"}, "CLOSE", "CLOSE requires that box SHUT false and that box SHUT true"),
+    ],
+    ids=["a text", "no update", "units", "a contradiction"],
+)  # fmt: skip
+def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
+    tmp_path: Path, said: dict[str, str], node: str, what: str
+) -> None:
+    (tmp_path / "mini.ttl").write_text(MINI.format(**said), encoding="utf-8")
+    (finding,) = (f for f in validate([tmp_path / "mini.ttl"]) if f.serious)
+    assert finding.what.startswith(what)
+    assert (local_name(finding.node), finding.line > 0, bool(finding.remedy)) == (node, True, True)
