@@ -2,6 +2,7 @@
 
     python -m benchmarks.mixed                                    the next worlds: COUNT of them from FIRST on
     python -m benchmarks.mixed --from 5000000 --count 100000 --workers 2 --into FOLDER
+    python -m benchmarks.mixed --mutants 100                      which share of small faults, so many in each part, they notice
     python -m benchmarks.mixed --seed 5000123                     one of them, with everything that is asked of it, and its scene
 
 A run goes on where it was interrupted, if it is given the same folder: there it notes what came of each stretch of worlds, and
@@ -29,7 +30,7 @@ from worlds.shrinking import shrunk
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
 SHRUNK = 2
 """So many worlds are made small for each thing that is wrong, by each process."""
-SHOWN = 6
+SHOWN, MUTANTS = 6, 100
 
 
 def signature(one: Complaint) -> str:
@@ -199,7 +200,13 @@ def main(arguments: Sequence[str] = ()) -> int:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--into", type=Path)
     parser.add_argument("--seed", type=int)
+    parser.add_argument("--mutants", type=int, nargs="?", const=MUTANTS)
     asked = parser.parse_args(arguments)
+    if asked.mutants is not None:
+        from benchmarks.mixed_mutants import kills
+
+        kills(asked.mutants, asked.into or Path("confab-out"))
+        return 0
     if asked.seed is not None:
         with TemporaryDirectory() as folder:
             its = judged(asked.seed, Path(folder), every=True)

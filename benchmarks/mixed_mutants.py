@@ -1,0 +1,131 @@
+"""How many small faults in recognition, in proofs and in the checker of plans the random worlds notice.
+
+Each fault (`benchmarks.mutants` draws them) is put into a process of its own, which judges the worlds until something is wrong
+that isn't without the fault. What came of each is noted in a file, with which a later run goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import resource
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from itertools import islice
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+from benchmarks.mutants import ROOT, Instead, faults, meaning
+from worlds.interpreter import Interpreter, TooManyStatesError
+from worlds.mixed import World, drawn
+
+PARTS: dict[str, tuple[tuple[str, ...], str]] = {
+    "recognition": (("reasoner/reading/relevance.py",), "guarded"),
+    "checker of plans": (
+        ("planner/validation.py", *sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))),
+        "checker",
+    ),
+    "proofs and certificates": (
+        (
+            "planner/hierarchical/unsolvability.py",
+            "planner/grounded/unreachable.py",
+            "planner/certifying.py",
+            "planner/certificate_checks.py",
+        ),
+        "guarded",
+    ),
+}
+"""The modules of each part, and the mode in which worlds are judged."""
+FIRST, WORLDS, SECONDS = 8_000_000, 150, 60
+Drawn = tuple[World, Interpreter]
+
+
+def kills(many: int, into: Path) -> None:
+    """Try faults in each part, and print which share is noticed."""
+    into.mkdir(parents=True, exist_ok=True)
+    record = into / "mixed-mutants.json"
+    known: dict[str, dict[str, str]] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
+    worlds = [drawn(seed) for seed in range(FIRST, FIRST + WORLDS)]
+    print("| part | module | faults tried | noticed | share |\n|---|---|---|---|---|")
+    for part, (files, mode) in PARTS.items():
+        present = [file for file in files if (ROOT / file).is_file()]
+        useful = [one for one in worlds if mode != "guarded" or part == "recognition" or hopeless(one[1])]
+        total = [0, 0]
+        for file in present:
+            source = (ROOT / file).read_text("utf-8")
+            its = known.setdefault(f"{file} {hashlib.sha256(meaning(source).encode()).hexdigest()[:12]}", {})
+            before = complained(file, source, useful, mode, set())
+            if not isinstance(before, set):
+                raise SystemExit(f"{file}: the worlds can't be judged without any fault")
+            share = -(-many // len(present))
+            for (name, number), text in islice(faults(source, Random(file)), share):
+                key = f"{name.removeprefix('core/')}:{number}"
+                if key not in its:
+                    found = complained(file, text, useful, mode, before)
+                    line = next(
+                        n for o, n in zip(source.splitlines(), [*text.splitlines(), ""], strict=False) if o != n
+                    )
+                    its[key] = "noticed" if not isinstance(found, set) or found else f"survived: {line.strip()}"
+                    record.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", "utf-8")
+                    print(file, key, its[key], file=sys.stderr, flush=True)
+            noticed = sum(said == "noticed" for said in its.values())
+            total = [total[0] + len(its), total[1] + noticed]
+            print(f"| {part} | `{file}` | {len(its)} | {noticed} | {noticed / max(len(its), 1):.0%} |", flush=True)
+        print(f"| {part} | **all** | {total[0]} | {total[1]} | {total[1] / max(total[0], 1):.0%} |", flush=True)
+
+
+def hopeless(meant: Interpreter) -> bool:
+    """Return whether a world has no plan."""
+    try:
+        return meant.explored(meant.problem.domain.levels[-1], 2_000).least is None
+    except TooManyStatesError:
+        return False
+
+
+def complained(file: str, text: str, worlds: Sequence[Drawn], mode: str, before: set[str]) -> set[str] | None:
+    """Return what is complained of with this text of a module: all of it, or the first that wasn't before; None if all breaks."""
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python warns of forking beside threads
+        child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+            os.close(reading)
+            with open(os.devnull, "w") as nowhere:  # noqa: PTH123
+                os.dup2(nowhere.fileno(), 1)
+                os.dup2(nowhere.fileno(), 2)
+            sys.meta_path.insert(0, Instead(file, text))
+            os.write(
+                writing,
+                json.dumps(sorted(judge(worlds, mode, lambda said: bool(before) and said not in before))).encode(),
+            )
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(writing)
+    with os.fdopen(reading) as answer:
+        said = answer.read()
+    _, state = os.waitpid(child, 0)
+    if not (os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0):
+        return None
+    return {one for one in json.loads(said) if not before or one not in before}
+
+
+def judge(worlds: Sequence[Drawn], mode: str, enough: Callable[[str], bool]) -> set[str]:
+    """Judge worlds in one mode, until a complaint is enough; return what was complained of, and how each call ended."""
+    from worlds.judging import Judge
+
+    found: set[str] = set()
+    with TemporaryDirectory() as folder:
+        for world, meant in worlds:
+            its = Judge(world, Path(folder), only=mode, meant=meant).judged()
+            said = {f"{world.seed} {one.kind} {one.mode}" for one in (*its.complaints, *its.remarks)}
+            found |= said | {f"{world.seed} judged"}
+            if any(map(enough, said)):
+                break
+    return found
