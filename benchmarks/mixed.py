@@ -22,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from worlds.features import features
 from worlds.judging import Complaint, Judge, Judged
 from worlds.mixed import World, drawn, mixed
 from worlds.scenes import scene
@@ -31,6 +32,8 @@ FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
 SHRUNK = 2
 """So many worlds are made small for each thing that is wrong, by each process."""
 SHOWN, MUTANTS = 6, 100
+SAMPLE = 25
+"""Of one of so many worlds it is found out what its features decide."""
 
 
 def signature(one: Complaint) -> str:
@@ -50,7 +53,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     begin = time.process_time()
     found: dict[str, Any] = {
         "first": first, "count": count, "wrong": {}, "remarks": {}, "truth": Counter(), "lengths": Counter(),
-        "levels": Counter(), "status": Counter(), "seconds": Counter(),
+        "levels": Counter(), "status": Counter(), "seconds": Counter(), "features": Counter(), "decisive": Counter(),
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         for seed in range(first, first + count):
@@ -74,6 +77,11 @@ def note(found: dict[str, Any], seed: int, world: World, its: Judged) -> None:
     found["truth"]["unknown" if not its.known else "none" if its.least is None else "some"] += 1
     found["lengths"][str(its.length)] += 1
     found["levels"][str(len(world.problem.domain.levels))] += 1
+    if seed % SAMPLE == 0 and its.known:
+        found["features"]["worlds"] += 1
+        for name, decisive in features(world, its.least):
+            found["features"][name] += 1
+            found["decisive"][name] += decisive
     for mode, status in its.status.items():
         found["status"][f"{mode}: {status}"] += 1
     for mode, seconds in its.seconds.items():
@@ -158,7 +166,7 @@ def add(total: dict[str, Any], one: dict[str, Any]) -> None:
     for key in ("wrong", "remarks"):
         for said, seeds in one[key].items():
             total.setdefault(key, {}).setdefault(said, []).extend(seeds)
-    for key in ("truth", "lengths", "levels", "status", "seconds"):
+    for key in ("truth", "lengths", "levels", "status", "seconds", "features", "decisive"):
         total.setdefault(key, Counter()).update(one[key])
     for key in ("count", "cpu"):
         total[key] = total.get(key, 0) + one[key]
@@ -182,6 +190,13 @@ def table(total: dict[str, Any]) -> None:
         print(
             f"| {mode} | {' | '.join(map(str, row))} | {1e3 * total['seconds'].get(mode, 0) / max(sum(row), 1):.1f} |"
         )
+    sampled = total["features"].pop("worlds", 0)
+    print(
+        f"\n| Of {sampled} worlds these have, and in these it decides whether or at what cost the goal is reached | has | decides |"
+    )
+    print("|---|---|---|")
+    for name, has in sorted(total["features"].items(), key=lambda pair: -total["decisive"][pair[0]]):
+        print(f"| {name} | {has / sampled:.0%} | {total['decisive'][name] / sampled:.1%} |")
     for key, title in (("wrong", "What is wrong"), ("remarks", "Not wrong")):
         print(f"\n| {title} | worlds | per 1,000 | seeds |\n|---|---|---|---|")
         for said, seeds in sorted(total.get(key, {}).items(), key=lambda pair: -len(pair[1])):

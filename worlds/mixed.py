@@ -45,7 +45,9 @@ FEW = 12
 """Worlds with fewer states are mostly drawn again."""
 EXCLUDED = 0.4
 """In this share of worlds it is tried to want what no state has."""
-TRIES = 6
+TRIES = 8
+NEAR = 0.25
+"""The share of goals one step away that are kept."""
 UPDATES = 0.15
 """In this share of worlds some behaviours are written as SPARQL updates, which take long to read."""
 
@@ -98,7 +100,7 @@ class _Wishes:
     """Draws what is wanted."""
 
     def __init__(self, rng: Random, interpreter: Interpreter, costs: Mapping[State, Any]) -> None:
-        self.rng, self.of = rng, interpreter
+        self.rng, self.of, self.costs = rng, interpreter, costs
         self.states = sorted(costs, key=lambda state: float(costs[state]))
         self.first: dict[tuple[int, Any], Any] = {}  # the least cost at which a value can be had
         for state in self.states:
@@ -108,12 +110,20 @@ class _Wishes:
     def goal(self, excluded: bool) -> dict[Symbol, str]:
         """Return a goal that doesn't hold at first, one that no state has if that is asked for and found; or nothing."""
         for _ in range(TRIES):
-            goal = self.drawn("random" if self.rng.random() < 0.12 else "two" if excluded else "one")
+            kind = "random" if self.rng.random() < 0.12 else "two" if excluded else "one"
+            goal = self.drawn(kind)
             states = self.states if excluded else self.states[:1]
-            if goal and not any(all(self.of.meets(state, s, v) for s, v in goal.items()) for state in states):
-                return goal
+            if goal and not any(self.has(state, goal) for state in states) and not (excluded and kind == "random"):
+                near = (state for state in self.states[1:] if self.has(state, goal))
+                cost = self.costs[next(near, self.states[0])]
+                if excluded or not cost or cost > 1 or self.rng.random() < NEAR:
+                    return goal
             excluded = excluded and self.rng.random() < 0.9
         return {}
+
+    def has(self, state: State, goal: Mapping[Symbol, str]) -> bool:
+        """Return whether a state is as wanted."""
+        return all(self.of.meets(state, symbol, value) for symbol, value in goal.items())
 
     def drawn(self, kind: str) -> dict[Symbol, str]:
         """Return what some states have: one, two mixed, or any values at all."""
@@ -371,10 +381,10 @@ class _Draft(Vocabulary):
     def behavior(self, name: str, level: int, sure: bool = False) -> Behavior:
         """Return a behaviour of its own."""
         rng, writer = self.rng, Phrases(self, level)
-        parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2)))]
+        parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2, 2)))]
         bound = list(parameters)
-        conditions = writer.conditions(bound, rng.choice((0, 0, 1, 1, 2)), 1)
-        if self.made and self.chance(0.5) and (link := writer.link(bound, rng.choice(self.made))):
+        conditions = writer.conditions(bound, rng.choice((0, 1, 1, 2, 3)), 1)
+        if self.made and self.chance(0.6) and (link := writer.link(bound, rng.choice(self.made))):
             conditions.append(link)
         found = self.with_effects(name, level, writer, parameters, bound, conditions, rng.choice((1, 1, 2, 3)))
         self.made += [effect for effect in found.effects if not effect.value.startswith("?")]
@@ -392,9 +402,10 @@ class _Draft(Vocabulary):
         effects: Sequence[ValueEffect] = (),
         amounts: Sequence[AmountEffect] = (),
     ) -> Behavior:
-        values, numbers = list(effects), list(amounts)
+        values, numbers, before = list(effects), list(amounts), len(bound)
         for _ in range(many):
             writer.effect(bound, values, numbers)
+        parameters = [*parameters, *bound[before:]]
         terms = writer.terms()
         cost = self.rng.choice((1.0, 1.0, 1.0, 2.0, 0.5)) if self.chance(0.5) else 1.0
         return Behavior(

@@ -30,6 +30,8 @@ EACH, ANYONE = "?each", "?anyone"
 """The variables of conditions that a scene says by a class in the place of an individual, and by an absence."""
 
 
+MOST_TERMS = 3
+"""An effect gets a parameter of its own where there are fewer terms and none fits."""
 CONDITIONS = (
     *("value", "value", "value", "binding", "near", "class", "equal", "witness", "absence", "every", "any"),
     *("amount", "amount"),
@@ -87,7 +89,7 @@ class Phrases:
         """Return a term for an argument of a class: mostly one that fits, sometimes one of another class."""
         members = self.draft.classes[kind]
         fitting = [t for t in bound if set(self.kinds_of(t)) & set(members)]
-        if fitting and self.rng.random() < 0.75:
+        if fitting and self.rng.random() < 0.92:
             return self.rng.choice(fitting)
         if members:
             return self.rng.choice(members)
@@ -243,7 +245,7 @@ class Phrases:
 
     # ----------------------------------------------------------------------------------------------------------- effects
 
-    def effect(self, bound: Sequence[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
+    def effect(self, bound: list[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
         """Draw an effect, unless it would contradict one that is there already."""
         rng, draft = self.rng, self.draft
         of_numbers = self.seen(quantity=True)
@@ -256,6 +258,12 @@ class Phrases:
                 each = Parameter(EACH, rng.choice((kind, kind, "A1")))
                 self.inner[EACH] = each.kind
                 terms.append(EACH)
+            elif (
+                kind in ("A", "B", "A1") and len(self.kinds) < MOST_TERMS and rng.random() < 0.7
+                and not any(set(self.kinds_of(t)) & set(draft.classes[kind]) for t in bound)
+            ):  # fmt: skip
+                bound.append(self.fresh(kind))
+                terms.append(bound[-1])
             else:
                 terms.append(self.term(bound, kind))
         if None in terms:

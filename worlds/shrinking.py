@@ -53,7 +53,7 @@ def smaller_worlds(world: World) -> Iterator[World]:
         if not _mentioned(name, world):
             yield _without_situation(world, name)
     for individual in (*problem.classes["A"], *problem.classes["B"]):
-        if (found := _without_individual(world, individual)) is not None:
+        if (found := without_individual(world, individual)) is not None:
             yield found
     for relation in problem.relations:
         if not _occurs(relation, (domain, problem.goal)):
@@ -174,7 +174,7 @@ def _without_situation(world: World, name: str) -> World:
     )  # fmt: skip
 
 
-def _without_individual(world: World, individual: str) -> World | None:
+def without_individual(world: World, individual: str) -> World | None:
     """Return a world without an individual that nothing names and that is nobody's value."""
     problem = world.problem
     if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
