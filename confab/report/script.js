@@ -1,5 +1,5 @@
-// A click on the axis of time seeks the film, and a cursor runs along with it; without a film it leads to the step in the plan.
-// The page is whole without this script: bars are links to the steps.
+// A click on the timeline seeks the film, and a cursor follows the film; without a film the click opens the step in the plan.
+// The page works without this script: bars are links to steps.
 (() => {
   "use strict";
   const open = (element) => {
