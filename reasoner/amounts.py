@@ -1,7 +1,7 @@
-"""Amounts: values that are numbers, exact whatever is worked out, and what is worked out from them.
+"""Amounts: values that are exact numbers, and arithmetic expressions over them.
 
-A state keeps an amount as text like any other value, each number in one way only: ``3``, ``1.5``, and ``1/3`` where decimals
-have no end. What is wanted of an amount may be bounds, written ``>=2`` or ``>=2,<5``.
+A state stores an amount as text like any other value, with one text for each number: ``3``, ``1.5``, and ``1/3`` for a number
+without a finite decimal. The goal value of an amount may be bounds, written ``>=2`` or ``>=2,<5``.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from functools import lru_cache
 from typing import TypeAlias
 
 Number: TypeAlias = "Fraction | float"
-"""A fraction, or `NOTHING`; no other binary number ever."""
+"""A fraction, or `NOTHING`; never another float."""
 NOTHING = float("nan")
-"""What has no amount: all that is worked out from it is nothing, and it compares with nothing."""
+"""The amount of a symbol without one (nan): every result computed with it is `NOTHING`, and every comparison with it is false."""
 
 
 LARGEST = 10**60
-"""No amount gets larger than this, nor its denominator: else doubling again and again would fill the memory."""
+"""Maximum numerator and denominator of an amount; without a bound, repeated doubling would fill the memory."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What the amounts of a situation type are: of which unit, whether whole numbers only, and between which bounds."""
+    """The kind of a situation type's amounts: unit, whether they are whole numbers, lower and upper bound."""
 
     unit: str = ""
     whole: bool = False
@@ -34,7 +34,7 @@ class Quantity:
     most: Fraction | None = None
 
     def allows(self, amount: Number) -> bool:
-        """Whether an amount is one of these."""
+        """Return whether an amount is of this kind."""
         return (
             isinstance(amount, Fraction)  # and not `NOTHING`
             and (self.least is None or amount >= self.least)
@@ -47,7 +47,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Amount:
-    """The amount that a symbol has now."""
+    """The present amount of a symbol."""
 
     situation: str
     arguments: tuple[str, ...]
@@ -80,13 +80,13 @@ COMPARING: Mapping[str, Callable[[Number, Number], bool]] = {
     ">": operator.gt,
 }
 MORE, LESS = "more", "less"
-"""What an amount must become to be as wanted."""
+"""The direction in which an amount has to change to meet its goal."""
 OPERATIONS = ("assign", "scale", "increase", "decrease")
-"""What an effect does to an amount, in the order in which effects of one behaviour on one symbol are made."""
+"""The operations of effects on amounts, in the order in which a behaviour's effects on one symbol are applied."""
 
 
 def inside(expression: Expression) -> Iterator[Expression]:
-    """Yield an expression and all inside it."""
+    """Yield an expression and all its subexpressions."""
     yield expression
     if isinstance(expression, Calculation):
         yield from inside(expression.left)
@@ -104,7 +104,7 @@ def situations_in(expression: Expression) -> frozenset[str]:
 
 
 def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:
-    """Return an expression with other terms put in for some."""
+    """Return an expression with some terms substituted."""
     if isinstance(expression, Calculation):
         left, right = put_in(expression.left, terms), put_in(expression.right, terms)
         return Calculation(expression.operator, left, right)
@@ -115,13 +115,13 @@ def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:
 
 @lru_cache(maxsize=2**16)
 def number(text: str | None) -> Number:
-    """Return the number that a text says; no text says nothing."""
+    """Return the number of a text, or `NOTHING` for None."""
     return NOTHING if text is None else Fraction(text)
 
 
 @lru_cache(maxsize=2**16)
 def written(amount: Fraction) -> str:
-    """Return the one text of a number.
+    """Return the canonical text of a number.
 
     >>> written(Fraction(3)), written(Fraction(-3, 2)), written(Fraction(1, 3))
     ('3', '-1.5', '1/3')
@@ -142,7 +142,7 @@ DECIMAL = re.compile(r"[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,2})
 
 
 def exact(text: str) -> Fraction | None:
-    """Return the number that somebody wrote, exact; None if it is none.
+    """Return the exact number of a decimal text, or None if the text is no number.
 
     >>> exact("1.50"), exact("many")
     (Fraction(3, 2), None)
@@ -151,12 +151,12 @@ def exact(text: str) -> Fraction | None:
 
 
 def divided(left: Number, right: Number) -> Number:
-    """Return a quotient: nothing where it is divided by zero."""
+    """Return a quotient, or `NOTHING` for division by zero."""
     return left / right if right else NOTHING
 
 
 def done(operation: str, amount: Number, by: Number) -> Number:
-    """Return what an effect makes of an amount; of none, none."""
+    """Return an amount after an effect; `NOTHING` stays `NOTHING`."""
     match operation:
         case "assign":
             return by if isinstance(amount, Fraction) else NOTHING
@@ -168,12 +168,12 @@ def done(operation: str, amount: Number, by: Number) -> Number:
             return amount - by
 
 
-# ------------------------------------------------------------------------------------------------------ what is wanted
+# ------------------------------------------------------------------------------------------------------ goals and bounds
 
 
 @lru_cache(maxsize=2**12)
 def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
-    """Return what is wanted of an amount, as operators with numbers.
+    """Return the goal value of an amount as pairs of operator and number.
 
     >>> bounds(">=2,<5"), bounds("3")
     ((('>=', Fraction(2, 1)), ('<', Fraction(5, 1))), (('=', Fraction(3, 1)),))
@@ -181,7 +181,7 @@ def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
     Raises
     ------
     ValueError
-        It is neither a number nor bounds.
+        The text is neither a number nor bounds.
     """
     found = []
     for part in wanted.split(","):
@@ -192,7 +192,7 @@ def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
 
 
 def bounds_written(wanted: str) -> str:
-    """Return the one text of what is wanted of an amount: a number, or bounds.
+    """Return the canonical text of an amount's goal value: a number, or bounds.
 
     >>> bounds_written("=2.0"), bounds_written("<5, >=2"), bounds_written("=2,<5")
     ('2', '<5,>=2', '<5,<=2,>=2')
@@ -205,7 +205,7 @@ def bounds_written(wanted: str) -> str:
 
 
 def meets(value: str | None, wanted: str) -> bool:
-    """Whether a value is the one that is wanted, or an amount within the bounds that are.
+    """Return whether a value equals the wanted one, or is an amount within the wanted bounds.
 
     >>> meets("shelf", "shelf"), meets("1.5", ">=2"), meets("2", ">=2,<5")
     (True, False, True)
@@ -218,7 +218,7 @@ def meets(value: str | None, wanted: str) -> bool:
 
 
 def towards(amount: str | None, wanted: str) -> str:
-    """Return whether an amount must become more or less to be as wanted; what it is, if it is as wanted.
+    """Return `MORE` or `LESS` if an amount has to change to meet its goal, else the goal.
 
     >>> towards("1.5", ">=2"), towards("3", "2"), towards("2", "2")
     ('more', 'less', '2')
@@ -231,7 +231,7 @@ def towards(amount: str | None, wanted: str) -> str:
 
 
 def nearer(before: str | None, after: Number, wanted: str) -> bool:
-    """Whether an amount comes nearer to what is wanted of it, or gets there."""
+    """Return whether an amount comes nearer to its goal, or meets it."""
     if before is None or not isinstance(after, Fraction):
         return False
     limits, old = bounds(wanted), number(before)

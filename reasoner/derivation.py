@@ -1,7 +1,7 @@
-"""Which defined situation types need which others: they are worked out in this order, those that need each other together.
+"""Stratification: the order in which defined situation types are computed, mutually dependent ones together.
 
-A situation type may need the negation of another only if that one is worked out before it: else there would be no first one to
-work out, or two answers.
+A situation type may depend on the negation of another one only if that one is computed before it; otherwise its value would be
+undefined or ambiguous.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from reasoner.symbols import (
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:
-    """Yield the situation types that conditions name, each with whether its being false is what helps them to hold.
+    """Yield the situation types that conditions name, each with whether they depend on its negation.
 
     >>> list(needed([Witness("?x", "Cup", (ValueCondition("FULL", ("?x",), "true"),), negated=True)]))
     [('FULL', True)]
@@ -44,7 +44,7 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
 
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
-    """Return the defined situation types in groups that need each other, what a group needs before it."""
+    """Return the groups of mutually dependent defined situation types, each after the groups on which it depends."""
     needs = {
         name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
     }
@@ -57,7 +57,7 @@ def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
 
 
 def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
-    """Return the situation types that need themselves, directly or by way of others."""
+    """Return the situation types that depend on themselves, directly or through others."""
     needs = {
         name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
     }
@@ -65,7 +65,7 @@ def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
 
 
 def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
-    """Return each pair of a situation type and another whose negation it needs, though that one needs it in turn."""
+    """Return the pairs of a situation type and another one on whose negation it depends, while that one depends on it."""
     together = {name: group for group in strata(rules) for name in group}
     return sorted(
         {

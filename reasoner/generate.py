@@ -44,7 +44,7 @@ Row = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Layout:
-    """A table before anything is wanted of it.
+    """A table before its goals are chosen.
 
     `reach` has the places of each hand; `starts` and `goals` a place for each object, those of the first kind first.
     """
@@ -68,12 +68,12 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
     clutter : int
         Irrelevant objects in other rooms, where no hand reaches.
     seed : int
-        Of everything that is random.
+        Seed of all random numbers.
 
     Raises
     ------
     KnowledgeError
-        No such family, or no table of it for these numbers.
+        The family is unknown, or has no table for these numbers.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 
 
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
-    """Write a scene, called like its file, whole or not at all and piece by piece; parameters as in `generate`."""
+    """Write a scene, named after its file, atomically and piece by piece; parameters as in `generate`."""
     write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
 
@@ -120,7 +120,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name:
 
 
 def _blocks(path: Path) -> list[tuple[str, str]]:
-    """Return the sections of a template with their text, those of the template that it is like first."""
+    """Return the sections of a template with their text, those of its ``like`` template first."""
     found: list[tuple[str, str]] = []
     section, lines = "once", list[str]()
     for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:
@@ -136,7 +136,7 @@ def _blocks(path: Path) -> list[tuple[str, str]]:
 
 
 def _rows(section: str, once: Row, layout: Layout, clutter: int, random: Random) -> Iterable[Row]:
-    """Return the rows of a section, each a value for every word."""
+    """Return the rows of a section, each with a value for every word."""
     half = len(layout.starts) // 2
     if section == "hand":
         return ({"HAND": hand + 1} for hand in range(len(layout.reach)))
@@ -179,7 +179,7 @@ def strips(columns: int, hands: int, places: Sequence[int]) -> list[list[int]]:
 
 
 def _side_by_side(objects: int, hands: int, random: Random) -> Layout:
-    """Lay all objects out in the near row, the first at its far end; each goal is a far place at random."""
+    """Put all objects into the near row, the first at its far end; each goal is a random far place."""
     places = range(1, 2 * objects + 1)
     goals = random.sample(places[objects:], objects)
     return Layout(places, strips(objects, hands, places), places[:objects][::-1], goals)
@@ -195,20 +195,20 @@ def _exchange(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _rotation(objects: int, hands: int, random: Random) -> Layout:
-    """Let each object go to the place of the next."""
+    """Set the goal of each object to the place of the next one."""
     layout = _side_by_side(objects, hands, random)
     return Layout(layout.places, layout.reach, layout.starts, [*layout.starts[1:], layout.starts[0]])
 
 
 def _crowded(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects on a table with one place more; each goal is a place at random."""
+    """Put the objects on a table with one free place; each goal is a random place."""
     places = range(1, objects + 2)
     reach = strips(-(-len(places) // 2), hands, places)
     return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
 
 
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
-    """Put objects where only the first or the last hand reaches, to change sides; what finds no room stays between."""
+    """Put objects at places that only the first or the last hand reaches, with goals on the other side; the rest stay between."""
     places = range(1, 2 * objects + 1)
     reach = strips(objects, hands, places)
     of_first = set(reach[0]).difference(*reach[1:]) if hands > 1 else set()
@@ -227,21 +227,21 @@ def _opposite(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _occupied(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects of the first kind where those of the second shall stand."""
+    """Put the objects of the first kind at the goals of the second kind."""
     places, half = range(1, 2 * objects + 1), objects // 2
     starts = random.sample(places[objects:], half) + random.sample(places[:objects], half)
     return Layout(places, strips(objects, hands, places), starts, starts[:half] + random.sample(starts[:half], half))
 
 
 def _anywhere(objects: int, hands: int, random: Random) -> Layout:
-    """Put the objects at random places, to go to random places; a hand reaches each place with probability 3/4."""
+    """Put the objects at random places with random goals; a hand reaches each place with probability 3/4."""
     places = range(1, 2 * objects + 1)
     reach = [[place for place in places if random.random() < 0.75] for _ in range(hands)]
     return Layout(places, reach, random.sample(places, objects), random.sample(places, objects))
 
 
 def _unreachable(objects: int, hands: int, random: Random) -> Layout:
-    """Lay out side by side, but let no hand reach the goal of one object of the second kind."""
+    """Like `_side_by_side`, but no hand reaches the goal of one object of the second kind."""
     layout = _side_by_side(objects, hands, random)
     barred = random.choice(layout.goals[objects // 2 :])
     reach = [[place for place in places if place != barred] for places in layout.reach]

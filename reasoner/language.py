@@ -1,4 +1,4 @@
-"""What conditions name, need from outside and hold inside: read here by all but the checker, so that a new kind is added once."""
+"""Traversal of conditions: their terms, variables and nested conditions. A new kind of condition is added here and in the checker."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def walk(condition: Condition) -> Iterator[Condition]:
 
 
 def terms(condition: Condition) -> tuple[str, ...]:
-    """Return the terms of a condition itself, not of those inside it."""
+    """Return the terms of a condition itself, without those of nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):
             return (*arguments, value)
@@ -64,7 +64,7 @@ def terms(condition: Condition) -> tuple[str, ...]:
 
 
 def situations_of(condition: Condition) -> frozenset[str]:
-    """Return the situation types of which a condition itself speaks, not those inside it."""
+    """Return the situation types of a condition itself, without those of nested conditions."""
     match condition:
         case ValueCondition(situation):
             return frozenset({situation})
@@ -75,7 +75,7 @@ def situations_of(condition: Condition) -> frozenset[str]:
 
 
 def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
-    """Return the relations that behaviours take for numbers: the last of a tuple is no individual."""
+    """Return the relations that behaviours use as numbers, whose tuples end with a number."""
     amounts = [effect.amount for behavior in behaviors for effect in behavior.amounts]
     for behavior in behaviors:
         for condition in behavior.conditions:
@@ -84,7 +84,7 @@ def measures(behaviors: Iterable[Behavior]) -> frozenset[str]:
 
 
 def mentions(condition: Condition) -> set[str]:
-    """Return all variables of a condition but those that a witness inside it looks for.
+    """Return all variables of a condition except those of the witnesses inside it.
 
     >>> sorted(mentions(Witness("?o", "Cup", (ValueCondition("LOCATION", ("?o",), "?l"),))))
     ['?l']
@@ -95,7 +95,7 @@ def mentions(condition: Condition) -> set[str]:
 
 
 def needs(condition: Condition) -> set[str]:
-    """Return the variables that must be bound before a condition can be tested; the rest of what it mentions it determines.
+    """Return the variables that must be bound before a condition can be tested; it determines its other variables.
 
     >>> needs(ValueCondition("LOCATION", ("cup1",), "?l")), needs(ValueCondition("LOCATION", ("cup1",), "?l", True))
     (set(), {'?l'})
@@ -109,12 +109,12 @@ def needs(condition: Condition) -> set[str]:
 
 
 def _unbound(group: Sequence[Condition]) -> set[str]:
-    """Return what a conjunction needs from outside: what its own value conditions determine is left out."""
+    """Return the variables that must be bound before a conjunction can be tested; its value conditions determine the others."""
     determined = {c.value for c in group if isinstance(c, ValueCondition) and not c.negated}
     return {term for c in group for term in needs(c)} - determined
 
 
 def nothing_determines(where: str, waiting: Sequence[Condition], bound: set[str]) -> DomainError:
-    """Return the error to raise where none of the conditions of a behaviour can be tested next."""
+    """Return the error for a behaviour of which no condition can be tested next."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

@@ -29,35 +29,35 @@ class Names:
         self._names = {iri: name for name, iri in self._iris.items()}
 
     def short(self, iri: str) -> str:
-        """Return the short name of an IRI; of one that the scene doesn't know, its last part."""
+        """Return the short name of an IRI; for an IRI outside the scene, its last part."""
         return self._names.get(iri) or local_name(iri)
 
     def iri(self, name: str) -> str:
-        """Return the IRI behind a short name; raises `KeyError` if there is none."""
+        """Return the IRI of a short name; raise `KeyError` if there is none."""
         return self._iris[name]
 
     @property
     def iris(self) -> Collection[str]:
-        """The IRIs that have names."""
+        """The IRIs with short names."""
         return self._names.keys()
 
     def agree(self, other: Names) -> bool:
-        """Tell whether all that has a name here has the same one there."""
+        """Return whether all IRIs of this table have the same short names in the other one."""
         return all(other._names.get(iri) == name for iri, name in self._names.items())
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether some IRI has this short name."""
+        """Return whether an IRI has this short name."""
         return name in self._iris
 
 
 def local_name(iri: str) -> str:
-    """Return what stands behind the last ``#``, ``/`` or ``:`` of an IRI."""
+    """Return the part of an IRI after its last ``#``, ``/`` or ``:``."""
     iri = iri.rstrip("#/:")
     return iri[max(iri.rfind("#"), iri.rfind("/"), iri.rfind(":")) + 1 :]
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
-    """Return ``; did you mean 'x'?`` for the known word that is nearest, or the hint, or nothing."""
+    """Return ``; did you mean 'x'?`` with the most similar known word, else the hint, else an empty text."""
     candidates = sorted(set(known))
     folded = {name.lower(): name for name in candidates}
     near = get_close_matches(word, candidates, n=1, cutoff=0.8) or [

@@ -1,4 +1,4 @@
-"""How deeply documents are nested: the time, memory or stack of some parsers grows much faster than the depth."""
+"""The depth of nesting of documents, checked first since the time, memory or stack of some parsers grows much faster."""
 
 from __future__ import annotations
 

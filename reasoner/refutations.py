@@ -1,7 +1,7 @@
-"""What a motion planner has refuted: a behaviour that can't be carried out as long as some facts hold.
+"""Refutations by motion planning: a behaviour that is impossible as long as some facts hold.
 
-A refutation is one more precondition of the behaviour, in a problem as in the ontology: where all of its facts hold at once,
-the behaviour isn't done with these arguments. So whatever plans, checks or explains knows of it without being told.
+A refutation is an additional precondition of the behaviour, in a problem as in the ontology: the behaviour is not applicable with
+these arguments while all of its facts hold. So planning, checking and explaining take it into account without further code.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, Proble
 
 @dataclass(frozen=True, order=True)
 class Refutation:
-    """A behaviour with its arguments, the facts as long as which it can't be carried out, and why not.
+    """A behaviour with its arguments, the facts under which it is impossible, and the reason.
 
-    An empty argument stands for any.
+    An empty argument stands for any individual.
     """
 
     behavior: str
@@ -25,12 +25,12 @@ class Refutation:
     why: str = ""
 
     def covers(self, other: Refutation) -> bool:
-        """Tell whether it says all that another one says."""
+        """Return whether this refutation implies another one."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
         return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
 
     def __str__(self) -> str:
-        """Return it in words, e.g. ``not OPEN hand door while bottle LOCATION before_door: no path``."""
+        """Return the refutation as text, e.g. ``not OPEN hand door while bottle LOCATION before_door: no path``."""
         facts = ", ".join(map(str, self.facts))
         return f"not {' '.join((self.behavior, *(one or 'any' for one in self.arguments)))} while {facts}" + (
             f": {self.why}" if self.why else ""
@@ -38,7 +38,7 @@ class Refutation:
 
 
 def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem:
-    """Return the problem with one more precondition for each refutation of a behaviour that it has."""
+    """Return the problem with an additional precondition for each refutation of one of its behaviours."""
     behaviors = dict(problem.domain.behaviors)
     for one in refutations:
         behavior = behaviors.get(one.behavior)
@@ -57,6 +57,6 @@ def with_refuted(problem: Problem, refutations: Iterable[Refutation]) -> Problem
 
 
 def _condition(fact: Fact) -> ValueCondition:
-    """Return the condition that a fact holds; what is false isn't true."""
+    """Return the condition that a fact holds; that of a false fact is the negation of the true one."""
     value = TRUE if fact.value == FALSE else fact.value
     return ValueCondition(fact.symbol.situation, fact.symbol.arguments, value, negated=fact.value == FALSE)

@@ -1,8 +1,8 @@
-"""The values at the reasoner's door: what is read out of the knowledge graph and planned with.
+"""The reasoner's output values: symbols, conditions, effects, behaviours and problems, read from the knowledge graph.
 
-Nothing here knows RDF, search or physics. Every name is a string, unique within one scene (`cup1`, `B1_MOVE`, `LOCATION`);
-the reasoner keeps the IRI behind it. A term that starts with ``?`` is a parameter or variable of a behaviour, any other term
-is an individual.
+This module knows neither RDF nor search nor physics. Every name is a string, unique within one scene (`cup1`, `B1_MOVE`,
+`LOCATION`); the reasoner keeps its IRI. A term that starts with ``?`` is a parameter or variable of a behaviour, any other term is
+an individual.
 
 ============================  =========================================  =====================
 the paper                     the field                                  here
@@ -40,7 +40,7 @@ class Symbol:
     arguments: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return the symbol as people write it, e.g. ``<cup1, LOCATION>``."""
+        """Return the symbol in the paper's notation, e.g. ``<cup1, LOCATION>``."""
         return f"<{', '.join((*self.arguments, self.situation))}>"
 
 
@@ -57,12 +57,12 @@ class Fact:
 
 
 State: TypeAlias = Mapping[Symbol, str]
-"""One value for every symbol of the scene; a boolean symbol that is left out is `FALSE`."""
+"""A value for every symbol of the scene; a missing boolean symbol is `FALSE`."""
 
 
 @dataclass(frozen=True)
 class Perceived:
-    """How the values of a situation type are read off the world.
+    """The perception of a situation type's values.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Perceived:
     exclusive : bool
         Whether no two individuals can have the same value at once, special values excepted.
     special : tuple of (str, str)
-        The special values, each behind its name: ``("valueInHand", "in_hand")``.
+        The special values as pairs of name and value: ``("valueInHand", "in_hand")``.
     """
 
     by: str
@@ -85,9 +85,9 @@ class SituationType:
 
     `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
     value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
-    `level` on; `rest` is the value that a refinement must restore; `default` is assumed where a scene says nothing. With a
-    `quantity` the values are numbers (`reasoner.amounts`), and only those symbols exist that a scene gives one. `perceived` says
-    how physics reads the values, where it does.
+    `level` on; `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
+    With a `quantity` the values are numbers (`reasoner.amounts`), and only the symbols with a stated amount exist. `perceived`
+    states how physics reads the values, where it does.
     """
 
     name: str
@@ -146,7 +146,7 @@ class EqualityCondition:
 
 @dataclass(frozen=True)
 class Witness:
-    """Some individual of class `kind`, put in for `variable`, satisfies all `conditions`; negated: none does.
+    """Some individual of class `kind`, substituted for `variable`, satisfies all `conditions`; negated: none does.
 
     "The location is free" is ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
     """
@@ -167,7 +167,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two amounts compare as `operator` (a key of `reasoner.amounts.COMPARING`) says; what has no amount does so with none."""
+    """Two amounts stand in the relation `operator` (a key of `reasoner.amounts.COMPARING`); false if one of them is missing."""
 
     left: Expression
     operator: str
@@ -184,8 +184,8 @@ Condition: TypeAlias = (
 class ValueEffect:
     """``situation(arguments)`` becomes `value`, if all of `when` held before; variables in `when` are determined there.
 
-    With `each`, it does so for every individual of that class in place of that variable: as long as a behaviour is lifted. In a
-    `Problem` there is an effect for each of them (`spread`).
+    With `each`, the effect is on every individual of that class, substituted for that variable. A `Problem` has an effect for each
+    of them instead (`spread`).
     """
 
     situation: str
@@ -199,7 +199,7 @@ class ValueEffect:
 class AmountEffect:
     """The amount of ``situation(arguments)`` is assigned, increased, decreased or scaled, if all of `when` held before.
 
-    What it is changed by is worked out in the situation before; changes of one symbol add up.
+    The number is evaluated in the state before; changes of one symbol are added.
     """
 
     situation: str
@@ -228,10 +228,10 @@ class Parameter:
 class Behavior:
     """A lifted behaviour.
 
-    Its effects are kept in the order in which they are made: what becomes false does so first, so that a fact which one
-    binding makes both false and true is true, as in PDDL. It can't be done where an amount that it changes would come to be
-    one that its situation type doesn't allow. `spread` are individuals that it names only because they are all of a kind.
-    Where it has a `price`, that is what it costs, instead of `cost`; its preconditions ask that there is one (`priced`).
+    Effects are applied in order, false facts first, so that a fact which one binding makes both false and true is true, as in
+    PDDL. The behaviour is not applicable if an amount that it changes would violate the bounds of its situation type. `spread` has
+    the individuals that it names only as members of a class. A `price` replaces `cost`, and a precondition requires that the price
+    is defined (`priced`).
     """
 
     name: str
@@ -246,7 +246,7 @@ class Behavior:
     price: Expression | None = None
 
     def __post_init__(self) -> None:
-        """Put the effects in order."""
+        """Sort the effects."""
         object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda effect: effect.value != FALSE)))
         if self.amounts:
             ordered = sorted(self.amounts, key=lambda effect: OPERATIONS.index(effect.operation))
@@ -254,27 +254,27 @@ class Behavior:
 
     @cached_property
     def priced(self) -> Comparison | None:
-        """What a price asks: that it is a number, and none below zero."""
+        """The conditions of the price: it is a number, and not negative."""
         return None if self.price is None else Comparison(self.price, ">=", Fraction(0))
 
     @cached_property
     def asked(self) -> tuple[Condition, ...]:
-        """Its preconditions without what its price asks."""
+        """The preconditions without those of the price."""
         return tuple(condition for condition in self.preconditions if condition != self.priced)
 
     @cached_property
     def every_effect(self) -> tuple[ValueEffect | AmountEffect, ...]:
-        """Its effects on values, then those on amounts."""
+        """The behaviour's effects on values, then those on amounts."""
         return (*self.effects, *self.amounts)
 
     @cached_property
     def changes(self) -> frozenset[str]:
-        """The situation types that it changes."""
+        """The situation types that the behaviour changes."""
         return frozenset(effect.situation for effect in self.every_effect)
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
-        """Its preconditions, and the conditions of its effects."""
+        """The behaviour's preconditions and the conditions of its effects."""
         return (*self.preconditions, *(condition for effect in self.every_effect for condition in effect.when))
 
     @cached_property
@@ -285,10 +285,10 @@ class Behavior:
 
 @dataclass(frozen=True)
 class Rule:
-    """A situation type that is defined: of these individuals it is true where all conditions hold, in every state.
+    """A rule of a defined situation type: it is true of its arguments in every state in which all conditions hold.
 
-    Where a situation type has several rules, one suffices; where none applies it is false. Its symbols are in no state that is
-    handed around: whoever is asked for one works it out. Rules may need each other, but none the negation of what needs it
+    If a situation type has several rules, one suffices; if none applies it is false. States do not contain its symbols: their
+    values are computed on demand. Rules may depend on each other, but not on the negation of a situation type that depends on them
     (`reasoner.derivation`).
 
     Parameters
@@ -296,9 +296,9 @@ class Rule:
     situation : str
         A boolean situation type, which no behaviour changes.
     parameters : tuple of Parameter
-        What its arguments are called in the conditions, and the classes of which they have to be.
+        The names of its arguments in the conditions, and their classes.
     variables : tuple of Parameter
-        What the conditions determine besides, as in a behaviour.
+        Further variables, which the conditions determine, as in a behaviour.
     conditions : tuple of Condition
     """
 
@@ -309,7 +309,7 @@ class Rule:
 
     @cached_property
     def behavior(self) -> Behavior:
-        """The rule as a behaviour that makes its situation type true, for all that asks what makes what true."""
+        """The rule as a behaviour that makes its situation type true, for functions that look for achievers."""
         head = ValueEffect(self.situation, tuple(p.name for p in self.parameters), TRUE)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
 
@@ -323,15 +323,15 @@ class GroundBehavior:
     arguments: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return it as the paper's figures print it, e.g. ``22 B1_MOVE cup1 location7``."""
+        """Return the behaviour as in the paper's figures, e.g. ``22 B1_MOVE cup1 location7``."""
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
 @dataclass(frozen=True)
 class Domain:
-    """What can be the case and what can be done: situation types and behaviours, in declared order.
+    """The situation types and behaviours of a domain, in declared order.
 
-    `rules` has the situation types that are defined instead of changed, each with its rules.
+    `rules` has the defined situation types, each with its rules.
     """
 
     situations: Mapping[str, SituationType]
@@ -341,7 +341,7 @@ class Domain:
 
     @property
     def levels(self) -> tuple[int, ...]:
-        """The levels that have behaviours, the most abstract first."""
+        """The levels with behaviours, the most abstract first."""
         return tuple(sorted({b.level for b in self.behaviors.values()}))
 
     def at_level(self, level: int) -> tuple[Behavior, ...]:
@@ -351,7 +351,7 @@ class Domain:
 
 @dataclass(frozen=True)
 class Problem:
-    """A scene ready to be planned in.
+    """A planning problem: a scene with its domain, initial state and goal.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ class Problem:
     initial : State
         One value for every symbol.
     goal : State
-        Values wanted of some symbols.
+        Goal values of some symbols.
     parents : mapping of class to its direct superclasses
         For statistics that back off; the planner's search doesn't use it.
     value_levels : mapping of individual to level
@@ -387,20 +387,20 @@ class Problem:
         return tuple(value for value in members if self.value_levels.get(value, 1) <= level)
 
     def first_level(self, symbol: Symbol) -> int:
-        """Return the first level on which a symbol exists: its situation type, and the individuals that it is about."""
+        """Return the first level on which a symbol exists, with its situation type and its arguments."""
         individuals = (self.value_levels.get(argument, 1) for argument in symbol.arguments)
         return max((self.domain.situations[symbol.situation].level, *individuals))
 
     def sees(self, level: int, symbol: Symbol, value: str) -> bool:
-        """Return whether a level knows both a symbol and the value that it has."""
+        """Return whether a level sees a symbol and its value."""
         return self.first_level(symbol) <= level and self.value_levels.get(value, 1) <= level
 
     def goal_on(self, level: int) -> dict[Symbol, str]:
-        """Return the goal for plans of one level: with it, what the level knows and finds at rest is at rest in the end."""
+        """Return the goal of one level: the task's goal, and rest values of the symbols of `at_rest`."""
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
-        """Return what a level knows and finds at rest; of what is true or false and not stated, what its behaviours change."""
+        """Return the symbols that a level sees and that are initially at rest; of unstated boolean ones, those that it changes."""
         rests = {s.name: s.rest for s in self.domain.situations.values() if s.rest is not None}
         found = {s: v for s, v in self.initial.items() if v == rests.get(s.situation)}
         changed = frozenset[str]().union(*(behavior.changes for behavior in self.domain.at_level(level)))
@@ -450,7 +450,7 @@ class Problem:
 
 
 def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
-    """Return a condition with other terms put in for some."""
+    """Return a condition with some terms substituted."""
 
     def put(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(terms.get(name, name) for name in names)
@@ -475,7 +475,7 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
 
 
 def made_of(effect: Effect, one: str) -> Effect:
-    """Return an effect on each of a class as one on an individual."""
+    """Return an effect on all individuals of a class as an effect on one of them."""
     if effect.each is None:
         return effect
     terms = {effect.each.name: one}
@@ -487,7 +487,7 @@ def made_of(effect: Effect, one: str) -> Effect:
 
 
 def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour with an effect for each individual of a class in place of one for all of them."""
+    """Return a behaviour with each effect on all individuals of a class replaced by effects on the individuals."""
     if all(effect.each is None for effect in behavior.every_effect):
         return behavior
 
@@ -505,9 +505,9 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
-    """Return what a behaviour asks because an amount that it changes has bounds, as far as conditions can say that.
+    """Return the preconditions that follow from the bounds of the amounts that a behaviour changes, if conditions can express them.
 
-    What must not be is said, since an effect on what has no amount does nothing.
+    They are negations of a violated bound, so that they hold for missing amounts, on which effects do nothing.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

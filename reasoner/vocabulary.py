@@ -1,4 +1,4 @@
-"""The words of the ontology that Python knows: namespaces, and the terms that several modules name."""
+"""The terms of the ontology in Python: namespaces, and the terms that several modules use."""
 
 from __future__ import annotations
 

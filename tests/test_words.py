@@ -28,7 +28,7 @@ LEFT: dict[str, int] = {
     "planner/experience": 50,
     "planner/grounded": 28,
     "planner/hierarchical": 51,
-    "reasoner": 12,
+    "reasoner": 6,
     "reasoner/graph": 4,
     "reasoner/pddl": 3,
     "reasoner/reading": 30,
