@@ -1,4 +1,4 @@
-"""Traversal of conditions: their terms, variables and nested conditions. A new kind of condition is added here and in the checker."""
+"""Traversal of conditions: terms, variables and nested conditions. A new kind of condition is added here and in the checker."""
 
 from __future__ import annotations
 
