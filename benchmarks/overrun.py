@@ -147,7 +147,7 @@ def confab(*arguments: str) -> float:
 
 
 def main(limits: Sequence[float], files: Sequence[str]) -> None:
-    """Print a row for each command and call with each limit."""
+    """Print a row for each command and call: by limit the share of it that was used after it, and how the call ended."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
         scenes = {Path(file).stem: file for file in files}
         for number, (name, family) in enumerate({**SCENES, EASY: ("served", "--objects", "200")}.items()):
@@ -160,25 +160,25 @@ def main(limits: Sequence[float], files: Sequence[str]) -> None:
         confab("plan", "beverage-serving", "-o", plan)
         known = {**scenes, TABLE: "beverage-serving", "MEMORY": memory, "PLAN.json": plan}
         hard, new = [name for name in scenes if name != EASY], count()
-        print("| call | scene | limit, s | exit | CPU s after it | share of the limit |\n|---|---|---|---|---|---|")
-        for turn, seconds in enumerate(limits):
-            for number, words in enumerate(COMMANDS + CALLS):
-                where = words[1] if words in COMMANDS else words[0]
-                name = hard[(number + turn * 5) % len(hard)] if where == "SCENE" else where
-                if words in COMMANDS:
-                    said = [word for word in words if word != where]
-                    put = {
-                        **known,
-                        "SCENE": known[name],
-                        **{w: str(Path(folder, f"{next(new)}{w}")) for w in ("NEW", "NEW.ttl")},
-                    }
-                    arguments = [put.get(word, word) for word in words]
-                    code, after = overrun(COMMAND, [*arguments, "--time-limit", f"{seconds:g}"], seconds)
-                    call = f"confab {' '.join(said)}" if EVERY not in said else "confab query (every three triples)"
+        print(f"| call | scene | {' | '.join(f'{seconds:g} s' for seconds in limits)} |")
+        print("|---|---|" + "---|" * len(limits))
+        rows: list[tuple[str, str, tuple[str, ...]]] = [
+            (words[1], " ".join(("confab", words[0], *words[2:])), words) for words in COMMANDS
+        ]
+        rows += [(where, call, ()) for where, call in CALLS]
+        for number, (where, said, words) in enumerate(rows):
+            name = hard[number % len(hard)] if where == "SCENE" else where
+            print(f"| `{said.replace(EVERY, 'EVERY')}` | {name}", end="", flush=True)
+            for seconds in limits:
+                if words:
+                    made = {word: str(Path(folder, f"{next(new)}{word}")) for word in ("NEW", "NEW.ttl")}
+                    put = {**known, "SCENE": known[name], **made}
+                    arguments = [*(put.get(word, word) for word in words), "--time-limit", f"{seconds:g}"]
+                    code, after = overrun(COMMAND, arguments, seconds)
                 else:
-                    call = words[1]
-                    code, after = overrun(CALL, [known[name], EVERY, call], seconds)
-                print(f"| `{call}` | {name} | {seconds:g} | {code} | {after:.2f} | {after / seconds:.0%} |", flush=True)
+                    code, after = overrun(CALL, [known[name], EVERY, said], seconds)
+                print(f" | {after / seconds:.0%} ({code})", end="", flush=True)
+            print(" |", flush=True)
 
 
 def validated() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from confab.labels import Labels
 from confab.report.markup import Markup, styled, tag
@@ -15,6 +15,7 @@ from planner.levels import levels_left
 from planner.plan import Outcome, Plan, Status, Step
 from planner.plan_costs import cost_of
 from reasoner.graph.knowledge import KnowledgeError
+from reasoner.limits import check
 from reasoner.names import nearest
 from reasoner.reading.goals import parse_fact
 from reasoner.symbols import Behavior, Fact, Problem, Symbol
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
 """Plans anew for some goals; also returns the problem that was planned in, and what people call what is in it."""
+Path: TypeAlias = "tuple[int, ...]"
+Steps: TypeAlias = "Mapping[Path, Step]"
 BY = re.compile(r"\s+(?:by|with)\s+(\S+)\s*$")
 SHOWN = 3
 """Of what needs a step, so many are said; the rest is counted."""
@@ -262,12 +265,16 @@ def find_step(plan: Plan, asked: int | str | Sequence[int], labels: Labels) -> S
     raise KnowledgeError(f"no step '{asked}' in the plan{nearest(text, known, 'confab explain SCENE lists its steps')}")
 
 
-def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels, number: str | None = None) -> Because:
+def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels) -> Because:
     """Return why a step is there."""
-    by_path = {other.path: other for other in plan.walk()}
-    needs = tuple(dict.fromkeys(_sentence(need, by_path, plan, labels) for need in purpose.needs))
+    return _because(step, purpose, labels, {other.path: other for other in plan.walk()}, numbers(plan))
+
+
+def _because(step: Step, purpose: Purpose, labels: Labels, steps: Steps, number: Mapping[Path, str]) -> Because:
+    check("explaining the plan")
+    needs = tuple(dict.fromkeys(_sentence(need, steps, number, labels) for need in purpose.needs))
     return Because(
-        number or number_of(plan, step),
+        number[step.path],
         step.path,
         step.id,
         str(step),
@@ -279,12 +286,12 @@ def because(plan: Plan, step: Step, purpose: Purpose, labels: Labels, number: st
 
 def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Labels, headline: str) -> Account:
     """Return why each step of a plan is there."""
-    number = numbers(plan)
-    steps = tuple(because(plan, step, purposes[step.path], labels, number[step.path]) for step in plan.walk())
+    by_path, number = {step.path: step for step in plan.walk()}, numbers(plan)
+    steps = tuple(_because(step, purposes[path], labels, by_path, number) for path, step in by_path.items())
     return Account(headline, steps, plan)
 
 
-def _sentence(need: Need, steps: Mapping[tuple[int, ...], Step], plan: Plan, labels: Labels) -> str:
+def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labels) -> str:
     facts = " and ".join(labels.fact(change.fact) for change in need.gives)
     if need.kind is Kind.GOAL and need.conditions:
         return f"it is wanted that {' and '.join(map(labels.condition, need.conditions))}: that follows since {facts}"
@@ -293,7 +300,7 @@ def _sentence(need: Need, steps: Mapping[tuple[int, ...], Step], plan: Plan, lab
     if need.kind is Kind.REST:
         where = f" after “{labels.step(steps[need.by])}”" if need.by else " in the end"
         return f"so it is at rest{where}: {facts}"
-    by = f"“{labels.step(steps[need.by])}” ({number_of(plan, steps[need.by])})"
+    by = f"“{labels.step(steps[need.by])}” ({number[need.by]})"
     if need.kind is Kind.ABOVE:
         return f"{by} is to leave that {facts}"
     asks = " and ".join(labels.condition(condition) for condition in need.conditions)
