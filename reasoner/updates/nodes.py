@@ -214,7 +214,7 @@ class Writer:
             if self.vocabulary.numeric(prop):
                 group.numbers[last] = one
                 return True
-            if prop in self.vocabulary.functional:
+            if prop in self.vocabulary.functional and prop in self.vocabulary.properties:
                 group.determined[last] = self.vocabulary.properties[prop], last.at
             elif prop in self.vocabulary.bare:
                 group.determined[last] = prop, last.at

@@ -216,3 +216,13 @@ def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
     (finding,) = (f for f in validate([tmp_path / "mini.ttl"]) if f.serious)
     assert finding.what.startswith(what)
     assert (local_name(finding.node), finding.line > 0, bool(finding.remedy)) == (node, True, True)
+
+
+def test_a_value_property_of_what_is_no_situation_type_is_told_in_an_update(tmp_path: Path) -> None:
+    text = MINI.format(shut="false", unit="kg").replace("c:SituationType ;", "c:Level ;")
+    text = text.replace(
+        ":SHUT a owl:Class, owl:NamedIndividual, c:Level ;", ":SHUT a owl:Class ; c:valueProperty :shuts ;"
+    )
+    text += ":shuts a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual .\n"
+    (tmp_path / "mini.ttl").write_text(text.replace("?box :SHUT false", "?box :shuts ?how"), encoding="utf-8")
+    assert "update" in {finding.rule for finding in validate([tmp_path / "mini.ttl"]) if finding.serious}
