@@ -11,6 +11,7 @@ from enum import Enum
 from time import perf_counter
 from typing import Protocol
 
+from planner.certificates import Certificate
 from reasoner.limits import current
 from reasoner.symbols import Condition, Fact, Problem, State
 
@@ -145,7 +146,8 @@ class Outcome:
     `cost` is what the plan costs, where some behaviour has a price; `bound` what any plan costs at least on the lowest level,
     where that was proved; `engine` the other planner whose plan it is.
     `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
-    break that only the level above asks.
+    break that only the level above asks. `certificate` proves that a task is unsolvable; `planner.solve` lets none of these
+    answers leave without one.
     """
 
     status: Status
@@ -161,6 +163,7 @@ class Outcome:
     engine: str | None = None
     given_up: tuple[str, ...] = ()
     left: tuple[Left, ...] = ()
+    certificate: Certificate | None = None
 
 
 @dataclass(frozen=True)
@@ -196,11 +199,11 @@ class Planner(Protocol):
 
 
 class UnsolvableError(Exception):
-    """A proof that there is no plan came up; the reason is its argument."""
+    """A proof that there is no plan came up: the reason, and the certificate if there is one already."""
 
-    def __init__(self, reason: Reason) -> None:
+    def __init__(self, reason: Reason, certificate: Certificate | None = None) -> None:
         super().__init__(reason.text)
-        self.reason = reason
+        self.reason, self.certificate = reason, certificate
 
 
 class TooLargeError(Exception):

@@ -10,7 +10,8 @@ optimal    shortened until a lower bound is met, without memory         `planner
 paper      A* with eq. (5) on each level                                `planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-Every plan that leaves here was accepted by `planner.validation`, which shares no code with any search.
+Every plan that leaves here was accepted by `planner.validation`, every "unsolvable" by `planner.certificate_checks`. These share no
+code with any search.
 """
 
 from __future__ import annotations
@@ -21,17 +22,20 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from planner.levels import levels_left
-from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status
+from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, TooLargeError, UnsolvableError
 from planner.plan_costs import cost_of
 from planner.validation import validate
-from reasoner.limits import OutOfTimeError, within
+from reasoner.limits import Deadline, OutOfTimeError, within
 from reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
+    from planner.certificates import Certificate
     from planner.experience.advice import Memory
     from reasoner.memory.links import Links
 
 DEFAULT_MODE = "guarded"
+ADDED_UP = 200_000
+"""Joins of at most so many rows are made to find out by how much an amount falls short."""
 
 
 class RejectedPlanError(Exception):
@@ -83,15 +87,17 @@ def solve(request: Request) -> Outcome:
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
+    deadline = Deadline.after(request.limits.seconds)
     try:
-        with within(request.limits.seconds):
+        with within(deadline):
             outcome = MODES[request.mode](request)
     except MemoryError:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     except OutOfTimeError as error:
         return Outcome(Status.GAVE_UP, reason=Reason(str(error)))
     if outcome.plan is None:
-        return outcome
+        with within(deadline):
+            return certified(request.problem, outcome)
     faults = validate(request.problem, outcome.plan)
     if faults:
         raise RejectedPlanError(
@@ -105,6 +111,54 @@ def solve(request: Request) -> Outcome:
     if all(step.level == first for step in plan.steps):
         return outcome  # no level is left: nothing to tell
     return replace(outcome, left=tuple(levels_left(request.problem, plan)))
+
+
+def certified(problem: Problem, outcome: Outcome) -> Outcome:
+    """Return an outcome; "unsolvable" with a certificate that the checker accepts, or as given up where there is none.
+
+    Parameters
+    ----------
+    problem : Problem
+        The whole task.
+    outcome : Outcome
+        If it has a certificate already, that one is tried first.
+    """
+    if outcome.status is not Status.UNSOLVABLE:
+        return outcome
+    from planner.certificate_checks import refusal
+    from planner.certificate_reasons import told
+    from planner.certifying import certify
+
+    why = "none was found within the work that is allowed"
+    certificate, tried = outcome.certificate, False
+    while certificate is not None or not tried:
+        if certificate is None:
+            certificate, tried = certify(problem), True
+        if certificate is not None:
+            refused = refusal(problem, certificate)
+            if refused is None:
+                reason = _added_up(problem, certificate) or told(problem, certificate)
+                return replace(outcome, certificate=certificate, reason=reason)
+            why = f"the checker refuses it: {refused}"
+            certificate = None
+    said = f"; {outcome.reason.text}" if outcome.reason else ""
+    reason = Reason(
+        f"no plan was found, and that there is none couldn't be certified: {why}{said}",
+        outcome.reason.terms if outcome.reason else (),
+    )
+    return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)
+
+
+def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
+    """Return by how much an amount falls short, which says more than the combinations in which it does."""
+    if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
+        return None
+    from planner.grounded.grounding import ground
+
+    with suppress(TooLargeError, MemoryError, OutOfTimeError):
+        task = ground(problem, most=ADDED_UP)
+        return task if isinstance(task, Reason) and task.terms else None
+    return None
 
 
 def _with_experience(request: Request) -> Outcome:
@@ -136,14 +190,18 @@ def _paper(request: Request) -> Outcome:
     )
 
 
-def _proof(problem: Problem, states: int, deadline: float | None) -> Reason | None:
+def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:
     from planner.hierarchical.unsolvability import exhausted, impossible, proved
 
     if not states:
         return impossible(problem)
     with suppress(OutOfTimeError):  # then nothing is shown
-        task = proved(problem, problem.domain.levels[-1], deadline)
-        return None if isinstance(task, Reason) else exhausted(task, states, deadline)
+        try:
+            task = proved(problem, problem.domain.levels[-1], deadline)
+        except UnsolvableError as proof:
+            return proof
+        reason = None if isinstance(task, Reason) else exhausted(task, states, deadline)
+        return None if reason is None else UnsolvableError(reason)
     return None
 
 

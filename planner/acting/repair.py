@@ -23,7 +23,7 @@ from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
 from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
 from planner.hierarchical.settling import settle
-from planner.hierarchical.unsolvability import refuted
+from planner.hierarchical.unsolvability import impossible
 from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from planner.plan_costs import cost_of, costs_of_steps
 from planner.transitions import Cell, arguments_of, key_of
@@ -130,7 +130,8 @@ def repair(
         # Where nothing is dropped, all that is kept has its purpose.
         kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
         settle(call)
-        solved = not refuted(call.segments) and call.serialise(recovery.harder)
+        now = replace(problem, initial={**problem.initial, **call.table.state()})
+        solved = not impossible(now) and call.serialise(recovery.harder)
     except (LimitError, UnsolvableError):
         solved = False
     if not solved:

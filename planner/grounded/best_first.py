@@ -38,7 +38,6 @@ from planner.grounded.landmarks import in_series, landmarks
 from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, path_to
 from planner.grounded.plan_windows import shorter
 from planner.grounded.task import Task, bits_of
-from planner.grounded.unreachable import blocked
 from planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, TooLargeError
 from reasoner.limits import OutOfTimeError
 from reasoner.symbols import Problem, State
@@ -223,7 +222,9 @@ def search(
     often = _Evaluator(evaluate, many, needed, min(needed.width, portfolio.widest) if many else 1)
     begun = evaluate(task.initial)
     if begun is None:
-        return Flat(Status.UNSOLVABLE, (), blocked(task), counts)
+        return Flat(
+            Status.UNSOLVABLE, (), Reason("the goal can't be reached even if nothing ever ceases to hold"), counts
+        )
     lookahead, marks = ahead(task, deadline), cache(lambda: landmarks(task, deadline))
     searches: list[tuple[float, Generator[int, None, tuple[Seen, int] | None]]] = [
         (

@@ -32,7 +32,6 @@ from planner.grounded.reachability import Flags, Reached
 from planner.grounded.schemas import Schema
 from planner.grounded.shortage import shortage
 from planner.grounded.task import Change, Grouped, Task
-from planner.grounded.unreachable import unreachable
 from planner.plan import Reason
 from reasoner.amounts import COMPARING, written
 from reasoner.derivation import circular
@@ -99,7 +98,7 @@ def ground(
     wanted = problem.goal if goal is None else goal
     for symbol, value in sorted(wanted.items()):
         if not reached.possible(symbol, value):
-            return unreachable(reached, Fact(symbol, value))
+            return Reason(f"{Fact(symbol, value)} can't be reached")
     task = _Assembly(reached).task(wanted)
     return task if isinstance(task, Reason) else shortage(task) or task
 

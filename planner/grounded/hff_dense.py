@@ -53,7 +53,7 @@ def effort(task: Task) -> Effort:
     goal = np.append(_flags([task.goal], task.size)[0], False)
     sizes = np.diff(task.needs.starts) + np.diff(task.adds.starts)
     layers, ready, before = 2, np.zeros(len(sizes), bool), -1
-    if not len(sizes):
+    if not sizes.sum():  # no operators, or none that need or add anything
         return Effort(1, CALLS, 1, 1)
     while not known[goal].all() and known.sum() != before:
         before = known.sum()

@@ -33,7 +33,6 @@ from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import MUCH, RefinedStep
 from planner.hierarchical.serialization import Call, Compiled, compiled
 from planner.hierarchical.subproblem import BITS
-from planner.hierarchical.unsolvability import impossible
 from planner.levels import levels_left
 from planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from planner.transitions import arguments_of
@@ -129,7 +128,7 @@ def _plan(
                 for level, counts in flat.search.items():
                     call.segments.counts[level].add(counts)
                 if flat.status is Status.UNSOLVABLE:
-                    return outcome(flat.status, None, impossible(problem, call.program) or flat.reason)
+                    return outcome(flat.status, None, flat.reason)
                 if flat.status is Status.SOLVED:
                     return outcome(flat.status, flat.plan)
             call = call if solved else rested(call, advised)
@@ -148,7 +147,7 @@ def _plan(
                 )
             return outcome(Status.SOLVED, made)
     except UnsolvableError as proof:
-        return outcome(Status.UNSOLVABLE, reason=proof.reason)
+        return replace(outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
         from planner.hierarchical.stuck import gave_up
 

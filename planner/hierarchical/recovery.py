@@ -16,7 +16,7 @@ from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt,
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.subproblem import MAKING
 from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, looked_at, proved
-from planner.plan import Reason, TooLargeError, UnsolvableError
+from planner.plan import Reason, TooLargeError
 from planner.transitions import Cell
 from reasoner.symbols import State
 
@@ -145,9 +145,8 @@ class Recovery:
         """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
         if not self._doubted:
             self._doubted = True
-            reason = impossible(self.call.problem, self.call.program)
-            if reason:
-                raise UnsolvableError(reason)
+            if proof := impossible(self.call.problem):
+                raise proof
 
     def doubt(self) -> None:
         """Raise `UnsolvableError` if there is no plan and the lowest level is so small that looking at its states is no work."""

@@ -27,7 +27,7 @@ SETTLED, UNSETTLED = "settled", "unsettled"
 
 DOUBT = 1_000
 """Number of expansions before the first proof of unsolvability is tried; it is tried again each time the number has quadrupled."""
-Proof: TypeAlias = "Callable[[Problem, int, float | None], Reason | None]"
+Proof: TypeAlias = "Callable[[Problem, int, float | None], UnsolvableError | None]"
 """Function of a problem, a number of states and a deadline: returns why the problem has no plan, or None if it finds no proof."""
 
 Refined: TypeAlias = "tuple[Step, Values] | None"
@@ -95,7 +95,10 @@ def plan(
         try:
             steps = task(call, level)
         except UnsolvableError as error:
-            return Outcome(Status.UNSOLVABLE, None, error.reason, call.counts, 0, perf_counter() - begin)
+            seconds = perf_counter() - begin
+            return Outcome(
+                Status.UNSOLVABLE, None, error.reason, call.counts, 0, seconds, certificate=error.certificate
+            )
         if steps is not None or call.gave_up:
             break
         if not leave_levels and level != levels[-1]:
@@ -243,8 +246,8 @@ def search(call: PaperCall, level: int, start: Values, wanted: Target) -> Found:
         call.expanded += 1
         if call.expanded == call.doubted:
             call.doubted *= 4
-            if reason := call.proof(call.model.problem, call.expanded - DOUBT, call.deadline):
-                raise UnsolvableError(reason)
+            if proof := call.proof(call.model.problem, call.expanded - DOUBT, call.deadline):
+                raise proof
         base, marks = state[:size], state[size:]
         for applied in call.model.successors(timely(grounds, call.deadline), base):
             after = applied.after

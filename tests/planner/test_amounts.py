@@ -80,9 +80,9 @@ def test_who_gives_up_says_which_amount_was_in_the_way() -> None:
     [
         ("1.5", 2, "1", {}, "TEA of jug: 1.5 servings are there, 2 are wanted, and nothing gives more"),
         ("2", 2, "0.5", {"jug": ">=1.5"}, "TEA of jug: 2 servings are there, 2.5 are wanted, and nothing gives more"),
-        ("2", 0, "1", {"jug": ">=3"}, "<jug, TEA>: at most 2 servings can be there, 3 wanted"),
-        ("2", 0, "1", {"jug": ">2"}, "<jug, TEA>: at most 2 servings can be there, more than 2 wanted"),
-        ("2", 0, "1", {"jug": "<1"}, "<jug, TEA>: at least 2 servings can be there, less than 1 wanted"),
+        ("2", 0, "1", {"jug": ">=3"}, "jug TEA >=3 can't be reached: no behaviour of level 2 gives more"),
+        ("2", 0, "1", {"jug": ">2"}, "jug TEA >2 can't be reached: no behaviour of level 2 gives more"),
+        ("2", 0, "1", {"jug": "<1"}, "jug TEA <1 can't be reached: never some Cup DRINK empty, which POUR needs"),
     ],
 )
 def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted: dict[str, str], said: str) -> None:

@@ -193,7 +193,7 @@ def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
     most = looked_at(task, segments, 0)
     assert looked_at(task, segments, most) == most  # what was done isn't done again for fewer than twice as many
     segments.worked = 20_000 * LEAST
-    with pytest.raises(UnsolvableError, match="states of level 1 that can be reached were looked at"):
+    with pytest.raises(UnsolvableError, match="none of all"):
         looked_at(task, segments, most)
 
 
@@ -253,12 +253,11 @@ def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> N
 
     assert paper(hierarchy(3000016), proof=proof).status is Status.UNSOLVABLE
     assert asked == [0, 3 * DOUBT]
-    with pytest.raises(UnsolvableError, match="can't be reached"):
-        _proof(pen({"IN lion": "yard"}, key=False), 100, None)
+    assert isinstance(_proof(pen({"IN lion": "yard"}, key=False), 100, None), UnsolvableError)
     assert _proof(pen({"IN lion": "yard"}, key=False), 100, 0.0) is None  # the deadline came first
 
 
-def test_where_no_state_will_do_it_is_said_which_goals_never_hold_and_what_can_never_be_done() -> None:
+def test_where_no_state_will_do_it_is_said_how_many_there_are() -> None:
     task = ground(
         replace(pen({"IN lion": "yard"}), goal={Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): TRUE}), 2
     )
@@ -267,7 +266,4 @@ def test_where_no_state_will_do_it_is_said_which_goals_never_hold_and_what_can_n
     shut = replace(task, barred={(task.initial, operator) for operator in range(len(task))})
     reason = exhausted(shut, 100)
     assert reason is not None
-    assert reason.text == (
-        "all 1 states of level 2 that can be reached were looked at: in none does gate AJAR true or lion IN yard hold; "
-        "B2_DRIVE, B2_OPEN, B2_SHUT can never be done"
-    )
+    assert reason.text == "none of all 1 states of level 2 that can be reached fulfils the goal"

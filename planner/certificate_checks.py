@@ -1,0 +1,450 @@
+"""Does a certificate prove that a task has no plan? A checker that shares no code with any search.
+
+It works on the whole task and on its lowest level: what an upper level can't do proves nothing. With behaviours and conditions as
+they are written (`planner.possibilities`) it verifies that the certificate's set of states
+
+1. contains the state in which the task begins;
+2. is left by no behaviour of the lowest level: each case is taken up and whatever can be done in it is done;
+3. contains no state in which the goal holds and what has a rest value is at rest, or as it was in the beginning.
+
+A plan of several levels, carried out, is a sequence of behaviours of the lowest level that ends in such a state (docs/levels.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import product
+from typing import Generic, TypeAlias, TypeVar
+
+from planner.certificates import Certificate
+from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from reasoner.amounts import bounds, number, written
+from reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
+
+OTHER, ANY, KEPT = "", "?", "="
+"""In a case: none of the values told apart; whichever value; in what comes after it: the value of before."""
+WORK = 3_000_000
+"""How much a check may do: tests of conditions, and behaviours tried in a case."""
+MOST_CASES = 200_000
+
+T = TypeVar("T")
+Case: TypeAlias = "tuple[str, ...]"
+Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
+"""What a behaviour makes of a case: the entries that change, each with what it may become, or None if it can't be done; and what
+it breaks of that which never or always holds."""
+
+
+def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
+    """Return why a certificate proves nothing of a problem; None if it proves that there is no plan."""
+    try:
+        for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
+            if symbol.situation not in problem.domain.situations:
+                return f"it speaks of {symbol}, which this task doesn't know"
+            if symbol.situation in problem.domain.rules:
+                return f"it speaks of {symbol}, which is defined by rules"
+        if not certificate.unmet:
+            return "it doesn't say what of the goal can't hold"
+        for fact in certificate.unmet:
+            if fact.symbol.situation not in problem.domain.situations or not wanted_in_the_end(problem, fact):
+                return f"{fact} isn't wanted in this task"
+        cases = Cases(Lowest(problem, most), certificate)
+        cases.explore()
+    except WorkLimitError as error:
+        return f"checking it takes {error}"
+    except (ValueError, ZeroDivisionError) as error:
+        return f"it isn't well formed: {error}"
+    if cases.fault:
+        return cases.fault
+    if cases.reached is not None:
+        return "the goal may hold in one of its cases"
+    if len(cases.came_from) != certificate.cases:
+        return f"{len(cases.came_from)} cases can be reached, not {certificate.cases}"
+    return None
+
+
+class Decisions(Generic[T]):
+    """What came of cases, by the entries that it depends on, one asked for after the other."""
+
+    def __init__(self) -> None:
+        self.at: int | None = None
+        self.found: T | None = None
+        self.below: dict[str, Decisions[T]] = {}
+
+    def find(self, case: Case) -> T | None:
+        """Return what is known to come of a case."""
+        node: Decisions[T] | None = self
+        while node is not None and node.at is not None:
+            node = node.below.get(case[node.at])
+        return None if node is None else node.found
+
+    def learn(self, case: Case, reads: Iterable[int], found: T) -> None:
+        """Remember what came of a case, by the entries that were asked for."""
+        node = self
+        for at in dict.fromkeys(reads):
+            node.at = at
+            node = node.below.setdefault(case[at], Decisions())
+        node.found = found
+
+
+@dataclass
+class View:
+    """What is known in one case; `reads` are the entries that were asked for, in order, and `unknown` what nothing is known of."""
+
+    claims: Claims
+    case: Case
+    reads: list[int] = field(default_factory=list)
+    unknown: list[tuple[Symbol, str, bool]] | None = None
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has a value in some state of the case."""
+        claims = self.claims
+        at = claims.places.get(symbol)
+        if at is not None:
+            self.reads.append(at)
+            entry = self.case[at]
+            if entry == OTHER:
+                if value in claims.apart[at]:
+                    return False
+            elif entry != ANY:
+                return entry == value
+        always = claims.certificate.always.get(symbol)
+        if always is not None:
+            return always == value
+        if Fact(symbol, value) in claims.certificate.never:
+            return False
+        if claims.lowest.initial(symbol) != value and value not in claims.lowest.given[symbol.situation]:
+            return False
+        if self.unknown is not None:
+            self.unknown.append((symbol, value, True))
+        return True
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has another value in some state of the case."""
+        claims = self.claims
+        at = claims.places.get(symbol)
+        if at is not None:
+            self.reads.append(at)
+            entry = self.case[at]
+            if entry not in (OTHER, ANY):
+                return entry != value
+            if entry == OTHER and value in claims.apart[at]:
+                return True
+        always = claims.certificate.always.get(symbol)
+        if always is not None:
+            return always != value
+        if claims.lowest.problem.domain.situations[symbol.situation].boolean:
+            return self.may(symbol, FALSE if value == TRUE else TRUE)
+        others = {claims.lowest.initial(symbol), *claims.lowest.given[symbol.situation]} - {value}
+        if all(Fact(symbol, other) in claims.certificate.never for other in others):
+            return False
+        if self.unknown is not None:
+            self.unknown.append((symbol, value, False))
+        return True
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol has in the case."""
+        claims = self.claims
+        at = claims.places.get(symbol)
+        if at is not None:
+            self.reads.append(at)
+            if self.case[at] != ANY:
+                exactly = Fraction(self.case[at])
+                return Range(exactly, exactly)
+        if self.unknown is not None:
+            self.unknown.append((symbol, "", True))
+        return claims.range(symbol)
+
+
+class Claims:
+    """A certificate made ready to be asked: places of what is told apart, bounds of amounts."""
+
+    def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
+        self.lowest, self.certificate = lowest, certificate
+        self.symbols = tuple(sorted(certificate.told_apart))
+        self.places = {symbol: i for i, symbol in enumerate(self.symbols)}
+        self.apart = [frozenset(certificate.told_apart[symbol]) for symbol in self.symbols]
+        self._ranges: dict[Symbol, Range] = {}
+
+    def entry(self, at: int, value: str) -> str:
+        """Return how a case has a value."""
+        return value if not self.apart[at] or value in self.apart[at] else OTHER
+
+    def range(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol may have in any case."""
+        if symbol not in self._ranges:
+            found = self.allowed(symbol)
+            always = self.certificate.always.get(symbol)
+            if always is not None:
+                low, high = found.low, found.high
+                for sign, limit in bounds(always):
+                    low = max(low, limit) if sign in (">=", "=") else low
+                    high = min(high, limit) if sign in ("<=", "=") else high
+                found = Range(low, high)
+            self._ranges[symbol] = found
+        return self._ranges[symbol]
+
+    def allowed(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol's situation type allows, with the one of the beginning."""
+        quantity, first = self.lowest.quantity(symbol.situation), number(self.lowest.initial(symbol))
+        low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
+        high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
+        return Range(min(low, first), max(high, first))
+
+    def broken(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol that gets this value breaks what never or always holds."""
+        always = self.certificate.always.get(symbol)
+        return (always is not None and always != value) or Fact(symbol, value) in self.certificate.never
+
+
+@dataclass
+class Try:
+    """A behaviour with its individuals, and what is known of what it makes of cases."""
+
+    behavior: Behavior
+    env: Mapping[str, str]
+    known: Decisions[Leaf] = field(default_factory=Decisions)
+
+
+class Cases:
+    """All cases of a certificate, from the first one on: `came_from` has each with the one before and the behaviour that led there.
+
+    `fault` says what breaks the certificate, `reached` is a case in which the goal may hold.
+    """
+
+    def __init__(self, lowest: Lowest, certificate: Certificate) -> None:
+        self.lowest, self.problem, self.certificate = lowest, lowest.problem, certificate
+        self.claims = Claims(lowest, certificate)
+        self.fault = ""
+        self.reached: Case | None = None
+        self.came_from: dict[Case, tuple[Case, Try | None]] = {}
+        self._ends: Decisions[bool] = Decisions()
+
+    # ---------------------------------------------------------------------------------------------------- beginning
+
+    def first(self) -> Case | None:
+        """Return the case in which the task begins; None, with the fault, if some claim doesn't hold there."""
+        lowest, certificate = self.lowest, self.certificate
+        for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
+            if not lowest.exists(symbol.situation, symbol.arguments):
+                self.fault = f"there is no {symbol}"
+                return None
+            if lowest.quantity(symbol.situation) is not None and certificate.told_apart.get(symbol):
+                self.fault = f"amounts of {symbol} are told apart one by one only"
+                return None
+        for fact in certificate.never:
+            if lowest.quantity(fact.symbol.situation) is not None:
+                self.fault = f"{fact}: of an amount bounds have to be told that always hold"
+                return None
+            if lowest.initial(fact.symbol) == fact.value:
+                self.fault = f"{fact} holds in the beginning"
+                return None
+        for symbol, value in certificate.always.items():
+            first = lowest.initial(symbol)
+            amount = lowest.quantity(symbol.situation) is not None
+            if amount and any(sign in "<>" for sign, _ in bounds(value)):
+                raise ValueError(f"bounds of {symbol} have to be <= or >=, not {value}")
+            exactly = Range(number(first), number(first)) if amount else None
+            within = self.claims.range(symbol) if amount else None
+            if (exactly and within and not (within.low <= exactly.low <= within.high)) or (
+                not amount and first != value
+            ):
+                self.fault = f"{symbol} isn't {value} in the beginning"
+            if self.fault:
+                return None
+        return tuple(self.claims.entry(i, lowest.initial(symbol)) for i, symbol in enumerate(self.claims.symbols))
+
+    # ------------------------------------------------------------------------------------------------------- search
+
+    def explore(self) -> None:
+        """Take up all cases, breadth first. Stop at a fault, or where the goal may hold."""
+        first = self.first()
+        if first is None:
+            return
+        tries = list(self.tries())
+        self.came_from[first] = (first, None)
+        queue = [first]
+        for case in queue:  # which grows
+            if self.ends_here(case):
+                self.reached = case
+                return
+            for one in tries:
+                self.lowest.spend()
+                changes, broken = self.after(one, case)
+                if broken:
+                    self.fault = broken
+                    return
+                if changes is None:
+                    continue
+                for following in self._following(case, changes):
+                    if following not in self.came_from:
+                        self.came_from[following] = (case, one)
+                        queue.append(following)
+            if len(queue) > MOST_CASES:
+                raise WorkLimitError(f"more than {MOST_CASES} cases")
+
+    def _following(self, case: Case, changes: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[Case]:
+        if not changes:
+            return
+        for choice in product(*(entries for _, entries in changes)):
+            following = list(case)
+            for (at, _), entry in zip(changes, choice, strict=True):
+                if entry != KEPT:
+                    following[at] = entry
+            self.lowest.spend()
+            yield tuple(following)
+
+    def tries(self) -> Iterator[Try]:
+        """Yield the behaviours, with individuals, that may change what is told apart, or break what never or always holds."""
+        known = Reading(self.lowest, View(self.claims, (ANY,) * len(self.claims.symbols)))
+        seen: set[tuple[str, tuple[tuple[str, str], ...]]] = set()
+        wanted: dict[str, dict[tuple[Symbol, str | None], None]] = {}
+        for symbol in (*self.claims.symbols, *sorted(self.certificate.always)):
+            wanted.setdefault(symbol.situation, {})[symbol, None] = None
+        for fact in sorted(self.certificate.never):
+            wanted.setdefault(fact.symbol.situation, {})[fact.symbol, fact.value] = None
+        for behavior in self.lowest.behaviors:
+            own = own_variables(behavior)
+            for effect in behavior.every_effect:
+                value = getattr(effect, "value", None)
+                for symbol, becomes in wanted.get(effect.situation, ()):
+                    given = unified(
+                        self.problem, behavior, own, (*effect.arguments, value), (*symbol.arguments, becomes)
+                    )
+                    if given is None:
+                        continue
+                    for env in applicable(known, behavior, given):
+                        key = behavior.name, tuple(sorted(env.items()))
+                        if key not in seen:
+                            seen.add(key)
+                            yield Try(behavior, env)
+
+    # -------------------------------------------------------------------------------------------- one try in one case
+
+    def after(self, one: Try, case: Case) -> Leaf:
+        """Return what a behaviour makes of a case; remembered by the entries that this depends on."""
+        known = one.known.find(case)
+        if known is None:
+            view = View(self.claims, case)
+            known = self.effects(Reading(self.lowest, view), one)
+            one.known.learn(case, view.reads, known)
+        return known
+
+    def effects(self, reading: Reading, one: Try) -> Leaf:
+        """Return what a behaviour may change, as far as the certificate speaks of it."""
+        behavior, env, claims = one.behavior, one.env, self.claims
+        if not all(reading.holds(condition, env, behavior.kinds) for condition in behavior.preconditions):
+            return None, ""
+        amounts = reading.amounts(behavior, env)
+        if amounts is None:
+            return None, ""
+        changes: dict[int, list[str]] = {}
+        for effect in behavior.effects:
+            ways = list(reading.solutions(effect.when, env, behavior.kinds)) if effect.when else [dict(env)]
+            made = {
+                (
+                    Symbol(effect.situation, tuple(way.get(a, a) for a in effect.arguments)),
+                    way.get(effect.value, effect.value),
+                )
+                for way in ways
+            }
+            sure = not effect.when or (
+                len(made) == 1 and any(True for _ in reading.solutions(effect.when, env, behavior.kinds, must=True))
+            )
+            for symbol, value in sorted(made):
+                at = claims.places.get(symbol)
+                if not self.lowest.exists(symbol.situation, symbol.arguments):
+                    continue
+                if claims.broken(symbol, value) and not self._overruled(behavior, env, symbol):
+                    return None, f"{behavior.name} {' '.join(env.values())} may make it so that {Fact(symbol, value)}"
+                if at is not None:
+                    entry = claims.entry(at, value)
+                    changes[at] = [entry] if sure else [*changes.get(at, [KEPT]), entry]
+        for symbol, (now, sure) in amounts.items():
+            always, at = self.certificate.always.get(symbol), claims.places.get(symbol)
+            if always is not None:
+                within = claims.range(symbol)
+                if now.low < within.low or now.high > within.high:
+                    return None, f"{behavior.name} {' '.join(env.values())} may take {symbol} out of {always}"
+            if at is not None:
+                exact = sure and now.low == now.high and isinstance(now.low, Fraction)
+                changes[at] = [written(now.low) if exact and isinstance(now.low, Fraction) else ANY]
+        return tuple((at, tuple(dict.fromkeys(entries))) for at, entries in sorted(changes.items())), ""
+
+    def _overruled(self, behavior: Behavior, env: Mapping[str, str], symbol: Symbol) -> bool:
+        """Whether an effect without condition gives a symbol a value after all others that is the one it always has."""
+        last = [
+            env.get(effect.value, effect.value)
+            for effect in behavior.effects
+            if effect.situation == symbol.situation
+            and not effect.when
+            and tuple(env.get(a, a) for a in effect.arguments) == symbol.arguments
+        ]
+        others = [e for e in behavior.effects if e.situation == symbol.situation and e.when and e.value != FALSE]
+        return bool(last) and not others and not self.claims.broken(symbol, last[-1])
+
+    def ends_here(self, case: Case) -> bool:
+        """Whether in some state of a case the goal holds, and what is to be at rest is."""
+        known = self._ends.find(case)
+        if known is None:
+            view = View(self.claims, case)
+            reading = Reading(self.lowest, view)
+            known = all(self.met(reading, fact) for fact in self.certificate.unmet)
+            self._ends.learn(case, view.reads, known)
+        return known
+
+    def met(self, reading: Reading, fact: Fact) -> bool:
+        """Whether a fact that is wanted in the end may hold; what isn't at rest in the beginning may stay so."""
+        symbol, wanted = fact.symbol, fact.value
+        if reading.goal(symbol, wanted):
+            return True
+        return symbol not in self.problem.goal and reading.goal(symbol, self.lowest.initial(symbol))
+
+
+def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
+    """Whether a fact is a goal, or a rest value that a plan has to leave if it touches the symbol."""
+    symbol = fact.symbol
+    if symbol in problem.goal:
+        return problem.goal[symbol] == fact.value
+    kind = problem.domain.situations[symbol.situation]
+    return kind.rest == fact.value and problem.first_level(symbol) <= problem.domain.levels[-1]
+
+
+def own_variables(behavior: Behavior) -> frozenset[str]:
+    """Return the parameters of a behaviour, and the variables that its preconditions determine."""
+    found = {parameter.name for parameter in behavior.parameters}
+    return frozenset(found.union(*(variables(condition) for condition in behavior.preconditions)))
+
+
+def unified(
+    problem: Problem,
+    behavior: Behavior,
+    own: frozenset[str],
+    terms: tuple[str | None, ...],
+    words: tuple[str | None, ...],
+) -> dict[str, str] | None:
+    """Return which of a behaviour's own variables stand for what if an effect's terms are these words; None if they can't be.
+
+    No word is whichever.
+    """
+    found: dict[str, str] = {}
+    for term, word in zip(terms, words, strict=True):
+        if term is None or word is None:
+            continue
+        kind = behavior.kinds.get(term)
+        if kind is None:
+            if term != word:
+                return None
+        elif word not in problem.members(kind) or (term in own and found.setdefault(term, word) != word):
+            return None
+    return found
+
+
+def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
+    """Yield the individuals for a behaviour's own variables with which it may be done, some of them given."""
+    for env in reading.solutions(behavior.preconditions, given, behavior.kinds):
+        left = [p for p in behavior.parameters if p.name not in env]
+        for values in product(*(reading.problem.classes.get(p.kind, ()) for p in left)):
+            reading.lowest.spend()
+            yield {**env, **{p.name: value for p, value in zip(left, values, strict=True)}}

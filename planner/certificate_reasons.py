@@ -1,0 +1,383 @@
+"""What a certificate says in a sentence: the cause that no behaviour changes, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from planner.certificate_checks import Claims, View, own_variables, unified
+from planner.certificates import Certificate
+from planner.levels import said
+from planner.plan import Reason
+from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from reasoner.amounts import MORE, Expression, terms_of, towards, written
+from reasoner.symbols import (
+    AmountEffect,
+    Behavior,
+    ClassCondition,
+    Condition,
+    Effect,
+    EqualityCondition,
+    Fact,
+    Problem,
+    RelationCondition,
+    Rule,
+    Symbol,
+    ValueCondition,
+    Witness,
+    substituted,
+)
+
+WORK = 300_000
+"""How many tests may be spent to find the cause."""
+WORDS, ONE = ("none", "one", "two", "three", "four", "five"), "?one"
+"""Small numbers, and the variable of one of several individuals that are counted."""
+SHOWN = 4
+"""So many facts of a chain or of a goal, at most, are named."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A fact that never holds, or always does; or such facts of all individuals of some classes, which its variables stand for."""
+
+    fact: Fact
+    kinds: tuple[tuple[str, str], ...] = ()
+
+    def __str__(self) -> str:
+        """Return it in words, variables by their classes."""
+        names = {variable: f"some {kind}" for variable, kind in self.kinds}
+        symbol = self.fact.symbol
+        named = Symbol(symbol.situation, tuple(names.get(a, a) for a in symbol.arguments))
+        return str(Fact(named, names.get(self.fact.value, self.fact.value)))
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Why something can't be: a sentence, the terms it names, and the claims that it rests on (none: nothing changes it)."""
+
+    text: str
+    terms: tuple[str, ...] = ()
+    rests_on: tuple[Claim, ...] = ()
+    parts: int = 1  # how many conditions it names
+
+
+def told(problem: Problem, certificate: Certificate) -> Reason:
+    """Return why there is no plan, as a certificate shows it."""
+    goals = [*certificate.unmet[:SHOWN]]
+    terms = [word for fact in goals for word in _words(fact)]
+    if certificate.told_apart:
+        what = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN)
+        symbols = sorted(certificate.told_apart)
+        about = ", ".join(map(str, symbols[:SHOWN])) + f" and {len(symbols) - SHOWN} more" * (len(symbols) > SHOWN)
+        one, many = certificate.cases == 1, len(goals) > 1
+        cases = f"{certificate.cases} combination{'' if one else 's'} of values of {about} can be reached"
+        how = "exclude each other" if many else "can't be reached"
+        text = f"{what} {how}: {cases}, {'and not' if one else 'none'} with {'all of them' if many else 'it'}"
+        return Reason(text, tuple(dict.fromkeys(terms)))
+    try:
+        chain, cause = _Causes(problem, certificate).chain()
+    except (WorkLimitError, RecursionError):
+        chain, cause = [], Cause("nothing brings it about")
+    goal = certificate.unmet[0]
+    follows = [claim for claim in reversed(chain) if claim.fact != goal]
+    kept = [claim for claim in follows if certificate.always.get(claim.fact.symbol) == claim.fact.value]
+    never = [claim for claim in follows if claim not in kept]
+    so = "".join(
+        f"; so {what} {', '.join(map(str, facts[:SHOWN]))}" + f" and {len(facts) - SHOWN} more" * (len(facts) > SHOWN)
+        for what, facts in (("always", kept), ("never", never))
+        if facts
+    )
+    terms += [*cause.terms, *(word for claim in follows for word in _words(claim.fact))]
+    named = dict.fromkeys(word for word in terms if not word.startswith("?"))
+    return Reason(f"{goal} can't be reached: {cause.text}{so}", tuple(named))
+
+
+def _words(fact: Fact) -> tuple[str, ...]:
+    return (*fact.symbol.arguments, fact.symbol.situation, fact.value)
+
+
+class _Causes:
+    """The causes of what a certificate of facts claims."""
+
+    def __init__(self, problem: Problem, certificate: Certificate) -> None:
+        self.problem, self.certificate = problem, certificate
+        self.lowest = Lowest(problem, WORK)
+        self.claims = Claims(self.lowest, certificate)
+
+    def reading(self) -> tuple[Reading, _Noting]:
+        """Return what conditions are read with, and what notes the claims that are asked for."""
+        view = _Noting(self.claims, ())
+        return Reading(self.lowest, view), view
+
+    def chain(self) -> tuple[list[Claim], Cause]:
+        """Return the shortest chain of claims from the goal to one with a cause that nothing changes."""
+        goal = Claim(self.certificate.unmet[0])
+        queue: list[tuple[Claim, ...]] = [(goal,)]
+        seen = {goal}
+        last: tuple[tuple[Claim, ...], Cause] | None = None
+        for chain in queue:  # which grows
+            for cause in self.causes(chain[-1]):
+                if not cause.rests_on:
+                    return list(chain), cause
+                if last is None:
+                    last = chain, cause
+                for claim in cause.rests_on:
+                    if claim not in seen:
+                        seen.add(claim)
+                        queue.append((*chain, claim))
+        return ([goal], last[1]) if last else ([goal], Cause("no behaviour makes it so"))
+
+    def causes(self, claim: Claim) -> list[Cause]:
+        """Return what is in the way of each behaviour that could make a claim false, the simplest first."""
+        fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
+        symbol, situation = fact.symbol, fact.symbol.situation
+        if not free and not lowest.exists(situation, symbol.arguments):
+            return [Cause(f"there is no {symbol} on level {lowest.level}")]
+        found: list[Cause] = []
+        for rule in self.problem.domain.rules.get(situation, ()):
+            given = {p.name: a for p, a in zip(rule.parameters, symbol.arguments, strict=True) if a not in free}
+            cause = self.too_few(rule, given) or self.lacking(rule.behavior, rule.conditions, given)
+            found.append(cause)
+        amount = lowest.quantity(situation) is not None
+        kept = not amount and self.certificate.always.get(symbol) == fact.value
+        for behavior in lowest.behaviors:
+            for effect in behavior.every_effect:
+                if effect.situation != situation:
+                    continue
+                own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
+                terms = (*effect.arguments, None if amount else getattr(effect, "value", None))
+                boolean_or_set = fact.value if not amount else None
+                if kept:  # any other value counts
+                    if terms[-1] == fact.value:
+                        continue
+                    boolean_or_set = None
+                words = (*symbol.arguments, boolean_or_set)
+                bound = unified(
+                    self.problem, behavior, own, terms, tuple(None if word in free else word for word in words)
+                )
+                members = self.problem.members
+                if (
+                    bound is None
+                    or (amount and not self.towards(effect, bound, fact))
+                    or any(
+                        members(free[word]).isdisjoint(
+                            members(behavior.kinds[term]) if term in behavior.kinds else {term}
+                        )
+                        for term, word in zip(terms, words, strict=True)
+                        if word in free and term is not None
+                    )
+                ):
+                    continue
+                classes = [
+                    ClassCondition(term, free[word])
+                    for term, word in zip(terms, words, strict=True)
+                    if word in free and term in own and not members(behavior.kinds[term]) <= members(free[word])
+                ]
+                found.append(self.lacking(behavior, (*behavior.preconditions, *effect.when, *classes), bound))
+        found = [cause for cause in found if cause.text]
+        if amount and not found and fact.value != self.certificate.always.get(symbol):
+            return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
+        if amount and not found:
+            stays = self.certificate.always.get(symbol)
+            return [Cause(f"{symbol.arguments[0]} {situation} is always {stays}" if stays else self.bounds_of(symbol))]
+        if not found:
+            what = "gives it another value" if kept else "makes it so"
+            return [Cause(f"no behaviour of level {lowest.level} {what}")]
+        return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
+
+    def direction(self, fact: Fact) -> str:
+        """Return whether more of an amount is wanted, or less."""
+        return towards(self.problem.initial.get(fact.symbol), fact.value)
+
+    def towards(self, effect: Effect, given: dict[str, str], fact: Fact) -> bool:
+        """Whether an effect may bring an amount nearer to what is wanted of it, or out of where it is claimed to be."""
+        if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
+            return True
+        reading, _ = self.reading()
+        by = reading.expression(effect.amount, given) if variables_of(effect.amount) <= given.keys() else ANYTHING
+        if by is None or effect.operation not in ("increase", "decrease"):
+            return True
+        more = (self.direction(fact) == MORE) is (effect.operation == "increase")
+        return by.high > 0 if more else by.low < 0
+
+    def bounds_of(self, symbol: Symbol) -> str:
+        """Return between which bounds an amount stays, in words."""
+        allowed, words = self.claims.allowed(symbol), f"{symbol.arguments[0]} {symbol.situation}"
+        least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
+        most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
+        return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words
+
+    def too_few(self, rule: Rule, given: dict[str, str]) -> Cause | None:
+        """Return how many individuals a rule asks for and how many there can be, where these are fewer."""
+        for condition in rule.conditions:
+            many, kind, own = counted(substituted(condition, given))
+            if many < 2:
+                continue
+            kinds = {**rule.behavior.kinds, ONE: kind}
+            reading, _ = self.reading()
+            there = {env[ONE] for one in self.problem.classes.get(kind, ())
+                     for env in reading.solutions(own, {ONE: one}, kinds)}  # fmt: skip
+            if len(there) < many:
+                each = " and ".join(said(substituted(c, {ONE: "each"})) for c in own)
+                text = f"{rule.situation} asks for {WORDS[many]} {kind}, {each}; there can be {WORDS[len(there)]}"
+                return Cause(text, (rule.situation, kind))
+        return None
+
+    def lacking(self, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]) -> Cause:
+        """Return what of some conditions can't be, as few of them as can be, those that never change before others."""
+        core = self.core(conditions, given, behavior)
+        if core is None:
+            return self.out_of_bounds(behavior, conditions, given)
+        opened, kinds, witness = core, dict(behavior.kinds), core[0]
+        if len(core) == 1 and isinstance(witness, Witness) and not witness.negated:
+            kinds[witness.variable] = witness.kind
+            inner = self.core(self.lowest.inside(witness), given, behavior, kinds)
+            opened = [c for c in inner or core if not (isinstance(c, ClassCondition) and c.term == witness.variable)]
+            opened = opened or core
+        reading, view = self.reading()
+        any(True for _ in reading.solutions(tuple(opened), given, kinds))
+        text = self.words(opened, given, kinds)
+        names = tuple(
+            word
+            for condition in opened
+            for word in (getattr(condition, "relation", getattr(condition, "situation", "")), *given.values())
+            if word
+        )
+        claims = [Claim(fact) for fact in view.claimed]
+        (first, *more) = [substituted(condition, given) for condition in opened]
+        if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
+            free = {term for term in (*first.arguments, first.value) if term.startswith("?")}
+            if free and free <= kinds.keys():  # of all individuals at once, if that can be
+                of_all = Fact(Symbol(first.situation, first.arguments), first.value)
+                claims.insert(0, Claim(of_all, tuple((term, kinds[term]) for term in sorted(free))))
+        return Cause(f"{text}, which {behavior.name} needs", (behavior.name, *names), tuple(claims), len(opened))
+
+    def core(
+        self,
+        conditions: Sequence[Condition],
+        given: dict[str, str],
+        behavior: Behavior,
+        kinds: dict[str, str] | None = None,
+    ) -> list[Condition] | None:
+        """Return as few conditions as can be that can't hold together; None if all can."""
+        kinds = kinds or dict(behavior.kinds)
+
+        def can(some: Sequence[Condition]) -> bool:
+            reading, _ = self.reading()
+            return any(True for _ in reading.solutions(tuple(some), given, kinds))
+
+        if can(conditions):
+            return None
+        order = sorted(conditions, key=lambda c: (isinstance(c, ClassCondition), self.lowest.constant(c)))
+        core = list(order)
+        for condition in order:
+            rest = [c for c in core if c is not condition]
+            if not can(rest):
+                core = rest
+        return core
+
+    def out_of_bounds(self, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]) -> Cause:
+        """Return which amount a behaviour would take beyond what is allowed."""
+        reading, _ = self.reading()
+        for env in reading.solutions(tuple(conditions), given, behavior.kinds):
+            for effect in behavior.amounts:
+                for text, terms in self.beyond(reading, env, effect):
+                    return Cause(f"{behavior.name} would {text}", (behavior.name, *terms))
+        return Cause("")
+
+    def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
+        """Yield how an effect would take an amount beyond its bounds."""
+        from planner.possibilities import OPERATORS, calculated
+
+        symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
+        quantity = self.lowest.quantity(effect.situation)
+        old = reading.between(effect.situation, symbol.arguments)
+        by = reading.expression(effect.amount, env)  # type: ignore[union-attr]
+        if quantity is None or old is None:
+            return
+        words = f"{symbol.arguments[0]} {symbol.situation}"
+        terms = (*symbol.arguments, symbol.situation)
+        operation = effect.operation  # type: ignore[union-attr]
+        new = by if by is None or operation == "assign" else calculated(OPERATORS[operation], old, by)
+        if new is None:
+            yield f"make {words} an amount that can't be worked out", terms
+        elif quantity.most is not None and new.low > quantity.most and isinstance(new.low, Fraction):
+            yield f"take {words} to {written(new.low)}, more than its most, {written(quantity.most)}", terms
+        elif quantity.least is not None and new.high < quantity.least and isinstance(new.high, Fraction):
+            yield f"take {words} to {written(new.high)}, less than its least, {written(quantity.least)}", terms
+        elif quantity.whole and new.low == new.high and isinstance(new.low, Fraction) and new.low.denominator != 1:
+            yield f"take {words} to {written(new.low)}, which is no whole number", terms
+
+    def words(self, core: Sequence[Condition], given: dict[str, str], kinds: dict[str, str]) -> str:
+        """Return what fails to hold, e.g. ``no Hand canReach location9``."""
+
+        def term(name: str) -> str:
+            return given.get(name, f"some {kinds[name]}" if name in kinds else name)
+
+        if len(core) == 1:
+            condition = substituted(core[0], given)
+            if isinstance(condition, ClassCondition) and not condition.negated:
+                return f"{term(condition.term)} is no {condition.kind}"
+            if isinstance(condition, RelationCondition) and not condition.negated and len(condition.arguments) == 2:
+                left, right = condition.arguments
+                if left.startswith("?"):
+                    return f"no {kinds[left]} {condition.relation} {term(right)}"
+                if right.startswith("?"):
+                    return f"{left} {condition.relation} no {kinds[right]}"
+        all_ = " and ".join(said(self._spoken(condition, given, kinds)) for condition in core)
+        return f"nothing satisfies {all_}" if len(core) > 1 else f"never {all_}"
+
+    def _spoken(self, condition: Condition, given: dict[str, str], kinds: dict[str, str]) -> Condition:
+        free = {name: f"some {kind}" for name, kind in kinds.items() if name not in given}
+        return substituted(condition, {**given, **free})
+
+
+def variables_of(expression: Expression) -> set[str]:
+    """Return the variables in an expression."""
+    return {term for term in terms_of(expression) if term.startswith("?")}
+
+
+def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
+    """Return how many individuals of a class a condition asks for, each told apart from the others, and what of each."""
+    before: list[str] = []
+    found: tuple[str, tuple[Condition, ...]] = ("", ())
+    while isinstance(condition, Witness) and not condition.negated and len(before) < len(WORDS) - 1:
+        apart = {EqualityCondition(condition.variable, other, negated=True) for other in before}
+        own = [c for c in condition.conditions if c not in apart]
+        nested = own.pop() if own and isinstance(own[-1], Witness) and own[-1].kind == condition.kind else None
+        one = condition.kind, tuple(substituted(c, {condition.variable: ONE}) for c in own)
+        if before and (one != found or not apart <= {*condition.conditions}):
+            break
+        found = one
+        before.append(condition.variable)
+        condition = nested
+    return len(before), *found
+
+
+@dataclass
+class _Noting(View):
+    """A case that notes the claims that were asked for and denied."""
+
+    claimed: dict[Fact, None] = field(default_factory=dict)
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has a value in some state of the case."""
+        found = super().may(symbol, value)
+        if not found and value in self.claims.lowest.given[symbol.situation]:
+            self.claimed[Fact(symbol, value)] = None
+        return found
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has another value in some state of the case."""
+        found = super().may_not(symbol, value)
+        if not found and symbol in self.claims.certificate.always:
+            self.claimed[Fact(symbol, value)] = None
+        return found
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol has in the case."""
+        always = self.claims.certificate.always.get(symbol)
+        if always is not None:
+            self.claimed[Fact(symbol, always)] = None
+        return super().between(symbol)

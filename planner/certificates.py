@@ -1,0 +1,109 @@
+"""What proves that a task has no plan: a set of states that the task never leaves and in which the goal doesn't hold.
+
+The set is described in three ways, which go together. Some facts *never* hold. Some symbols *always* keep their value, or an
+amount stays within bounds. And of some symbols the values are *told apart*: of all combinations of these values only some are
+reached, and those are counted. With nothing told apart there is one combination; with everything told apart, each is a state.
+
+`planner.certificate_checks` verifies a certificate, `planner.certifying` finds one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from reasoner.symbols import Fact, Symbol
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A set of states, the first one among them, that no behaviour of the lowest level leaves; in none does the goal hold.
+
+    Attributes
+    ----------
+    never : frozenset of Fact
+        Facts that hold in no state.
+    always : mapping of Symbol to value
+        Symbols that keep the value they have in the beginning; for an amount, the bounds between which it stays.
+    told_apart : mapping of Symbol to values
+        Symbols, each with the values that are told apart from each other and from all others; none given: all values.
+    cases : int
+        How many combinations of these values are reached; in each of them the goal doesn't hold.
+    unmet : tuple of Fact
+        What of the goal can't hold together in any case.
+    """
+
+    never: frozenset[Fact] = frozenset()
+    always: Mapping[Symbol, str] = field(default_factory=dict)
+    told_apart: Mapping[Symbol, tuple[str, ...]] = field(default_factory=dict)
+    cases: int = 1
+    unmet: tuple[Fact, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """What kind of description it is, in a word or two."""
+        if not self.told_apart:
+            return "facts"
+        return "pair" if len(self.told_apart) == 2 and all(map(len, self.told_apart.values())) else "cases"
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """Return a certificate as JSON, facts as lists: situation type, arguments, value."""
+    return {
+        "format": FORMAT,
+        "never": [_listed(fact) for fact in sorted(certificate.never)],
+        "always": [_listed(Fact(symbol, value)) for symbol, value in sorted(certificate.always.items())],
+        "told_apart": [
+            {"symbol": [symbol.situation, *symbol.arguments], "values": list(values)}
+            for symbol, values in sorted(certificate.told_apart.items())
+        ],
+        "cases": certificate.cases,
+        "unmet": [_listed(fact) for fact in certificate.unmet],
+    }
+
+
+def certificate_from(data: Any) -> Certificate:
+    """Return the certificate that JSON has.
+
+    Raises
+    ------
+    ValueError
+        It has none; the message says what was wanted.
+    """
+    try:
+        if data["format"] != FORMAT:
+            raise ValueError(f"a certificate of format {data['format']!r}; wanted {FORMAT}")
+        if type(data["cases"]) is not int:
+            raise ValueError(f'"cases" is {data["cases"]!r}; wanted a whole number')
+        return Certificate(
+            never=frozenset(map(_fact, data["never"])),
+            always={fact.symbol: fact.value for fact in map(_fact, data["always"])},
+            told_apart={
+                Symbol(one["symbol"][0], tuple(map(_text, one["symbol"][1:]))): tuple(map(_text, one["values"]))
+                for one in data["told_apart"]
+            },
+            cases=data["cases"],
+            unmet=tuple(map(_fact, data["unmet"])),
+        )
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise ValueError(
+            "no certificate; wanted an object with format, never, always, told_apart, cases and unmet, as --json prints it"
+        ) from error
+
+
+def _listed(fact: Fact) -> list[str]:
+    return [fact.symbol.situation, *fact.symbol.arguments, fact.value]
+
+
+def _fact(words: Sequence[Any]) -> Fact:
+    situation, *arguments, value = map(_text, words)
+    return Fact(Symbol(situation, tuple(arguments)), value)
+
+
+def _text(word: Any) -> str:
+    if not isinstance(word, str):
+        raise TypeError(word)
+    return word

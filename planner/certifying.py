@@ -1,0 +1,383 @@
+"""Find a certificate that a task has no plan.
+
+First: what can be brought about at all, if nothing that was brought about ever ceased to hold? That is asked backwards from the
+goal, so that only what could matter is looked at; what is needed and can't be brought about never holds.
+
+Where the goal could be brought about in this way, few values are told apart, at first the goal's, and the cases are searched. A way
+to the goal through the cases is tried out on the task itself; the values on which it fails there are told apart, too, until there
+is no way left, or the way succeeds: then there is a plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
+from typing import TypeAlias
+
+from planner.certificate_checks import (
+    ANY,
+    Case,
+    Cases,
+    Try,
+    View,
+    own_variables,
+    unified,
+    wanted_in_the_end,
+)
+from planner.certificates import Certificate
+from planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
+from planner.validation import Facts, Rules
+from reasoner.amounts import meets, number, written
+from reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Condition, Effect, Fact, Problem, State, Symbol
+
+WORK = 3_000_000
+"""How much may be done to find a certificate: tests of conditions, and behaviours tried in a case."""
+LITTLE = 2_000, 20_000
+"""So many tests for each goal by itself, and then so many, before all of them are looked into to the end."""
+FEW = 3
+"""If more values of a symbol are to be told apart, all are."""
+Key: TypeAlias = "tuple[str, Symbol, str]"
+"""What may be impossible: that a symbol comes to have a value (`GETS`), comes to have another one (`LEAVES`; of an amount: by how
+much), or that something wanted in the end holds (`ENDS`)."""
+GETS, LEAVES, ENDS = "gets", "leaves", "ends"
+
+
+def certify(problem: Problem, most: float = WORK) -> Certificate | None:
+    """Return a certificate that a task has no plan; None if none is found with so much work, or there is a plan."""
+    if not problem.domain.levels:
+        return None
+    lowest = Lowest(problem, most)
+    try:
+        relaxed = Relaxed(lowest)
+        return _at_once(lowest) or relaxed.certificate(problem.goal) or _by_cases(lowest, relaxed)
+    except (WorkLimitError, RecursionError):
+        return None
+
+
+def _at_once(lowest: Lowest) -> Certificate | None:
+    """Return a certificate for a goal of which little has to be asked; each is asked for by itself, with little work at first."""
+    most = lowest.most
+    try:
+        for little in LITTLE:
+            for symbol, wanted in sorted(lowest.problem.goal.items()):
+                lowest.most = min(most, lowest.work + little)
+                with suppress(WorkLimitError):
+                    if (found := Relaxed(lowest).certificate({symbol: wanted})) is not None:
+                        return found
+                if lowest.work >= most:
+                    return None
+    finally:
+        lowest.most = most
+    return None
+
+
+class Relaxed:
+    """What can be brought about if nothing that was brought about ever ceases to hold; found out backwards from what is asked.
+
+    What is asked for the first time counts as impossible until a way to it is found; then all that relied on it is asked again.
+    """
+
+    def __init__(self, lowest: Lowest) -> None:
+        self.lowest, self.problem = lowest, lowest.problem
+        self.possible: set[Key] = set()
+        self.ranges: dict[Symbol, Range] = {}
+        self.reads: dict[Key, None] = {}  # what was asked while one key was looked into
+        self._readers: dict[Key, dict[Key, None]] = {}
+        self._waiting: dict[Key, None] = {}
+        self._asking: Key | None = None
+        self._joint: dict[int, tuple[Condition, ...]] = {}
+
+    # ------------------------------------------------------------------------------------------- what is known, so far
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol can come to have a value."""
+        if self.lowest.initial(symbol) == value:
+            return True
+        return value in self.lowest.given[symbol.situation] and self._ask((GETS, symbol, value))
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol can come to have another value."""
+        if self.lowest.initial(symbol) != value:
+            return True
+        if self.problem.domain.situations[symbol.situation].boolean:
+            return self.may(symbol, FALSE if value == TRUE else TRUE)
+        return self._ask((LEAVES, symbol, value))
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol can come to have."""
+        first = self.lowest.initial(symbol)
+        self._ask((LEAVES, symbol, first))
+        return self.ranges.get(symbol, Range(number(first), number(first)))
+
+    def _ask(self, key: Key) -> bool:
+        self.reads[key] = None
+        if key not in self._readers:
+            self._readers[key] = {}
+            self._waiting[key] = None
+        if self._asking is not None:
+            self._readers[key][self._asking] = None
+        return key in self.possible
+
+    # ------------------------------------------------------------------------------------------------------ finding out
+
+    def reachable(self, key: Key) -> bool:
+        """Find out whether something can be brought about."""
+        self._asking = None
+        self._ask(key)
+        while self._waiting and key not in self.possible:
+            one = next(iter(self._waiting))
+            del self._waiting[one]
+            if self._news(one):
+                self._waiting.update(self._readers[one])
+        return key in self.possible
+
+    def look(self, key: Key) -> Reading:
+        """Return what conditions are read with while something is looked into; `reads` will have what is asked."""
+        self._asking, self.reads = key, {}
+        return Reading(self.lowest, self)
+
+    def _news(self, key: Key) -> bool:
+        """Look into something again; whether it is possible only now, or the range of an amount wider than before."""
+        kind, symbol, _ = key
+        reading = self.look(key)
+        if kind == LEAVES and self.lowest.quantity(symbol.situation) is not None:
+            return self._wider(reading, symbol)
+        if key in self.possible or not self.brought_about(reading, key):
+            return False
+        self.possible.add(key)
+        return True
+
+    def brought_about(self, reading: Reading, key: Key) -> bool:
+        """Whether there is a way to something, as far as is known."""
+        kind, symbol, value = key
+        if kind == ENDS:
+            return reading.goal(symbol, value)
+        return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
+
+    def possible_ways(self, reading: Reading, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
+        """Yield the behaviours, with individuals, that may give a symbol a value, or another one than that."""
+        for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
+            words = (*symbol.arguments, None if other else value)
+            for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
+                becomes = env.get(effect.value, effect.value)
+                if (becomes != value) == other and reading.amounts(behavior, env) is not None:
+                    yield Try(behavior, env)
+
+    def _envs(
+        self,
+        reading: Reading,
+        behavior: Behavior,
+        effect: Effect,
+        terms: tuple[str, ...],
+        words: tuple[str | None, ...],
+    ) -> Iterator[dict[str, str]]:
+        """Yield the individuals with which a behaviour may be done so that the terms of an effect become some words."""
+        own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
+        given = unified(self.problem, behavior, own, terms, words)
+        if given is None:
+            return
+        both = self._joint.setdefault(id(effect), (*behavior.preconditions, *effect.when))
+        for env in reading.solutions(both, given, behavior.kinds):
+            left = [p for p in behavior.parameters if p.name not in env]
+            for values in product(*(self.problem.classes.get(p.kind, ()) for p in left)):
+                self.lowest.spend()
+                yield {**env, **{p.name: v for p, v in zip(left, values, strict=True)}}
+
+    def _wider(self, reading: Reading, symbol: Symbol) -> bool:
+        first = number(self.lowest.initial(symbol))
+        before = now = self.ranges.get(symbol, Range(first, first))
+        quantity = self.lowest.quantity(symbol.situation)
+        least = -float("inf") if quantity is None or quantity.least is None else quantity.least
+        most = float("inf") if quantity is None or quantity.most is None else quantity.most
+        for behavior in self.lowest.behaviors:
+            for effect in behavior.amounts:
+                if effect.situation != symbol.situation:
+                    continue
+                constant = effect.operation == "assign" and not isinstance(effect, str) and _number(effect)
+                for env in self._envs(reading, behavior, effect, effect.arguments, symbol.arguments):
+                    after = (reading.amounts(behavior, env) or {}).get(symbol)
+                    if after is None:
+                        continue
+                    low, high = max(after[0].low, min(least, now.low)), min(after[0].high, max(most, now.high))
+                    if not constant:  # in one stride as far as it may ever get
+                        low = min(least, now.low) if low < now.low else low
+                        high = max(most, now.high) if high > now.high else high
+                    now = now.hull(Range(low, high))
+        self.ranges[symbol] = now
+        return now != before
+
+    # ------------------------------------------------------------------------------------------------------ certificate
+
+    def certificate(self, goal: State) -> Certificate | None:
+        """Return a certificate if something of a goal can't be brought about."""
+        for symbol, wanted in sorted(goal.items()):
+            key = ENDS, symbol, wanted
+            if not self.reachable(key):
+                never, always = self.claims([key])
+                return Certificate(frozenset(never), always, unmet=(Fact(symbol, wanted),))
+        return None
+
+    def claims(self, keys: Iterable[Key]) -> tuple[set[Fact], dict[Symbol, str]]:
+        """Return all that never or always holds and that some impossible things rest on."""
+        never, always = set[Fact](), dict[Symbol, str]()
+        seen, waiting = set[Key](), list(keys)
+        while waiting:
+            key = waiting.pop()
+            if key in seen or key in self.possible:
+                continue
+            seen.add(key)
+            kind, symbol, value = key
+            amount = self.lowest.quantity(symbol.situation) is not None
+            if kind == GETS:
+                never.add(Fact(symbol, value))
+            elif kind == LEAVES and not amount:
+                always[symbol] = value
+            elif kind == LEAVES:
+                text = self._bounds(symbol)
+                if not text:
+                    continue  # it may be anything that is allowed
+                always[symbol] = text
+            reading = self.look(key)
+            if kind == LEAVES and amount:
+                self._wider(reading, symbol)
+            else:
+                self.brought_about(reading, key)
+            waiting += self.reads
+        return never, always
+
+    def _bounds(self, symbol: Symbol) -> str:
+        first = number(self.lowest.initial(symbol))
+        found, quantity = self.ranges.get(symbol, Range(first, first)), self.lowest.quantity(symbol.situation)
+        if not isinstance(found.low, float) and found.low == found.high:
+            return written(found.low)
+        least = None if quantity is None else quantity.least
+        most = None if quantity is None else quantity.most
+        parts = [
+            f">={written(found.low)}" if not isinstance(found.low, float) and found.low != least else "",
+            f"<={written(found.high)}" if not isinstance(found.high, float) and found.high != most else "",
+        ]
+        return ",".join(part for part in parts if part)
+
+
+def _number(effect: AmountEffect) -> bool:
+    return not isinstance(effect.amount, tuple) and not hasattr(effect.amount, "arguments") and not hasattr(
+        effect.amount, "operator"
+    )  # fmt: skip
+
+
+# -------------------------------------------------------------------------------------------------------------- by cases
+
+
+def _by_cases(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
+    """Tell values apart, one after the other, until no case is left in which the goal could hold."""
+    certificate = Certificate(cases=0)
+    while True:
+        cases = Cases(lowest, certificate)
+        cases.explore()
+        if cases.fault:
+            return None
+        if cases.reached is None:
+            return replace(certificate, cases=len(cases.came_from))
+        refined = _refined(cases, cases.reached, relaxed)
+        if refined is None or refined == certificate:
+            return None
+        certificate = refined
+
+
+def _refined(cases: Cases, end: Case, relaxed: Relaxed) -> Certificate | None:
+    """Return a certificate that tells apart what a way through the cases fails on; None if it succeeds."""
+    lowest, problem = cases.lowest, cases.problem
+    path: list[tuple[Case, Try, Case]] = []
+    while True:
+        before, one = cases.came_from[end]
+        if one is None:
+            break
+        path.append((before, one, end))
+        end = before
+    facts, rules = Facts(problem, problem.initial), Rules(problem)
+    for before, one, after in reversed(path):
+        view = View(cases.claims, before, unknown=[])
+        cases.effects(Reading(lowest, view), one)
+        arguments = tuple(one.env[p.name] for p in one.behavior.parameters)
+        changes = rules.changes(one.behavior, arguments, facts)
+        wrong = _wrong(view, facts)
+        for situation, key, value in changes or ():
+            facts.put(situation, key, value)
+        if changes is None or not _is(cases, facts, after, bool(wrong)):
+            return _told_apart(cases, relaxed, wrong or view.unknown or [])
+    goals = [Fact(symbol, wanted) for symbol, wanted in sorted(problem.goal.items())]
+    open_ = [fact for fact in goals if not _met(problem, facts, fact)]
+    rests = [] if open_ else _restless(problem, lowest.level, facts)
+    for fact in open_ or rests:
+        if fact in cases.certificate.unmet:
+            view = View(cases.claims, path[0][2] if path else end, unknown=[])
+            cases.met(Reading(lowest, view), fact)
+            if wrong := _wrong(view, facts):
+                return _told_apart(cases, relaxed, wrong)
+    for fact in open_ or rests:
+        if fact not in cases.certificate.unmet:
+            return replace(cases.certificate, unmet=(*cases.certificate.unmet, fact))
+    return None
+
+
+def _wrong(view: View, facts: Facts) -> list[tuple[Symbol, str, bool]]:
+    """Return what was taken for possible in a case and isn't so in the state that one is really in."""
+    found = []
+    for symbol, value, has in view.unknown or ():
+        now = facts.value(symbol.situation, symbol.arguments)
+        if not value or (now == value) is not has:
+            found.append((symbol, value, has))
+    return found
+
+
+def _is(cases: Cases, facts: Facts, case: Case, exactly: bool) -> bool:
+    """Whether a state is one of a case."""
+    for at, symbol in enumerate(cases.claims.symbols):
+        now = facts.value(symbol.situation, symbol.arguments) or FALSE
+        if (case[at] == ANY and exactly) or (case[at] != ANY and cases.claims.entry(at, now) != case[at]):
+            return False
+    return True
+
+
+def _met(problem: Problem, facts: Facts, fact: Fact) -> bool:
+    return meets(facts.value(fact.symbol.situation, fact.symbol.arguments) or FALSE, fact.value)
+
+
+def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
+    """Return what would have to be at rest in a state, or as in the beginning, and isn't."""
+    found = []
+    for symbol, now in sorted(facts.state().items()):
+        rest = problem.domain.situations[symbol.situation].rest
+        if rest is None or now in (rest, problem.initial.get(symbol, FALSE)):
+            continue
+        if symbol not in problem.goal and wanted_in_the_end(problem, Fact(symbol, rest)):
+            found.append(Fact(symbol, rest))
+    return found
+
+
+def _told_apart(cases: Cases, relaxed: Relaxed, wrong: Iterable[tuple[Symbol, str, bool]]) -> Certificate | None:
+    """Return a certificate that says of what was taken for possible that it never holds, or tells it apart."""
+    certificate, lowest = cases.certificate, cases.lowest
+    apart = dict(certificate.told_apart)
+    impossible = []
+    for symbol, value, has in wrong:
+        amount = lowest.quantity(symbol.situation) is not None
+        key = (GETS, symbol, value) if has else (LEAVES, symbol, value)
+        known = lowest.initial(symbol) == value if has else lowest.initial(symbol) != value
+        if not amount and not known and not relaxed.reachable(key):
+            impossible.append(key)
+            continue
+        told = apart.get(symbol)
+        if amount or (told is not None and (not told or len(told) >= FEW)):
+            apart[symbol] = ()
+        else:
+            apart[symbol] = tuple(dict.fromkeys((*(told or ()), value)))
+    never, always = relaxed.claims(impossible)
+    return replace(
+        certificate,
+        never=certificate.never | never,
+        always={**certificate.always, **always},
+        told_apart=apart,
+    )

@@ -1,0 +1,487 @@
+"""What may hold, and what must, in a set of states of which only some values are known.
+
+Conditions are read as they are written, with two bounds: `may` is true unless the condition is false in all of the states, `must`
+is true only if it holds in all of them. For a single state of which everything is known both are what `planner.validation` says.
+The checker of certificates rests on this; no search does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from time import perf_counter
+from typing import Protocol, TypeAlias
+
+from planner.checked_definitions import Definitions
+from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds, situations_in, terms_of
+from reasoner.limits import current
+from reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AnyOf,
+    Behavior,
+    ClassCondition,
+    Comparison,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+    Witness,
+)
+
+Env: TypeAlias = "Mapping[str, str]"
+Bound: TypeAlias = "Fraction | float"
+
+
+class WorkLimitError(Exception):
+    """A proof or a check needs more work than it is allowed."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The amounts that an expression may come to; if `partial`, it may also come to nothing."""
+
+    low: Bound
+    high: Bound
+    partial: bool = False
+
+    def hull(self, other: Range) -> Range:
+        """Return the smallest range with both."""
+        return Range(min(self.low, other.low), max(self.high, other.high), self.partial or other.partial)
+
+
+LOOKS = 4_096
+"""After so many tests one looks at the clock."""
+ANYTHING = Range(-math.inf, math.inf, True)
+
+
+class Knowledge(Protocol):
+    """What is known of the symbols that exist and that behaviours change."""
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has a value in some state."""
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Whether a symbol has another value in some state."""
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the amounts that a symbol may have."""
+
+
+class Lowest:
+    """A problem's lowest level, indexed by what its behaviours change.
+
+    `work` counts what was tested; above `most`, or after the deadline that holds here, it is given up.
+    """
+
+    def __init__(self, problem: Problem, most: float = math.inf) -> None:
+        self.problem, self.most, self.deadline, self.work = problem, most, current().at, 0
+        domain = problem.domain
+        self.level = domain.levels[-1] if domain.levels else 1
+        self.behaviors = domain.at_level(self.level)
+        self.changing = frozenset[str]().union(*(behavior.changes for behavior in self.behaviors))
+        self.effects: dict[str, list[tuple[Behavior, ValueEffect]]] = {}
+        for behavior in self.behaviors:
+            for effect in behavior.effects:
+                self.effects.setdefault(effect.situation, []).append((behavior, effect))
+        self.given: dict[str, dict[str, None]] = {}
+        for name, effects in self.effects.items():
+            values = self.given.setdefault(name, {})
+            for behavior, effect in effects:
+                kind = behavior.kinds.get(effect.value)
+                values.update(dict.fromkeys([effect.value] if kind is None else problem.classes.get(kind, ())))
+        self.holders: dict[str, list[tuple[tuple[str, ...], str]]] = {}
+        for symbol, value in problem.initial.items():
+            if symbol.situation not in self.changing:
+                self.holders.setdefault(symbol.situation, []).append((symbol.arguments, value))
+        self._rows: dict[tuple[str, int], dict[str, list[tuple[str, ...]]]] = {}
+        self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
+        self._inner: dict[int, tuple[Condition, ...]] = {}
+        self._kept: list[object] = []  # so that no id is given twice
+
+    def spend(self, work: int = 1) -> None:
+        """Count work; raise `WorkLimitError` where it is too much."""
+        self.work += work
+        if self.work > self.most:
+            raise WorkLimitError(f"more than {self.most:.0f} tests")
+        if self.work % LOOKS < work and perf_counter() > self.deadline:
+            raise WorkLimitError("more time than there is")
+
+    def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
+        """Whether there is such a symbol: it is stated, or boolean and about individuals of the right classes."""
+        if Symbol(situation, arguments) in self.problem.initial:
+            return True
+        kind = self.problem.domain.situations[situation]
+        members = self.problem.members
+        return (
+            kind.boolean
+            and len(arguments) == len(kind.arguments)
+            and all(argument in members(of) for argument, of in zip(arguments, kind.arguments, strict=True))
+        )
+
+    def initial(self, symbol: Symbol) -> str:
+        """Return the value that a symbol that exists has in the beginning."""
+        return self.problem.initial.get(symbol, FALSE)
+
+    def quantity(self, situation: str) -> Quantity | None:
+        """Return what the amounts of a situation type are; None if its values aren't amounts."""
+        return self.problem.domain.situations[situation].quantity
+
+    def rows(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
+        """Return the tuples of a relation, by what stands at a position."""
+        if (relation, position) not in self._rows:
+            found: dict[str, list[tuple[str, ...]]] = {}
+            for row in sorted(self.problem.relations.get(relation, ())):
+                found.setdefault(row[position], []).append(row)
+            self._rows[relation, position] = found
+        return self._rows[relation, position]
+
+    def constant(self, condition: Condition) -> bool:
+        """Whether a condition that isn't nested is the same in all states."""
+        if isinstance(condition, ValueCondition):
+            return condition.situation not in self.changing and condition.situation not in self.problem.domain.rules
+        if isinstance(condition, Comparison):
+            return self.changing.isdisjoint(situations_in(condition.left) | situations_in(condition.right))
+        return isinstance(condition, RelationCondition | ClassCondition | EqualityCondition)
+
+    def steps(self, conditions: Sequence[Condition], bound: frozenset[str]) -> list[tuple[Condition, tuple[str, ...]]]:
+        """Return conditions in the order in which they are looked at, each with the variables that it finds values for."""
+        key = id(conditions), bound
+        if key not in self._steps:
+            self._kept.append(conditions)
+            waiting = [c for c in conditions if not isinstance(c, AnyOf | Witness)]
+            known, found = set(bound), list[tuple[Condition, tuple[str, ...]]]()
+            while waiting:
+                ranks = [(self._rank(c, known), i) for i, c in enumerate(waiting)]
+                condition = waiting.pop(min(ranks)[1])
+                unknown = tuple(sorted(variables(condition) - known))
+                found.append((condition, unknown))
+                known.update(unknown)
+            nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
+            self._steps[key] = found + [(condition, ()) for condition in nested]
+        return self._steps[key]
+
+    def _rank(self, condition: Condition, known: set[str]) -> int:
+        unknown, constant = variables(condition) - known, self.constant(condition)
+        if not unknown:
+            return 0 if constant else 2
+        if isinstance(condition, EqualityCondition) and len(unknown) == 1 and not condition.negated:
+            return 1
+        if isinstance(condition, RelationCondition) and not condition.negated:
+            return 1 if len(unknown) < len(set(condition.arguments)) else 4
+        if isinstance(condition, ValueCondition) and not condition.negated:
+            if constant:
+                return 1 if len(unknown) < len({*condition.arguments, condition.value}) else 4
+            return 3 if unknown == {condition.value} else 5
+        return 5 + len(unknown)
+
+    def inside(self, witness: Witness) -> tuple[Condition, ...]:
+        """Return the conditions of a witness, its class among them."""
+        if id(witness) not in self._inner:
+            self._kept.append(witness)
+            self._inner[id(witness)] = (ClassCondition(witness.variable, witness.kind), *witness.conditions)
+        return self._inner[id(witness)]
+
+
+class Reading:
+    """Conditions and effects of the lowest level, read by what is known of a set of states, which stays as it is meanwhile."""
+
+    def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
+        self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
+        rules = self.problem.domain.rules
+        self._defined = {
+            must: Definitions(rules, partial(self._given, must=must)) for must in ((True, False) if rules else ())
+        }
+
+    # ------------------------------------------------------------------------------------------------------- values
+
+    def value(self, situation: str, arguments: tuple[str, ...], value: str, must: bool) -> bool:
+        """Whether a symbol may have a value, or must."""
+        lowest = self.lowest
+        lowest.spend()
+        if not lowest.exists(situation, arguments):
+            return False
+        if situation in self.problem.domain.rules:
+            if value == TRUE:
+                return self._defined[must].follows((situation, arguments))
+            return value == FALSE and not self._defined[not must].follows((situation, arguments))
+        symbol = Symbol(situation, arguments)
+        if situation not in lowest.changing:
+            return lowest.initial(symbol) == value
+        if lowest.quantity(situation) is not None:
+            return self.amount_meets(symbol, value, must)
+        return not self.knowledge.may_not(symbol, value) if must else self.knowledge.may(symbol, value)
+
+    def _given(self, situation: str, arguments: tuple[str, ...], must: bool) -> bool:
+        for rule in self.problem.domain.rules[situation]:
+            env = {p.name: a for p, a in zip(rule.parameters, arguments, strict=True)}
+            if all(env[p.name] in self.problem.members(p.kind) for p in rule.parameters) and any(
+                True for _ in self.solutions(rule.conditions, env, rule.behavior.kinds, must)
+            ):
+                return True
+        return False
+
+    def between(self, situation: str, arguments: tuple[str, ...]) -> Range | None:
+        """Return the amounts that a symbol may have; None if there is no such symbol."""
+        if not self.lowest.exists(situation, arguments):
+            return None
+        symbol = Symbol(situation, arguments)
+        if situation not in self.lowest.changing:
+            exactly = Fraction(self.lowest.initial(symbol))
+            return Range(exactly, exactly)
+        return self.knowledge.between(symbol)
+
+    def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
+        """Whether an amount may be, or must be, as wanted: a number, or bounds."""
+        found = self.between(symbol.situation, symbol.arguments)
+        try:
+            limits = bounds(wanted)
+        except ValueError:
+            return False
+        return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
+
+    def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
+        """Whether a goal may hold, or must; a symbol that doesn't exist counts as false."""
+        if not self.lowest.exists(symbol.situation, symbol.arguments):
+            return wanted == FALSE
+        if self.lowest.quantity(symbol.situation) is not None:
+            return self.amount_meets(symbol, wanted, must)
+        return self.value(symbol.situation, symbol.arguments, wanted, must)
+
+    # --------------------------------------------------------------------------------------------------- conditions
+
+    def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
+        """Whether a condition may hold, or must, with these individuals for its variables."""
+        found: bool
+        match condition:
+            case ValueCondition(situation, arguments, value, negated):
+                key = tuple(env.get(a, a) for a in arguments)
+                return self.value(situation, key, env.get(value, value), must is not negated) is not negated
+            case RelationCondition(relation, arguments, negated):
+                key = tuple(env.get(a, a) for a in arguments)
+                return (key in self.problem.relations.get(relation, ())) is not negated
+            case ClassCondition(term, kind, negated):
+                return (env.get(term, term) in self.problem.members(kind)) is not negated
+            case EqualityCondition(left, right, negated):
+                return (env.get(left, left) == env.get(right, right)) is not negated
+            case Comparison(left, sign, right, negated):
+                one, other = self.expression(left, env), self.expression(right, env)
+                found = one is not None and other is not None and compared(one, sign, other, must is not negated)
+                return found is not negated
+            case Witness(variable, kind, _, negated):
+                outer = {term: value for term, value in env.items() if term != variable}
+                every = self.solutions(
+                    self.lowest.inside(condition), outer, {**kinds, variable: kind}, must is not negated
+                )
+                return any(True for _ in every) is not negated
+            case AnyOf(alternatives, negated):
+                some = any(
+                    any(True for _ in self.solutions(group, env, kinds, must is not negated)) for group in alternatives
+                )
+                return some is not negated
+
+    def solutions(
+        self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
+    ) -> Iterator[dict[str, str]]:
+        """Yield the individuals for the variables of conditions with which all of them may hold, or must."""
+        yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
+
+    def _extended(
+        self,
+        steps: Sequence[tuple[Condition, tuple[str, ...]]],
+        at: int,
+        env: dict[str, str],
+        kinds: Mapping[str, str],
+        must: bool,
+    ) -> Iterator[dict[str, str]]:
+        if at == len(steps):
+            yield env
+            return
+        condition, unknown = steps[at]
+        self.lowest.spend()
+        if not unknown:
+            if self.holds(condition, env, kinds, must):
+                yield from self._extended(steps, at + 1, env, kinds, must)
+            return
+        for more in self._candidates(condition, unknown, env, kinds):
+            self.lowest.spend()
+            if self.holds(condition, more, kinds, must):
+                yield from self._extended(steps, at + 1, more, kinds, must)
+
+    def _candidates(
+        self, condition: Condition, unknown: Sequence[str], env: dict[str, str], kinds: Mapping[str, str]
+    ) -> Iterator[dict[str, str]]:
+        """Yield the individuals, put in for unknown variables, with which a condition might hold."""
+        lowest, members = self.lowest, self.problem.members
+        rows: Sequence[tuple[str, ...]] | None = None
+        terms: tuple[str, ...] = ()
+        match condition:
+            case RelationCondition(relation, arguments, False):
+                terms = arguments
+                known = next((i for i, term in enumerate(terms) if term not in unknown), None)
+                if known is None:
+                    rows = sorted(self.problem.relations.get(relation, ()))
+                else:
+                    rows = lowest.rows(relation, known).get(env.get(terms[known], terms[known]), ())
+            case EqualityCondition(left, right, False) if len(unknown) == 1:
+                terms, other = (unknown[0],), right if left == unknown[0] else left
+                rows = [(env.get(other, other),)]
+            case ValueCondition(situation, arguments, value, False):
+                boolean = self.problem.domain.situations[situation].boolean
+                if lowest.constant(condition) and (not boolean or value == TRUE):
+                    terms = (*arguments, value)
+                    rows = [(*key, its) for key, its in lowest.holders.get(situation, ())]
+                elif tuple(unknown) == (value,) and value not in arguments and not boolean:
+                    terms = (value,)
+                    symbol = Symbol(situation, tuple(env.get(a, a) for a in arguments))
+                    at_first = lowest.initial(symbol)
+                    rows = [(v,) for v in dict.fromkeys((at_first, *lowest.given.get(situation, ())))]
+            case _:
+                pass
+        if rows is None:
+            yield from self._of_classes(unknown, env, kinds)
+            return
+        for row in rows:
+            more = dict(env)
+            fits = all(more.setdefault(term, one) == one if term.startswith("?") else term == one
+                       for term, one in zip(terms, row, strict=True))  # fmt: skip
+            if fits and all(more[term] in members(kinds[term]) for term in unknown):
+                yield more
+
+    def _of_classes(
+        self, unknown: Sequence[str], env: dict[str, str], kinds: Mapping[str, str]
+    ) -> Iterator[dict[str, str]]:
+        if not unknown:
+            yield env
+            return
+        for one in self.problem.classes.get(kinds[unknown[0]], ()):
+            self.lowest.spend()
+            yield from self._of_classes(unknown[1:], {**env, unknown[0]: one}, kinds)
+
+    # ------------------------------------------------------------------------------------------------------ amounts
+
+    def expression(self, expression: Expression, env: Env) -> Range | None:
+        """Return what an expression may come to; None if it comes to nothing."""
+        match expression:
+            case Amount(situation, arguments):
+                return self.between(situation, tuple(env.get(a, a) for a in arguments))
+            case Measure(relation, arguments):
+                key = tuple(env.get(a, a) for a in arguments)
+                rows = self.lowest.rows(relation, 0).get(key[0], ()) if key else sorted(
+                    self.problem.relations.get(relation, ())
+                )  # fmt: skip
+                found = [Fraction(row[-1]) for row in rows if row[:-1] == key]
+                return Range(min(found), max(found)) if found else None
+            case Calculation(sign, left, right):
+                one, other = self.expression(left, env), self.expression(right, env)
+                return None if one is None or other is None else calculated(sign, one, other)
+            case number:
+                return Range(number, number)
+
+    def amounts(self, behavior: Behavior, env: Env) -> dict[Symbol, tuple[Range, bool]] | None:
+        """Return what a behaviour may make of the amounts that it changes, and whether it surely changes them.
+
+        None if it can't be done since some amount would come to one that isn't allowed.
+        """
+        after: dict[Symbol, tuple[Range, bool]] = {}
+        for effect in behavior.amounts:
+            if effect.when:
+                ways = list(self.solutions(effect.when, env, behavior.kinds))
+                sure = len(ways) == 1 and any(True for _ in self.solutions(effect.when, env, behavior.kinds, must=True))
+            else:
+                ways, sure = [dict(env)], True
+            for way in ways:
+                symbol = Symbol(effect.situation, tuple(way.get(a, a) for a in effect.arguments))
+                before = self.between(effect.situation, symbol.arguments)
+                if before is None:
+                    continue
+                old, surely = after.get(symbol, (before, True))
+                by = self.expression(effect.amount, way)
+                if by is None:
+                    if sure:
+                        return None
+                    after[symbol] = old, False
+                    continue
+                new = by if effect.operation == "assign" else calculated(OPERATORS[effect.operation], old, by)
+                if new is None:
+                    return None
+                after[symbol] = (new if sure else new.hull(old)), surely and sure
+        for symbol, (new, surely) in after.items():
+            quantity = self.lowest.quantity(symbol.situation)
+            if quantity is None:
+                return None
+            low = new.low if quantity.least is None else max(new.low, quantity.least)
+            high = new.high if quantity.most is None else min(new.high, quantity.most)
+            allowed = low <= high and not (low == high and not quantity.allows(low))
+            if not allowed and surely:
+                return None
+            if allowed and surely:
+                after[symbol] = Range(low, high), surely
+            elif not surely:
+                after[symbol] = Range(new.low, new.high), surely
+        return after
+
+
+OPERATORS = {"scale": "*", "increase": "+", "decrease": "-"}
+
+
+def variables(condition: Condition) -> set[str]:
+    """Return the variables of a condition that isn't nested."""
+    match condition:
+        case ValueCondition(_, arguments, value):
+            terms: set[str] = {*arguments, value}
+        case RelationCondition(_, arguments):
+            terms = set(arguments)
+        case ClassCondition(term):
+            terms = {term}
+        case EqualityCondition(left, right):
+            terms = {left, right}
+        case Comparison(one, _, other):
+            terms = {*terms_of(one), *terms_of(other)}
+        case _:
+            terms = set()
+    return {term for term in terms if term.startswith("?")}
+
+
+def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
+    """Whether an amount of one range compares with one of another as a sign says, for some of them or for all."""
+    if must and (one.partial or other.partial):
+        return False
+    if sign in (">", ">="):
+        one, other, sign = other, one, {">": "<", ">=": "<="}[sign]
+    if sign == "=":
+        if must:
+            return one.low == one.high == other.low == other.high
+        return one.low <= other.high and other.low <= one.high
+    left, right = (one.high, other.low) if must else (one.low, other.high)
+    return left < right or (sign == "<=" and left == right)
+
+
+def calculated(sign: str, one: Range, other: Range) -> Range | None:
+    """Return what comes of two ranges of amounts; None if nothing does."""
+    partial = one.partial or other.partial
+    if sign == "+":
+        return Range(one.low + other.low, one.high + other.high, partial)
+    if sign == "-":
+        return Range(one.low - other.high, one.high - other.low, partial)
+    if sign == "/":
+        if other.low == other.high == 0:
+            return None
+        if other.low <= 0 <= other.high:
+            return ANYTHING
+        ends = [_quotient(a, b) for a in (one.low, one.high) for b in (other.low, other.high)]
+    else:
+        ends = [a * b if a and b else Fraction(0) for a in (one.low, one.high) for b in (other.low, other.high)]
+    return Range(min(ends), max(ends), partial)
+
+
+def _quotient(a: Bound, b: Bound) -> Bound:
+    if math.isinf(b):
+        return Fraction(0) if not math.isinf(a) else math.copysign(math.inf, a) * math.copysign(1, b)
+    return a / b

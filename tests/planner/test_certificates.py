@@ -1,0 +1,154 @@
+"""Every "unsolvable" carries a certificate, which an independent checker accepts; what is corrupted or forged it refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from random import Random
+
+import pytest
+
+import confab
+from planner.certificate_checks import refusal
+from planner.certificates import Certificate, certificate_from, certificate_json
+from planner.certifying import certify
+from planner.plan import Outcome, Reason, Status
+from planner.solve import MODES, Request, certified, solve
+from reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
+from worlds.agreement import solvable
+from worlds.hierarchies import hierarchy
+
+CASES = Path(__file__).with_name("cases")
+
+
+def answered(case: str, mode: str) -> Outcome:
+    return confab.load(CASES / case).plan(mode=mode, time_limit=20.0).outcome
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "leading"])
+@pytest.mark.parametrize("case", ["false-unsolvable-1", "false-unsolvable-2", "no-operators-solvable"])
+def test_what_a_few_steps_solve_is_not_called_unsolvable(case: str, mode: str) -> None:
+    outcome = answered(f"{case}.ttl", mode)
+    assert outcome.plan is not None and len(outcome.plan.primitives) <= 2
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "leading"])
+def test_a_task_whose_behaviours_change_nothing_is_unsolvable(mode: str) -> None:
+    outcome = answered("no-operators.ttl", mode)
+    assert outcome.certificate is not None and outcome.reason is not None
+    assert outcome.reason.text == (
+        "a1 D0 true can't be reached: no behaviour of level 1 gives it another value; so always b4 F0 a1"
+    )
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: str) -> None:
+    outcome = answered("reason-key-opens-nothing/ward-small.ttl", mode)
+    assert outcome.certificate is not None and outcome.reason is not None
+    assert "no Key opens cabinet0, which L2_UNLOCK needs; so never cabinet0 LOCK unlocked" in outcome.reason.text
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_the_reason_names_the_bound_that_an_amount_would_exceed(mode: str) -> None:
+    outcome = answered("reason-wrong-sign/depot-small.ttl", mode)
+    assert outcome.certificate is not None and outcome.reason is not None
+    assert "L3_ROLL would take robot0 BATTERY to 13, more than its most, 12; so never robot0" in outcome.reason.text
+
+
+@cache
+def certificate_of(seed: int) -> tuple[Problem, Certificate | None]:
+    problem = hierarchy(seed)
+    return problem, certify(problem)
+
+
+def unsolvable(seeds: range) -> Iterator[tuple[Problem, Certificate]]:
+    for problem, certificate in map(certificate_of, seeds):
+        if certificate is not None:
+            yield problem, certificate
+
+
+def test_in_random_worlds_exactly_what_has_no_plan_has_a_certificate() -> None:
+    for seed in range(30):
+        problem, certificate = certificate_of(seed)
+        assert (certificate is None) == bool(solvable(problem)), seed
+        assert certificate is None or refusal(problem, certificate) is None, seed
+
+
+def corrupted(certificate: Certificate, rng: Random) -> Iterator[Certificate]:
+    """Yield a certificate with something left out, something added, and something of another task."""
+    yield replace(certificate, unmet=())
+    yield replace(certificate, cases=certificate.cases + 1)
+    yield replace(certificate, cases=certificate.cases - 1)
+    other = Symbol(certificate.unmet[0].symbol.situation, ("nothing",))
+    yield replace(certificate, unmet=(Fact(other, certificate.unmet[0].value),))
+    yield replace(certificate, unmet=(Fact(certificate.unmet[0].symbol, "nothing"), *certificate.unmet[1:]))
+    yield replace(certificate, never=certificate.never | {Fact(other, TRUE)})
+    if certificate.told_apart:
+        gone = rng.choice(sorted(certificate.told_apart))
+        yield replace(certificate, told_apart={s: v for s, v in certificate.told_apart.items() if s != gone})
+        yield replace(certificate, unmet=certificate.unmet[:-1])
+
+
+def test_a_corrupted_certificate_is_refused() -> None:
+    rng, refused = Random(1), 0
+    for problem, certificate in unsolvable(range(30)):
+        for bad in corrupted(certificate, rng):
+            said = refusal(problem, bad)
+            holds = (
+                certify(replace(problem, goal={fact.symbol: fact.value for fact in bad.unmet})) if bad.unmet else None
+            )
+            assert said is not None or holds is not None, bad  # what is left may be a proof still
+            refused += said is not None
+    assert refused >= 50
+
+
+def test_a_certificate_proves_nothing_of_a_task_that_has_a_plan() -> None:
+    tried = 0
+    for problem, certificate in unsolvable(range(30)):
+        for seed in range(6):
+            rng = Random(seed)
+            symbol = rng.choice(sorted(problem.initial))
+            values = [value for value in problem.values(symbol, 9) if value != problem.initial[symbol]]
+            if problem.domain.situations[symbol.situation].boolean:
+                values = [FALSE if problem.initial[symbol] == TRUE else TRUE]
+            other = replace(
+                problem, initial={**problem.initial, symbol: rng.choice(values or [problem.initial[symbol]])}
+            )
+            if solvable(other):
+                tried += 1
+                assert refusal(other, certificate) is not None
+    assert tried > 5
+
+
+def test_a_certificate_survives_being_written_and_a_broken_one_is_named() -> None:
+    for _, certificate in unsolvable(range(20)):
+        assert certificate_from(json.loads(json.dumps(certificate_json(certificate)))) == certificate
+    for broken in (
+        "{}",
+        "[]",
+        '{"format": 2}',
+        '{"format": 1, "cases": "1"}',
+        '{"format": 1, "cases": 1, "never": [[1]]}',
+    ):
+        with pytest.raises(ValueError, match=r"certificate|whole number"):
+            certificate_from(json.loads(broken))
+
+
+def test_what_cant_be_certified_is_given_up() -> None:
+    problem = next(hierarchy(seed) for seed in range(100) if solvable(hierarchy(seed)))
+    said = certified(problem, Outcome(Status.UNSOLVABLE, reason=Reason("so it seems")))
+    assert said.status is Status.GAVE_UP and said.certificate is None and said.reason is not None
+    assert "couldn't be certified" in said.reason.text and "so it seems" in said.reason.text
+    forged = Certificate(unmet=tuple(Fact(symbol, value) for symbol, value in problem.goal.items()))
+    said = certified(problem, Outcome(Status.UNSOLVABLE, certificate=forged))
+    assert said.status is Status.GAVE_UP and said.reason is not None and "refuses" in said.reason.text
+
+
+def test_every_mode_answers_unsolvable_with_a_certificate() -> None:
+    for problem, _ in unsolvable(range(12)):
+        for mode in ("guarded", "optimal", "paper"):
+            outcome = solve(Request(problem, mode))
+            assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
