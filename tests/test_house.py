@@ -149,6 +149,8 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 "validation",
                 "checked_amounts",
                 "checked_definitions",
+                "certifying",
+                "certificate_reasons",
                 "language",
                 "levels",
                 "transitions",
