@@ -73,6 +73,10 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         one, many = certificate.cases == 1, len(goals) > 1
         cases = f"{certificate.cases} combination{'' if one else 's'} of values of {about} can be reached"
         how = "exclude each other" if many else "can't be reached"
+        values = {(fact.symbol.situation, fact.value) for fact in goals}
+        if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1:
+            ((situation, value),) = values
+            return Reason(f"{what} {how}: only one at a time is {situation} {value}", tuple(dict.fromkeys(terms)))
         text = f"{what} {how}: {cases}, {'and not' if one else 'none'} with {'all of them' if many else 'it'}"
         return Reason(text, tuple(dict.fromkeys(terms)))
     try:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from typing import TypeAlias
 
 from planner.certificate_checks import (
@@ -51,25 +51,48 @@ def certify(problem: Problem, most: float = WORK) -> Certificate | None:
     lowest = Lowest(problem, most)
     try:
         relaxed = Relaxed(lowest)
-        return _at_once(lowest) or relaxed.certificate(problem.goal) or _by_cases(lowest, relaxed)
+        return (
+            _at_once(lowest, LITTLE[0])
+            or _contested(lowest)
+            or _at_once(lowest, LITTLE[1])
+            or relaxed.certificate(problem.goal)
+            or _by_cases(lowest, relaxed)
+        )
     except (WorkLimitError, RecursionError):
         return None
 
 
-def _at_once(lowest: Lowest) -> Certificate | None:
-    """Return a certificate for a goal of which little has to be asked; each is asked for by itself, with little work at first."""
+def _at_once(lowest: Lowest, little: int) -> Certificate | None:
+    """Return a certificate for a goal of which little has to be asked; each is asked for by itself, with so much work."""
     most = lowest.most
     try:
-        for little in LITTLE:
-            for symbol, wanted in sorted(lowest.problem.goal.items()):
-                lowest.most = min(most, lowest.work + little)
-                with suppress(WorkLimitError):
-                    if (found := Relaxed(lowest).certificate({symbol: wanted})) is not None:
-                        return found
-                if lowest.work >= most:
-                    return None
+        for symbol, wanted in sorted(lowest.problem.goal.items()):
+            lowest.most = min(most, lowest.work + little)
+            with suppress(WorkLimitError):
+                if (found := Relaxed(lowest).certificate({symbol: wanted})) is not None:
+                    return found
+            if lowest.work >= most:
+                break
     finally:
         lowest.most = most
+    return None
+
+
+def _contested(lowest: Lowest) -> Certificate | None:
+    """Return a certificate for two goals that want one value which only one symbol has at a time."""
+    wanting: dict[tuple[str, str], list[Symbol]] = {}
+    for symbol, wanted in sorted(lowest.problem.goal.items()):
+        kind = lowest.problem.domain.situations[symbol.situation]
+        if not kind.boolean and kind.quantity is None:
+            wanting.setdefault((symbol.situation, wanted), []).append(symbol)
+    for (_, wanted), symbols in wanting.items():
+        for one, other in pairwise(symbols):
+            told_apart = {one: (wanted,), other: (wanted,)}
+            unmet = (Fact(one, wanted), Fact(other, wanted))
+            cases = Cases(lowest, Certificate(told_apart=told_apart, unmet=unmet))
+            cases.explore()
+            if not cases.fault and cases.reached is None:
+                return replace(cases.certificate, cases=len(cases.came_from))
     return None
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """The work of looking at all states, in states times relaxed operators, that no search has to come before."""
-AT_ONCE = 60_000
+AT_ONCE = 20_000
 """So many tests of conditions are little work."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""

@@ -151,7 +151,7 @@ def test_two_goals_that_exclude_each_other_are_named() -> None:
     both = {"AT cup1": "sink", "AT cup2": "sink"}
     proof = impossible(kitchen(both))
     assert proof is not None and proof.certificate is not None and proof.certificate.kind == "pair"
-    assert proof.reason.text.startswith("cup1 AT sink and cup2 AT sink exclude each other: 3 combinations of values of")
+    assert proof.reason.text == "cup1 AT sink and cup2 AT sink exclude each other: only one at a time is AT sink"
     assert proof.reason.terms == ("cup1", "AT", "sink", "cup2")
     assert not solvable(kitchen(both))
 
