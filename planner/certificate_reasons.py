@@ -330,7 +330,9 @@ class _Causes:
                 if right.startswith("?"):
                     return f"{left} {condition.relation} no {kinds[right]}"
         all_ = " and ".join(said(self._spoken(condition, given, kinds)) for condition in core)
-        return f"nothing satisfies {all_}" if len(core) > 1 else f"never {all_}"
+        if len(core) > 1:
+            return f"nothing satisfies {all_}"
+        return f"{'not' if self.lowest.constant(core[0]) else 'never'} {all_}"
 
     def _spoken(self, condition: Condition, given: dict[str, str], kinds: dict[str, str]) -> Condition:
         free = {name: f"some {kind}" for name, kind in kinds.items() if name not in given}
