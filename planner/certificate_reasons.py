@@ -8,10 +8,10 @@ from fractions import Fraction
 
 from planner.certificate_checks import Claims, View, own_variables, unified
 from planner.certificates import Certificate
-from planner.levels import said
 from planner.plan import Reason
 from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
 from reasoner.amounts import MORE, Expression, terms_of, towards, written
+from reasoner.sentences import said
 from reasoner.symbols import (
     AmountEffect,
     Behavior,
