@@ -103,7 +103,7 @@ class Surroundings:
                     classes.add(witness.kind)
         parts = [self._pattern(shape, rows) for shape, rows in sorted(shapes.items())]
         parts += [
-            f"{{ ?x a owl:NamedIndividual ; a/rdfs:subClassOf* <{self.names.iri(name)}> }}"
+            f"{{ ?x a owl:NamedIndividual ; a/rdfs:subClassOf* <{self.frame.names.iri(name)}> }}"
             for kind in sorted(classes)
             for name in kind.split("|")
         ]
@@ -118,7 +118,7 @@ class Surroundings:
 
     def _asked(self, variable: str, conditions: Iterable[Condition]) -> Iterator[tuple[str, tuple[str | None, ...]]]:
         """Yield the conditions whose facts are stated where they hold, each by its IRI and terms, with None for the variable."""
-        iri, situations, rules = self.names.iri, self.frame.domain.situations, self.frame.domain.rules
+        iri, situations, rules = self.frame.names.iri, self.frame.domain.situations, self.frame.domain.rules
         for condition in conditions:
             match condition:
                 case RelationCondition(relation, about, False):

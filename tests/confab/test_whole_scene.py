@@ -37,6 +37,18 @@ def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: str) -> N
     assert confab.load(CASES / "lamps-without-oil.ttl").plan(mode=mode).outcome.status is Status.UNSOLVABLE
 
 
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: str) -> None:
+    """The goal wants one of the class not at rest; the others, which the effect touches as well, nothing brings back."""
+    scene = confab.load(CASES / "rest-of-a-class.ttl")
+    assert scene.plan(mode=mode).outcome.status is Status.UNSOLVABLE
+    step = Step((0,), scene.problem.id_of("L2_0", ("b4", "b4")), 2, "L2_0", ("b4", "b4"))
+    stretch = f"the stretch from {step} to {step}"
+    assert [fault.text for fault in validate(scene.problem, Plan((step,)))] == [
+        f"{stretch} touches <{one}, P0> and leaves it true; at rest it is false" for one in ("a2", "a3")
+    ]
+
+
 class Forgetful:
     """Task recognition with a fault: of the individuals that no goal or behaviour names it loses one, or none if `lost` is None."""
 
