@@ -171,12 +171,20 @@ class Call:
                     mark = len(self.table.trail)
                 else:
                     sleep(cell, self.segments.waits_for(first, cell, self.goal[cell]))
-            restarts, redone = self.restarts, self.redone
+            restarts, redone, steps = self.restarts, self.redone, len(self.steps)
             if asleep and not harder(asleep, before):
                 return False
             if self.restarts > restarts:
                 return self.serialise(harder)
             wake(mark if self.redone == redone else 0)
+            # Where no step was done, a pass has to leave fewer goals asleep: so the loop ends.
+            if asleep and not active and len(self.steps) == steps:
+                there = [cell for cell in asleep if self.met(cell)]
+                if not there:
+                    return False
+                for cell in there:
+                    del asleep[cell]
+                    self.kept[cell] = self.goal[cell]
         return True
 
     def redo(self, steps: Sequence[RefinedStep]) -> None:
