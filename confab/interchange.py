@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from planner.certificates import certificate_json
 from planner.plan import Outcome, Plan, Status, Step
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.names import nearest
@@ -46,6 +47,8 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         data["engine"] = outcome.engine
     if outcome.reason is not None:
         data["reason"] = {"text": outcome.reason.text, "terms": list(outcome.reason.terms)}
+    if outcome.certificate is not None:
+        data["certificate"] = certificate_json(outcome.certificate)
     data["search"] = {
         str(level): {"generated": c.generated, "evaluated": c.evaluated, "expanded": c.expanded}
         for level, c in outcome.search.items()

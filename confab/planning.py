@@ -17,7 +17,7 @@ from confab.checking import refused
 from confab.interchange import outcome_json
 from confab.known import Known
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
-from planner.solve import DEFAULT_MODE, MODES, Request, solve
+from planner.solve import DEFAULT_MODE, MODES, Request, certified, solve
 from planner.validation import validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline, within
@@ -170,7 +170,7 @@ def _plan(
         if engine not in (None, NO_ENGINE):
             from confab.engines import plan_by_engine
 
-            return plan_by_engine(problem, engine, level, deadline.left)
+            return certified(problem, plan_by_engine(problem, engine, level, deadline.left))
         others, seconds = leave_levels and engine != NO_ENGINE, deadline.left
         if others and seconds is not None:
             from confab.engines import some_installed

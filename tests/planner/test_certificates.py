@@ -152,3 +152,10 @@ def test_every_mode_answers_unsolvable_with_a_certificate() -> None:
         for mode in ("guarded", "optimal", "paper"):
             outcome = solve(Request(problem, mode))
             assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
+
+
+def test_json_has_the_certificate_and_the_checker_accepts_it() -> None:
+    result = confab.load(CASES / "reason-key-opens-nothing" / "ward-small.ttl").plan()
+    certificate = certificate_from(result.json()["certificate"])
+    assert refusal(result.problem, certificate) is None
+    assert Fact(Symbol("LOCK", ("cabinet0",)), "unlocked") in certificate.never
