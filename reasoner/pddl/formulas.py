@@ -1,0 +1,279 @@
+"""Formulas and effects of PDDL as values, each with its text.
+
+What is known to hold or not to hold is simplified away where a formula is built, so that none is written that a reader may not
+know, like ``(or)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TypeAlias
+
+from reasoner.amounts import written
+
+DIGITS = 30
+"""Decimal places of a number that has no end, where it can't be written as a quotient."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A variable or an object: `name` as PDDL writes it, its type, and the individuals that it can stand for."""
+
+    name: str
+    type: str = field(default="object", compare=False)
+    members: frozenset[str] = field(default=frozenset(), compare=False)
+
+    @property
+    def variable(self) -> bool:
+        """Whether it is a variable."""
+        return self.name.startswith("?")
+
+
+@dataclass(frozen=True)
+class Call:
+    """The value of a function."""
+
+    function: str
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Two numbers, calculated with."""
+
+    sign: str
+    left: Number
+    right: Number
+
+
+Number: TypeAlias = "Fraction | Call | Operation"
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A predicate holds."""
+
+    predicate: str
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Same:
+    """Two terms are the same object."""
+
+    left: Term
+    right: Term
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Two numbers compare."""
+
+    sign: str
+    left: Number
+    right: Number
+
+
+@dataclass(frozen=True)
+class Not:
+    """A formula doesn't hold."""
+
+    inner: Formula
+
+
+@dataclass(frozen=True)
+class And:
+    """All of some formulas hold."""
+
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True)
+class Or:
+    """One of some formulas holds."""
+
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True)
+class Exists:
+    """A formula holds for some objects in place of its variables."""
+
+    variables: tuple[Term, ...]
+    inner: Formula
+
+
+Formula: TypeAlias = "Atom | Same | Compare | Not | And | Or | Exists"
+TRUE: Formula = And(())
+FALSE: Formula = Or(())
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """A function changes by a number: ``assign``, ``increase``, ``decrease`` or ``scale-up``."""
+
+    operation: str
+    call: Call
+    by: Number
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something comes to hold, or not to hold, or a number changes, for all variables with which a formula held before."""
+
+    what: Atom | Not | Assignment
+    when: Formula = TRUE
+    variables: tuple[Term, ...] = ()
+
+
+# ------------------------------------------------------------------------------------------------------------ building
+
+
+def both(parts: Iterable[Formula]) -> Formula:
+    """Return that all of some formulas hold."""
+    flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, And) else (part,)))
+    if FALSE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
+        return FALSE
+    return next(iter(flat)) if len(flat) == 1 else And(tuple(flat))
+
+
+def either(parts: Iterable[Formula]) -> Formula:
+    """Return that one of some formulas holds."""
+    flat = dict.fromkeys(one for part in parts for one in (part.parts if isinstance(part, Or) else (part,)))
+    if TRUE in flat or any(isinstance(one, Not) and one.inner in flat for one in flat):
+        return TRUE
+    return next(iter(flat)) if len(flat) == 1 else Or(tuple(flat))
+
+
+def no(formula: Formula, yes: bool = True) -> Formula:
+    """Return that a formula doesn't hold; with `yes` being False, the formula."""
+    if not yes:
+        return formula
+    if formula == TRUE or formula == FALSE:
+        return FALSE if formula == TRUE else TRUE
+    return formula.inner if isinstance(formula, Not) else Not(formula)
+
+
+def some(variables: Iterable[Term], formula: Formula) -> Formula:
+    """Return that a formula holds for some objects."""
+    variables = tuple(variables)
+    if formula == FALSE or not all(one.members for one in variables):
+        return FALSE
+    inside = {term.name for term in terms(formula)}
+    used = tuple(one for one in variables if one.name in inside)
+    return Exists(used, formula) if used else formula
+
+
+def same(left: Term, right: Term) -> Formula:
+    """Return that two terms are the same object."""
+    if left == right:
+        return TRUE
+    return Same(left, right) if left.members & right.members else FALSE
+
+
+def conjuncts(formula: Formula) -> tuple[Formula, ...]:
+    """Return the formulas of which one is the conjunction."""
+    return formula.parts if isinstance(formula, And) else (formula,)
+
+
+# ------------------------------------------------------------------------------------------------------------- reading
+
+
+def inside(formula: Formula) -> Iterator[Formula]:
+    """Yield a formula and all inside it."""
+    yield formula
+    match formula:
+        case Not(inner) | Exists(_, inner):
+            yield from inside(inner)
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from inside(part)
+
+
+def calls(number: Number) -> Iterator[Call]:
+    """Yield the functions in a number."""
+    match number:
+        case Call():
+            yield number
+        case Operation(_, left, right):
+            yield from calls(left)
+            yield from calls(right)
+
+
+def terms(formula: Formula) -> Iterator[Term]:
+    """Yield the terms in a formula, its own variables among them."""
+    for one in inside(formula):
+        match one:
+            case Atom(_, its):
+                yield from its
+            case Same(left, right):
+                yield from (left, right)
+            case Compare(_, left, right):
+                yield from (term for number in (left, right) for call in calls(number) for term in call.terms)
+
+
+def terms_of(change: Change) -> Iterator[Term]:
+    """Yield the terms in an effect."""
+    yield from terms(change.when)
+    if isinstance(change.what, Assignment):
+        numbers = (change.what.call, change.what.by)
+        yield from (term for number in numbers for call in calls(number) for term in call.terms)
+    else:
+        yield from terms(change.what)
+
+
+# ------------------------------------------------------------------------------------------------------------- writing
+
+
+def typed(variables: Sequence[Term]) -> str:
+    """Return terms with their types, as PDDL declares them."""
+    return " ".join(f"{one.name} - {one.type}" for one in variables)
+
+
+def formula_text(formula: Formula) -> str:
+    """Return a formula as PDDL."""
+    match formula:
+        case Atom(predicate, its):
+            return f"({' '.join([predicate, *(term.name for term in its)])})"
+        case Same(left, right):
+            return f"(= {left.name} {right.name})"
+        case Compare(sign, left, right):
+            return f"({sign} {number_text(left)} {number_text(right)})"
+        case Not(inner):
+            return f"(not {formula_text(inner)})"
+        case And(parts):
+            return f"(and {' '.join(map(formula_text, parts))})"
+        case Or(parts):
+            return f"(or {' '.join(map(formula_text, parts))})"
+        case Exists(variables, inner):
+            return f"(exists ({typed(variables)}) {formula_text(inner)})"
+
+
+def change_text(change: Change) -> str:
+    """Return an effect as PDDL."""
+    if isinstance(change.what, Assignment):
+        text = f"({change.what.operation} {number_text(change.what.call)} {number_text(change.what.by)})"
+    else:
+        text = formula_text(change.what)
+    text = text if change.when == TRUE else f"(when {formula_text(change.when)} {text})"
+    return f"(forall ({typed(change.variables)}) {text})" if change.variables else text
+
+
+def number_text(number: Number) -> str:
+    """Return a number as PDDL; one without end as a quotient."""
+    match number:
+        case Call(function, its):
+            return f"({' '.join([function, *(term.name for term in its)])})"
+        case Operation(sign, left, right):
+            return f"({sign} {number_text(left)} {number_text(right)})"
+        case Fraction():
+            text = written(number)
+            return f"(/ {number.numerator} {number.denominator})" if "/" in text else text
+
+
+def decimal(number: Fraction) -> str:
+    """Return a number without a calculation, cut off behind `DIGITS` places if it has no end."""
+    text = written(number)
+    return text if "/" not in text else written(Fraction(round(number * 10**DIGITS), 10**DIGITS))

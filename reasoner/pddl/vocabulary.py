@@ -1,0 +1,251 @@
+"""The names that a scene has in PDDL: types, objects, predicates and functions, and what is stated of them at first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import product
+
+from reasoner.amounts import Amount, Calculation, Expression, Measure
+from reasoner.language import walk
+from reasoner.pddl.formulas import FALSE as NEVER
+from reasoner.pddl.formulas import TRUE as ALWAYS
+from reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both, decimal, formula_text
+from reasoner.symbols import TRUE, Problem, Symbol, Witness
+
+WORLD = "World"
+"""A class whose only individual is what a predicate without arguments is about."""
+RESERVED = frozenset(
+    """all always and assign at-end at-most-once at-start constants decrease define derived different domain effect either end exists
+    forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number object objects or over
+    parameters precondition predicates preference problem requirements scale-down scale-up sometime sometime-after sometime-before start
+    total-cost total-time types undefined when within""".split()
+)
+
+
+class Vocabulary:
+    """The names of a problem in PDDL. No two are the same, whatever they name, since some readers have one table for all."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, domain = problem, problem.domain
+        self.situations = domain.situations
+        self.names: dict[tuple[str, str], str] = {}
+        self.taken = set(RESERVED)
+        self.used: dict[str, None] = {}  # situation types that are named as predicates
+        self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # predicates that nothing changes, with their rows
+        self.arity: dict[str, int] = {}
+        self.functions: dict[str, tuple[str, ...]] = {}  # with the types of their arguments
+        self.measured: dict[str, str] = {}  # relations that give a number, with their functions
+        self.counted: dict[str, str] = {}  # situation types that are amounts, with their functions
+        self.existing: dict[str, set[tuple[str, ...]]] = {}
+        for symbol in problem.initial:
+            self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
+        self.types, self.above = self._types()
+        self.lowest = {
+            member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)
+        }
+
+    def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
+        """Return the PDDL name for one of ours."""
+        if (kind, ours) not in self.names:
+            text = re.sub(r"[^0-9a-z_-]", "_", (wanted or ours).lower())
+            text = text if re.match(r"[a-z]", text) else f"x{text}"
+            while text in self.taken:
+                text += "_"
+            self.taken.add(text)
+            self.names[kind, ours] = text
+        return self.names[kind, ours]
+
+    # --------------------------------------------------------------------------------------------------------- types
+
+    def _types(self) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the type of each class that is one, and the type above each: any two are nested or disjoint."""
+        domain = self.problem.domain
+        behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
+        kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
+        conditions = [part for one in behaviors for condition in one.conditions for part in walk(condition)]
+        kinds += [part.kind for part in conditions if isinstance(part, Witness)]
+        chosen: dict[frozenset[str], str] = {}
+        for kind in sorted(dict.fromkeys(kinds), key=lambda one: -len(self.problem.members(one))):
+            members = self.problem.members(kind)
+            if members and all(not members & other or members <= other for other in chosen):
+                chosen.setdefault(members, kind)
+        names = {members: self.name("type", kind) for members, kind in chosen.items()}
+        above = {}
+        for members in chosen:  # from large to small
+            larger = [names[other] for other in chosen if members < other]
+            above[names[members]] = larger[-1] if larger else "object"
+        types = {kind: names[its] for kind in self.problem.classes if (its := self.problem.members(kind)) in names}
+        return types, above
+
+    def above_first(self) -> list[str]:
+        """Return the classes that are types, the larger ones first."""
+        return sorted(self.types, key=lambda kind: -len(self.problem.members(kind)))
+
+    def variable(self, name: str, kind: str) -> Term:
+        """Return a variable for the individuals of a class."""
+        return Term(name, self.types.get(kind, "object"), self.problem.members(kind))
+
+    def object(self, ours: str) -> Term:
+        """Return an individual."""
+        return Term(self.name("object", ours), "object", frozenset((ours,)))
+
+    # ----------------------------------------------------------------------------------------------------- predicates
+
+    def atom(self, predicate: str, terms: Sequence[Term]) -> Atom:
+        """Return a predicate with its arguments."""
+        self.arity[predicate] = len(terms)
+        return Atom(predicate, tuple(terms))
+
+    def about(self, situation: str, terms: Sequence[Term]) -> tuple[Term, ...]:
+        """Return the arguments of a symbol without the one that stands for the world."""
+        kinds = self.situations[situation].arguments
+        one = len(self.problem.classes.get(WORLD, ())) == 1
+        return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
+
+    def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
+        """Return that a symbol has a value; without one, that it is true."""
+        self.used[situation] = None
+        words = self.about(situation, terms)
+        return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
+
+    def is_a(self, term: Term, kind: str) -> Formula:
+        """Return that a term is an individual of a class."""
+        members = self.problem.members(kind)
+        if term.members <= members:
+            return ALWAYS
+        if not term.members & members:
+            return NEVER
+        return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
+
+    def guard(self, term: Term, kind: str) -> Formula:
+        """Return what a variable of a class has to meet besides its type."""
+        if kind in self.types:
+            return ALWAYS
+        return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
+
+    def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
+        """Return that a relation holds."""
+        return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
+
+    def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
+        """Return a predicate that holds for some rows and never changes."""
+        if not rows:
+            return NEVER
+        if not any(term.variable for term in terms):
+            return ALWAYS if tuple(next(iter(term.members)) for term in terms) in rows else NEVER
+        name = self.name("predicate", ours, wanted)
+        self.statics[name] = rows
+        return self.atom(name, terms)
+
+    def total(self, situation: str, terms: Sequence[Term]) -> bool:
+        """Return whether there is a symbol of a situation type for all that some terms can stand for."""
+        kind = self.situations[situation]
+        within = all(t.members <= self.problem.members(k) for k, t in zip(kind.arguments, terms, strict=True))
+        if kind.boolean:
+            return within
+        rows = self.existing.get(situation, set())
+        if within and len(rows) == self.symbols(situation):
+            return True
+        return all(row in rows for row in product(*(sorted(term.members) for term in terms)))
+
+    def symbols(self, situation: str) -> int:
+        """Return the number of symbols that a situation type would have if all existed."""
+        number = 1
+        for kind in self.situations[situation].arguments:
+            number *= len(self.problem.classes.get(kind, ()))
+        return number
+
+    def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
+        """Return that there is a symbol of a situation type for some terms."""
+        kind = self.situations[situation]
+        if self.total(situation, terms):
+            return ALWAYS
+        if kind.boolean:
+            return both(self.is_a(term, one) for one, term in zip(kind.arguments, terms, strict=True))
+        rows = frozenset(self.existing.get(situation, ()))
+        return self.static(f"has {situation}", f"has_{situation}", rows, terms)
+
+    # -------------------------------------------------------------------------------------------------------- numbers
+
+    def amount(self, situation: str, terms: Sequence[Term]) -> Call:
+        """Return the function that an amount is."""
+        name = self.name("function", situation, situation)
+        kinds = self.situations[situation].arguments
+        places = [Term(str(place)) for place in range(len(kinds))]
+        kept = {int(term.name) for term in self.about(situation, places)}
+        self.functions[name] = tuple(self.types.get(kind, "object") for i, kind in enumerate(kinds) if i in kept)
+        self.counted[situation] = name
+        return Call(name, self.about(situation, terms))
+
+    def measure(self, relation: str, terms: Sequence[Term]) -> Call:
+        """Return the function that gives the number of a relation."""
+        name = self.name("function", f"relation {relation}", relation)
+        self.functions[name] = ("object",) * len(terms)
+        self.measured[relation] = name
+        return Call(name, tuple(terms))
+
+    def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
+        """Return a calculation, whose variables are some terms."""
+        match expression:
+            case Amount(situation, arguments):
+                return self.amount(situation, self.terms(arguments, terms))
+            case Measure(relation, arguments):
+                return self.measure(relation, self.terms(arguments, terms))
+            case Calculation(sign, left, right):
+                return Operation(sign, self.number(left, terms), self.number(right, terms))
+            case Fraction():
+                return expression
+
+    def there(self, expression: Expression, terms: Mapping[str, Term]) -> Iterator[Formula]:
+        """Yield what has to hold so that all numbers in a calculation exist."""
+        match expression:
+            case Amount(situation, arguments):
+                yield self.exists(situation, self.terms(arguments, terms))
+            case Measure(relation, arguments):
+                rows = frozenset(row[:-1] for row in self.problem.relations.get(relation, ()))
+                its = self.terms(arguments, terms)
+                if not all(row in rows for row in product(*(sorted(term.members) for term in its))):
+                    yield self.static(f"has {relation}", f"has_{relation}", rows, its)
+            case Calculation(_, left, right):
+                yield from self.there(left, terms)
+                yield from self.there(right, terms)
+
+    def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
+        """Return the terms that some of our names are."""
+        return tuple(terms[name] if name in terms else self.object(name) for name in names)
+
+    # ---------------------------------------------------------------------------------------------------- statements
+
+    def facts(self) -> Iterator[str]:
+        """Yield what is stated at first of all that has been named."""
+        for symbol, value in self.problem.initial.items():
+            situation = self.situations[symbol.situation]
+            its = self.terms(symbol.arguments, {})
+            if symbol.situation in self.counted:
+                yield f"(= {self._call(symbol)} {decimal(Fraction(value))})"
+            elif symbol.situation in self.used and (value == TRUE or not situation.boolean):
+                yield formula_text(self.value(symbol.situation, its, None if situation.boolean else self.object(value)))
+        for situation_name in sorted(self.counted):
+            kinds = self.situations[situation_name].arguments
+            if not self.total(situation_name, [self.variable("?x", kind) for kind in kinds]):
+                for row in product(*(self.problem.classes.get(kind, ()) for kind in kinds)):
+                    if row not in self.existing.get(situation_name, ()):  # a number that nothing asks for
+                        yield f"(= {self._call(Symbol(situation_name, row))} 0)"
+        for relation, name in sorted(self.measured.items()):
+            for row in sorted(self.problem.relations.get(relation, ())):
+                words = " ".join([name, *(self.object(one).name for one in row[:-1])])
+                yield f"(= ({words}) {decimal(Fraction(row[-1]))})"
+        for predicate, rows in sorted(self.statics.items()):
+            for row in sorted(rows):
+                yield formula_text(self.atom(predicate, [self.object(one) for one in row]))
+
+    def _call(self, symbol: Symbol) -> str:
+        call = self.amount(symbol.situation, self.terms(symbol.arguments, {}))
+        return f"({' '.join([call.function, *(term.name for term in call.terms)])})"
+
+    def declared(self, ours: str) -> str:
+        """Return an object with its type."""
+        return f"{self.name('object', ours)} - {self.lowest.get(ours, 'object')}"
+
