@@ -112,7 +112,7 @@ FALSE: Formula = Or(())
 
 @dataclass(frozen=True)
 class Assignment:
-    """A function changes by a number: ``assign``, ``increase``, ``decrease`` or ``scale-up``."""
+    """A function changes by a number: ``assign``, ``increase`` or ``decrease``."""
 
     operation: str
     call: Call
@@ -151,7 +151,7 @@ def no(formula: Formula, yes: bool = True) -> Formula:
     """Return that a formula doesn't hold; with `yes` being False, the formula."""
     if not yes:
         return formula
-    if formula == TRUE or formula == FALSE:
+    if formula in (TRUE, FALSE):
         return FALSE if formula == TRUE else TRUE
     return formula.inner if isinstance(formula, Not) else Not(formula)
 
@@ -190,6 +190,8 @@ def inside(formula: Formula) -> Iterator[Formula]:
         case And(parts) | Or(parts):
             for part in parts:
                 yield from inside(part)
+        case Atom() | Same() | Compare():
+            return
 
 
 def calls(number: Number) -> Iterator[Call]:
@@ -200,6 +202,8 @@ def calls(number: Number) -> Iterator[Call]:
         case Operation(_, left, right):
             yield from calls(left)
             yield from calls(right)
+        case Fraction():
+            return
 
 
 def terms(formula: Formula) -> Iterator[Term]:
@@ -212,6 +216,8 @@ def terms(formula: Formula) -> Iterator[Term]:
                 yield from (left, right)
             case Compare(_, left, right):
                 yield from (term for number in (left, right) for call in calls(number) for term in call.terms)
+            case Not() | And() | Or() | Exists():
+                continue
 
 
 def terms_of(change: Change) -> Iterator[Term]:

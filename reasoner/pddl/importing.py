@@ -25,7 +25,7 @@ inequalities.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, reduce
@@ -206,7 +206,7 @@ class _Import:
             measured = {(*(self.name("object", w) for w in words), written(n)) for words, n in numbers.items()}
             relations[self.name("static", f"({function})", function)] = frozenset(measured)
         situations = self.situations(classes, parents)
-        behaviors = {b.name: b for b in map(self.behavior, pddl.actions)}
+        behaviors = {b.name: b for b in map(self.behavior, pddl.actions) if b is not None}
         initial = self.initial(situations, classes)
         goal, reach = self.goal(situations)
         if reach:
@@ -232,9 +232,10 @@ class _Import:
         for axiom in self.pddl.axioms:
             name, variables = self.places[axiom.predicate].situation, _Variables(self)
             parameters = [Parameter(self.term(p.name), self.kind(p.type)) for p in axiom.parameters]
-            conditions = tuple(c for form in conjuncts(axiom.condition) for c in variables.condition(form))
+            conditions = self.simplified(c for form in conjuncts(axiom.condition) for c in variables.condition(form))
             head = tuple(parameters) or (Parameter("?the_world", WORLD),)
-            found[name] = (*found.get(name, ()), Rule(name, head, (), tuple(dict.fromkeys(conditions))))
+            its = () if conditions is None else (Rule(name, head, (), tuple(dict.fromkeys(conditions))),)
+            found[name] = (*found.get(name, ()), *its)
         for one, other in circles(found):
             said = {ours: theirs for (_, theirs), ours in self.names.items()}
             raise PddlError(
@@ -321,7 +322,9 @@ class _Import:
         goal, variables = {**found, Symbol(name, (THE_WORLD,)): TRUE}, _Variables(self)
         if not single:
             return goal, None
-        conditions = tuple(c for part in parts for c in variables.condition(part))
+        conditions = self.simplified(c for part in parts for c in variables.condition(part))
+        if conditions is None:  # reached only where it is reached already
+            conditions = (ValueCondition(name, (THE_WORLD,), TRUE),)
         effect = ValueEffect(name, (THE_WORLD,), TRUE)
         reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
         return goal, reach
@@ -382,12 +385,43 @@ class _Import:
         value = place.value if place.part.counted is None else terms[place.part.counted]
         return ValueCondition(place.situation, (terms[place.part.key],), value)
 
-    def behavior(self, name: str) -> Behavior:
-        """Return the behaviour of an action."""
+    def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
+        """Return a conjunction without what always holds, or None if it never holds."""
+        found: list[Condition] = []
+        for condition in conditions:
+            holds: bool | None = None
+            match condition:
+                case AnyOf(alternatives, negated):
+                    groups = [group for group in map(self.simplified, alternatives) if group is not None]
+                    holds = True if () in groups else None if groups else False
+                    condition = AnyOf(tuple(groups), negated)
+                case Witness(_, kind, conditions_inside, negated):
+                    group = self.simplified(conditions_inside)
+                    holds = False if group is None else None if group else self.inhabited(kind)
+                    condition = replace(condition, conditions=group or ())
+                case EqualityCondition(left, right, negated):
+                    constant = not left.startswith("?") and not right.startswith("?")
+                    holds = True if left == right else False if constant else None
+                case ValueCondition() | RelationCondition() | ClassCondition() | Comparison():
+                    negated = False
+            if holds is None:
+                found.append(condition)
+            elif holds is negated:
+                return None
+        return tuple(found)
+
+    def inhabited(self, kind: str) -> bool:
+        """Return whether a class that is a type has an individual."""
+        return any(self.sets[theirs] for (of, theirs), ours in self.names.items() if of == "type" and ours == kind)
+
+    def behavior(self, name: str) -> Behavior | None:
+        """Return the behaviour of an action; None if it can never be done."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
-        conditions = tuple(c for form in conjuncts(action.precondition) for c in variables.condition(form))
-        conditions = tuple(dict.fromkeys(conditions))
+        found = self.simplified(c for form in conjuncts(action.precondition) for c in variables.condition(form))
+        if found is None:
+            return None
+        conditions = tuple(dict.fromkeys(found))
         effects = self.value_effects(name, variables, conditions)
         amounts = self.amount_effects(name, variables)
         used = {word for atom in words_in(action.precondition, action.effect) for word in atom}
@@ -459,9 +493,11 @@ class _Import:
                     "state one of each in :init"
                 )
             for named in self.instances(effect):
-                when = tuple(
+                when = self.simplified(
                     c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
                 )
+                if when is None:
+                    continue
                 at, by = self.number(effect.function, named), self.number(effect.amount, named)
                 assert isinstance(at, Amount)
                 if effect.head == "scale-down":
@@ -483,9 +519,11 @@ class _Import:
         begins: list[ValueEffect] = []
         effects = self.effects[name]
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
-            when = tuple(
+            when = self.simplified(
                 c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
             )
+            if when is None:
+                continue
             at = self.atom(effect.atom)
             put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
             at = replace(at, arguments=put[:-1], value=put[-1])

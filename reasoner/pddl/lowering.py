@@ -18,16 +18,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, terms_of
+from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
 from reasoner.derivation import circular
+from reasoner.pddl.absence import Kept
 from reasoner.pddl.formulas import FALSE as NEVER
 from reasoner.pddl.formulas import TRUE as ALWAYS
 from reasoner.pddl.formulas import (
     Assignment,
     Atom,
+    Call,
     Change,
     Compare,
     Formula,
@@ -53,15 +55,15 @@ from reasoner.symbols import (
     EqualityCondition,
     Problem,
     RelationCondition,
-    Rule,
     Symbol,
     ValueCondition,
     ValueEffect,
     Witness,
-    allowed,
 )
 
 Terms = Mapping[str, Term]
+CASES = 4
+"""An effect whose condition a symbol doesn't meet with at most so many values becomes an action for each of these cases."""
 
 
 @dataclass(frozen=True)
@@ -113,100 +115,20 @@ class Lowering:
         self.problem, self.behaviors, self.words = problem, behaviors, words
         self.rules = problem.domain.rules
         self.recursive = circular(self.rules)
-        self.contrary: dict[str, set[str]] = {}  # situation types whose contrary is kept, and of which values
-        self.free: dict[tuple[str, str], frozenset[str]] = {}  # class and situation type, and the values asked about
-        for behavior in behaviors:
-            for condition in behavior.preconditions:
-                if absent := self.absent(condition):
-                    self.keep(behavior, *absent)
-
-    # ------------------------------------------------------------------------------------------- kept up to date
-
-    def absent(self, condition: Condition) -> tuple[str, str, str] | None:
-        """Return class, situation type and value of "no individual of the class has this value"."""
-        match condition:
-            case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
-                known = situation not in self.rules and not self.words.situations[situation].boolean
-                if about == variable != value and known:
-                    return kind, situation, value
-        return None
-
-    def keep(self, behavior: Behavior, kind: str, situation: str, value: str) -> None:
-        """Note what has to be kept up to date so that a behaviour can ask whether nothing has a value."""
-        if (kind, situation) not in self.free and self.exclusive(kind, situation):
-            self.free[kind, situation] = self.asked(kind, situation)
-        if (kind, situation) not in self.free:
-            self.contrary.setdefault(situation, set()).update(self.members(behavior, value))
-
-    def members(self, behavior: Behavior, term: str) -> frozenset[str]:
-        """Return what a term of a behaviour can stand for."""
-        return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
-
-    def asked(self, kind: str, situation: str) -> frozenset[str]:
-        """Return the values of which behaviours ask whether no individual of a class has them."""
-        found = frozenset[str]()
-        for behavior in self.behaviors:
-            for absent in map(self.absent, behavior.preconditions):
-                if absent and absent[:2] == (kind, situation):
-                    found |= self.members(behavior, absent[2])
-        return found
-
-    def exclusive(self, kind: str, situation: str) -> bool:
-        """Return whether no two individuals of a class can come to have the same value, of those asked about."""
-        asked, its = self.asked(kind, situation), self.problem.members(kind)
-        held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
-        held = [value for value in held if value in asked]
-        if len(held) > len(set(held)):
-            return False
-        for behavior in self.behaviors:
-            empty = {a[2] for a in map(self.absent, behavior.preconditions) if a and a[:2] == (kind, situation)}
-            filling = [
-                effect
-                for effect in behavior.effects
-                if effect.situation == situation
-                and self.members(behavior, effect.arguments[0]) & its
-                and self.members(behavior, effect.value) & asked
-            ]
-            if len(filling) > 1 or any(effect.when or effect.value not in empty for effect in filling):
-                return False
-        return True
-
-    def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
-        """Return that a symbol doesn't have a value, as a predicate of its own."""
-        words = self.words
-        name = words.name("predicate", f"not {situation}", f"not_{situation}")
-        return words.atom(name, (*words.about(situation, terms), value))
-
-    def nobody(self, kind: str, situation: str, value: Term) -> Atom:
-        """Return that no individual of a class has a value, as a predicate of its own."""
-        name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
-        return self.words.atom(name, (value,))
-
-    def kept(self) -> Iterator[Atom]:
-        """Yield what holds at first of what is kept up to date."""
-        state = self.problem.initial
-        for situation, values in sorted(self.contrary.items()):
-            for symbol, has in state.items():
-                if symbol.situation == situation:
-                    terms = self.words.terms(symbol.arguments, {})
-                    yield from (self.lacks(situation, terms, self.words.object(v)) for v in sorted(values - {has}))
-        for (kind, situation), values in self.free.items():
-            its = self.problem.members(kind)
-            held = {has for s, has in state.items() if s.situation == situation and s.arguments[0] in its}
-            yield from (self.nobody(kind, situation, self.words.object(v)) for v in sorted(values - held))
+        self.kept = Kept(problem, behaviors, words)
 
     # ------------------------------------------------------------------------------------------------- conditions
 
     def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> Formula:
         """Return that a conjunction holds, for some objects in place of what isn't bound yet."""
-        own, terms = self.bound(conditions, terms, scope)
-        parts = [self.words.guard(terms[name], scope.kinds[name]) for name in own]
-        parts += [self.formula(condition, terms, scope) for condition in conditions]
-        return some((terms[name] for name in own), both(parts))
+        own, inside = self.bound(conditions, terms, scope)
+        parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
+        parts += [self.formula(condition, inside, scope) for condition in conditions]
+        return some((inside[name] for name in own), both(parts))
 
     def bound(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> tuple[list[str], Terms]:
         """Return the variables that a conjunction names and that aren't bound yet, and all terms with them."""
-        own = sorted(set().union(*map(named, conditions)) - terms.keys())
+        own = sorted(set[str]().union(*map(named, conditions)) - terms.keys())
         fresh = {name: self.words.variable(scope.fresh(name), scope.kinds[name]) for name in own}
         return own, {**terms, **fresh}
 
@@ -224,8 +146,8 @@ class Lowering:
                 return no(found, negated)
             case RelationCondition(relation, arguments, negated):
                 return no(words.relation(relation, words.terms(arguments, terms)), negated)
-            case ClassCondition(term, kind, negated):
-                return no(words.is_a(words.terms((term,), terms)[0], kind), negated)
+            case ClassCondition(of, kind, negated):
+                return no(words.is_a(words.terms((of,), terms)[0], kind), negated)
             case EqualityCondition(left, right, negated):
                 return no(same(*words.terms((left, right), terms)), negated)
             case Witness(variable, kind, conditions, negated):
@@ -267,21 +189,57 @@ class Lowering:
 
     # ---------------------------------------------------------------------------------------------------- actions
 
+    def cases(self, behavior: Behavior) -> Iterator[Behavior]:
+        """Yield a behaviour for each case of its effects under conditions, as far as these are few: without such effects.
+
+        One value of one symbol is such a condition: either the symbol has it, or it has one of at most `CASES` others.
+        """
+        for effect in behavior.effects:
+            match effect.when:
+                case (ValueCondition(situation, arguments, value, False) as when,):
+                    words, kinds = self.words.situations[situation], behavior.kinds
+                    bound = set[str]().union(*map(named, behavior.preconditions), (p.name for p in behavior.parameters))
+                    fits = not words.boolean and bound.issuperset(a for a in arguments if a in kinds)
+                    if not fits or value in bound or not self.total(behavior, situation, arguments):
+                        continue
+                    others = sorted(self.range_of(situation) - self.kept.members(behavior, value))
+                    if len(others) <= CASES:
+                        left = tuple(one for one in behavior.effects if when not in one.when)
+                        made = tuple(
+                            replace(one, when=tuple(c for c in one.when if c != when)) for one in behavior.effects
+                        )
+                        yield from self.cases(
+                            replace(behavior, preconditions=(*behavior.preconditions, when), effects=made)
+                        )
+                        for other in others:
+                            asked = (*behavior.preconditions, replace(when, value=other))
+                            yield from self.cases(replace(behavior, preconditions=asked, effects=left))
+                        return
+                case _:
+                    continue
+        yield behavior
+
+    def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
+        """Return whether there is a symbol of a situation type for all that some terms of a behaviour can stand for."""
+        terms = [Term(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
+        return self.words.total(situation, terms)
+
     def action(self, behavior: Behavior) -> Action | None:
         """Return a behaviour as an action; nothing for one that can never be done, or that changes nothing."""
         scope, terms = Scope(behavior.kinds), dict[str, Term]()
-        used = set().union(*map(named, behavior.preconditions), set(terms_of(behavior.price) if behavior.price else ()))
+        used = set[str]().union(*map(named, behavior.preconditions), terms_of(behavior.price or Fraction(0)))
         for one in (*behavior.parameters, *(v for v in behavior.variables if v.name in used)):
             terms[one.name] = self.words.variable(scope.fresh(one.name), one.kind)
             scope.parameters.append(terms[one.name])
             scope.needs.append(self.words.guard(terms[one.name], one.kind))
-        conditions = [*behavior.asked, *allowed(behavior, self.problem.domain.situations)]
-        for condition in conditions:
+        for condition in behavior.asked:
             match condition:
                 case ValueCondition(situation, arguments, value, False) if not self.words.situations[situation].boolean:
                     key = situation, self.words.terms(arguments, terms)
                     scope.values.setdefault(key, self.words.terms((value,), terms)[0])
-        for condition in conditions:
+                case _:
+                    pass
+        for condition in behavior.asked:
             self.need(condition, terms, scope)
         cost = self.cost(behavior, terms, scope)
         changes = [*self.value_changes(behavior, terms, scope), *self.amount_changes(behavior, terms, scope)]
@@ -314,22 +272,22 @@ class Lowering:
     def need(self, condition: Condition, terms: Terms, scope: Scope) -> None:
         """Add a precondition."""
         words = self.words
-        if absent := self.absent(condition):
+        if absent := self.kept.absent(condition):
             kind, situation, said = absent
             value = words.terms((said,), terms)[0]
-            if (kind, situation) in self.free:
-                scope.needs.append(self.nobody(kind, situation, value))
+            if (kind, situation) in self.kept.free:
+                scope.needs.append(self.kept.nobody(kind, situation, value))
             else:
-                its = [words.object(one) for one in sorted(self.problem.members(kind))]
-                there = [one for one in its if words.exists(situation, (one,)) == ALWAYS]
-                scope.needs.extend(self.lacks(situation, (one,), value) for one in there)
+                members = map(words.object, sorted(self.problem.members(kind)))
+                there = [one for one in members if words.exists(situation, (one,)) == ALWAYS]
+                scope.needs.extend(self.kept.lacks(situation, (one,), value) for one in there)
             return
         match condition:
             case ValueCondition(situation, arguments, said, True):
                 its = words.terms(arguments, terms)
                 if not words.situations[situation].boolean and words.total(situation, its):
-                    value = words.terms((said,), terms)[0]
-                    scope.needs.append(no(same(self.known(situation, its, "other", scope), value)))
+                    value, other = words.terms((said,), terms)[0], self.known(situation, its, "other", scope)
+                    scope.needs.append(no(same(other, value)) if value.variable else words.differs(other, value))
                     return
             case Witness(variable, kind, conditions, False):
                 term = words.variable(scope.fresh(variable), kind)
@@ -340,6 +298,8 @@ class Lowering:
                 for one in conditions:
                     self.need(one, inside, scope)
                 return
+            case _:
+                pass
         scope.needs.append(self.formula(condition, terms, scope))
 
     def cost(self, behavior: Behavior, terms: Terms, scope: Scope) -> Number:
@@ -411,46 +371,68 @@ class Lowering:
         ]  # fmt: skip
         if before:
             old = before[0]
-        elif (situation, its) in scope.values or (when == ALWAYS and words.total(situation, its)):
+        elif (situation, its) in scope.values or (when == ALWAYS and not own and words.total(situation, its)):
             old = self.known(situation, its, "old", scope)
         else:
             old = Term(scope.fresh("old"), "object", self.range_of(situation))
-            yield Change(words.value(situation, its, new), when, own)
-            own, when = (*own, old), both([when, words.value(situation, its, old)])
         if old == new:
             return
-        yield Change(Not(words.value(situation, its, old)), when, own)
         yield Change(words.value(situation, its, new), when, own)
-        other = both([when, no(same(old, new))])
-        if asked := self.contrary.get(situation, set()):
+        if old.name not in {term.name for term in (*scope.parameters, *own)} and old.variable:
+            own, when = (*own, old), both([when, words.value(situation, its, old)])
+        yield Change(Not(words.value(situation, its, old)), when, own)
+        moves = self.kept.lacks(situation, its, new) in scope.needs if situation in self.kept.contrary else False
+        moves |= any(
+            self.kept.nobody(kind, situation, new) in scope.needs and words.is_a(its[0], kind) == ALWAYS
+            for kind, name in self.kept.free
+            if name == situation
+        )
+        other, both_asked = when if moves else both([when, no(same(old, new))]), old.members & new.members
+        if asked := frozenset(self.kept.contrary.get(situation, ())):
             if old.members & asked and other != NEVER:
-                yield Change(self.lacks(situation, its, old), other, own)
+                yield Change(self.kept.lacks(situation, its, old), other if both_asked & asked else when, own)
             if new.members & asked:
-                yield Change(Not(self.lacks(situation, its, new)), when, own)
-        for (kind, name), asked_of in self.free.items():
+                yield Change(Not(self.kept.lacks(situation, its, new)), when, own)
+        for (kind, name), asked_of in self.kept.free.items():
             member = words.is_a(its[0], kind) if name == situation else NEVER
             if member == NEVER:
                 continue
             if old.members & asked_of and other != NEVER:
-                yield Change(self.nobody(kind, situation, old), both([other, member]), own)
+                left = other if both_asked & asked_of else when
+                yield Change(self.kept.nobody(kind, situation, old), both([left, member]), own)
             if new.members & asked_of:
-                yield Change(Not(self.nobody(kind, situation, new)), both([when, member]), own)
+                yield Change(Not(self.kept.nobody(kind, situation, new)), both([when, member]), own)
 
     def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[Change]:
-        """Yield what a behaviour's effects on amounts change; it can't be done where one of them would be no number."""
-        changed = [effect.situation for effect in behavior.amounts]
+        """Yield what a behaviour's effects on amounts change; it can't be done where one of them would be no number.
+
+        What is assigned to a symbol or multiplied, and then increased, is one assignment: no planner makes several in a row.
+        """
+        groups: dict[tuple[str, Call, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
             cell, inside = self.cell(effect, terms, scope)
-            if cell.when == NEVER:
-                continue
-            there = both(self.words.there(effect.amount, inside))
-            scope.needs.append(no(some(cell.own, both([cell.when, no(there)]))))
-            at, by = self.words.amount(effect.situation, cell.terms), self.words.number(effect.amount, inside)
-            operation = effect.operation
-            if operation == "scale":  # which many planners don't read
-                alone = changed.count(effect.situation) == 1
-                operation, by = ("assign", Operation("*", at, by)) if alone else ("scale-up", by)
-            yield Change(Assignment(operation, at, by), cell.when, cell.own)
+            if cell.when != NEVER:
+                there = both(self.words.there(effect.amount, inside))
+                scope.needs.append(no(some(cell.own, both([cell.when, no(there)]))))
+                at = self.words.amount(effect.situation, cell.terms)
+                group = groups.setdefault((effect.situation, at, cell.when, cell.own), [])
+                by = self.words.number(effect.amount, inside)
+                group.append((effect.operation, by, effect.operation != "scale" or not situations_in(effect.amount)))
+                if effect.operation in ("assign", "scale"):
+                    self.words.assigned.add(effect.situation)
+        for (situation, at, when, own), changes in groups.items():
+            result: Number = at
+            for operation, by, _ in changes:
+                sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
+                result = by if sign is None else Operation(sign, result, by)
+            quantity = self.words.situations[situation].quantity
+            for sign, limit in (("<", quantity.least), (">", quantity.most)) if quantity else ():
+                if limit is not None and all(linear for _, _, linear in changes):
+                    scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
+            if all(operation in ("increase", "decrease") for operation, _, _ in changes):
+                yield from (Change(Assignment(operation, at, by), when, own) for operation, by, _ in changes)
+            else:
+                yield Change(Assignment("assign", at, result), when, own)
 
     # ------------------------------------------------------------------------------------------------------- goals
 

@@ -536,15 +536,16 @@ class _Reader:
         if len(wanted) != len(got):
             raise self.fail(form, f"{what} '{form.head}' takes {len(wanted)} arguments, got {len(got)}")
         for item, declared in zip(got, wanted, strict=True):
-            kind = self.term(item, variables)
-            above = self.pddl.above(kind)
-            if (
-                declared.type not in above
-                and kind not in self.pddl.above(declared.type)
-                and not self.meet(kind, declared)
-            ):
-                text = self.word(item, "a term").text
-                raise self.fail(item, f"'{text}' is a {kind}; {what} '{form.head}' takes a {declared.type} there")
+            kind, text = self.term(item, variables), self.word(item, "a term").text
+            fits = declared.type in self.pddl.above(kind)
+            if text in variables:  # which may stand for an object of the type
+                fits = fits or kind in self.pddl.above(declared.type) or self.meet(kind, declared)
+            if not fits:
+                dash = declared.type in self.pddl.objects and kind == "object"
+                hint = f"; is there no '-' before '{declared.type}' in (:objects …)?" if dash else ""
+                raise self.fail(
+                    item, f"'{text}' is of type {kind}; {what} '{form.head}' takes a {declared.type} there{hint}"
+                )
         return (form.head, *(self.word(item, "a term").text for item in got))
 
     def meet(self, kind: str, declared: Typed) -> bool:

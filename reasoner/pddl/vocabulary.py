@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 
@@ -11,17 +11,18 @@ from reasoner.amounts import Amount, Calculation, Expression, Measure
 from reasoner.language import walk
 from reasoner.pddl.formulas import FALSE as NEVER
 from reasoner.pddl.formulas import TRUE as ALWAYS
-from reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both, decimal, formula_text
-from reasoner.symbols import TRUE, Problem, Symbol, Witness
+from reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both
+from reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
 """A class whose only individual is what a predicate without arguments is about."""
-RESERVED = frozenset(
-    """all always and assign at-end at-most-once at-start constants decrease define derived different domain effect either end exists
-    forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number object objects or over
-    parameters precondition predicates preference problem requirements scale-down scale-up sometime sometime-after sometime-before start
-    total-cost total-time types undefined when within""".split()
-)
+RESERVED = """
+all always and assign at-end at-most-once at-start constants decrease define derived domain effect either end
+exists forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number
+object objects or over parameters precondition predicates preference problem requirements scale-down scale-up
+sometime sometime-after sometime-before start total-cost total-time types undefined when within
+"""
+"""Words that PDDL has a meaning for."""
 
 
 class Vocabulary:
@@ -31,20 +32,19 @@ class Vocabulary:
         self.problem, domain = problem, problem.domain
         self.situations = domain.situations
         self.names: dict[tuple[str, str], str] = {}
-        self.taken = set(RESERVED)
+        self.taken = set(RESERVED.split())
         self.used: dict[str, None] = {}  # situation types that are named as predicates
         self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # predicates that nothing changes, with their rows
         self.arity: dict[str, int] = {}
-        self.functions: dict[str, tuple[str, ...]] = {}  # with the types of their arguments
+        self.functions: dict[str, list[set[str]]] = {}  # with the types of the terms that are their arguments
         self.measured: dict[str, str] = {}  # relations that give a number, with their functions
         self.counted: dict[str, str] = {}  # situation types that are amounts, with their functions
+        self.assigned: set[str] = set()  # situation types that are amounts and get values
         self.existing: dict[str, set[tuple[str, ...]]] = {}
         for symbol in problem.initial:
             self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
         self.types, self.above = self._types()
-        self.lowest = {
-            member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)
-        }
+        self.lowest = {member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)}
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
         """Return the PDDL name for one of ours."""
@@ -66,6 +66,7 @@ class Vocabulary:
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
         conditions = [part for one in behaviors for condition in one.conditions for part in walk(condition)]
         kinds += [part.kind for part in conditions if isinstance(part, Witness)]
+        kinds += [kind for one in domain.situations.values() for kind in one.arguments if one.quantity is not None]
         chosen: dict[frozenset[str], str] = {}
         for kind in sorted(dict.fromkeys(kinds), key=lambda one: -len(self.problem.members(one))):
             members = self.problem.members(kind)
@@ -89,7 +90,7 @@ class Vocabulary:
 
     def object(self, ours: str) -> Term:
         """Return an individual."""
-        return Term(self.name("object", ours), "object", frozenset((ours,)))
+        return Term(self.name("object", ours), self.lowest.get(ours, "object"), frozenset((ours,)))
 
     # ----------------------------------------------------------------------------------------------------- predicates
 
@@ -128,6 +129,14 @@ class Vocabulary:
     def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
         """Return that a relation holds."""
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
+
+    def differs(self, term: Term, constant: Term) -> Formula:
+        """Return that a term isn't some individual, for planners that don't know equality."""
+        rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
+        found = self.static(
+            "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)
+        )
+        return found if term.members & constant.members else ALWAYS
 
     def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
         """Return a predicate that holds for some rows and never changes."""
@@ -172,19 +181,31 @@ class Vocabulary:
     def amount(self, situation: str, terms: Sequence[Term]) -> Call:
         """Return the function that an amount is."""
         name = self.name("function", situation, situation)
-        kinds = self.situations[situation].arguments
-        places = [Term(str(place)) for place in range(len(kinds))]
-        kept = {int(term.name) for term in self.about(situation, places)}
-        self.functions[name] = tuple(self.types.get(kind, "object") for i, kind in enumerate(kinds) if i in kept)
         self.counted[situation] = name
-        return Call(name, self.about(situation, terms))
+        return self.call(name, self.about(situation, terms))
 
     def measure(self, relation: str, terms: Sequence[Term]) -> Call:
         """Return the function that gives the number of a relation."""
         name = self.name("function", f"relation {relation}", relation)
-        self.functions[name] = ("object",) * len(terms)
         self.measured[relation] = name
+        return self.call(name, terms)
+
+    def call(self, name: str, terms: Sequence[Term]) -> Call:
+        """Return a function with its arguments."""
+        for types, term in zip(self.functions.setdefault(name, [set() for _ in terms]), terms, strict=True):
+            types.add(term.type)
         return Call(name, tuple(terms))
+
+    def common(self, types: Iterable[str]) -> str:
+        """Return the lowest type above some."""
+        chains = [list(self.upwards(one)) for one in sorted(types)]
+        return next((one for one in chains[0] if all(one in chain for chain in chains)), "object")
+
+    def upwards(self, kind: str) -> Iterator[str]:
+        """Yield a type and all above it."""
+        while kind != "object":
+            yield kind
+            kind = self.above[kind]
 
     def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
         """Return a calculation, whose variables are some terms."""
@@ -211,6 +232,8 @@ class Vocabulary:
             case Calculation(_, left, right):
                 yield from self.there(left, terms)
                 yield from self.there(right, terms)
+            case Fraction():
+                return
 
     def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
         """Return the terms that some of our names are."""
@@ -218,34 +241,35 @@ class Vocabulary:
 
     # ---------------------------------------------------------------------------------------------------- statements
 
-    def facts(self) -> Iterator[str]:
-        """Yield what is stated at first of all that has been named."""
+    def facts(self) -> Iterator[Atom | tuple[Call, Fraction]]:
+        """Yield what is stated at first of all that has been named: atoms, and functions with their numbers."""
         for symbol, value in self.problem.initial.items():
-            situation = self.situations[symbol.situation]
-            its = self.terms(symbol.arguments, {})
+            boolean, its = self.situations[symbol.situation].boolean, self.terms(symbol.arguments, {})
             if symbol.situation in self.counted:
-                yield f"(= {self._call(symbol)} {decimal(Fraction(value))})"
-            elif symbol.situation in self.used and (value == TRUE or not situation.boolean):
-                yield formula_text(self.value(symbol.situation, its, None if situation.boolean else self.object(value)))
-        for situation_name in sorted(self.counted):
-            kinds = self.situations[situation_name].arguments
-            if not self.total(situation_name, [self.variable("?x", kind) for kind in kinds]):
-                for row in product(*(self.problem.classes.get(kind, ()) for kind in kinds)):
-                    if row not in self.existing.get(situation_name, ()):  # a number that nothing asks for
-                        yield f"(= {self._call(Symbol(situation_name, row))} 0)"
-        for relation, name in sorted(self.measured.items()):
+                yield self.amount(symbol.situation, its), Fraction(value)
+            elif symbol.situation in self.used and (value == TRUE or not boolean):
+                yield self.value(symbol.situation, its, None if boolean else self.object(value))
+        every = dict.fromkeys(one for members in self.problem.classes.values() for one in members)
+        for situation in sorted(self.assigned):  # numbers that no action reads, for readers that want one of each
+            kinds = self.situations[situation].arguments
+            types = iter(map(self.common, self.functions[self.counted[situation]]))
+            kept = self.about(situation, [Term(str(place)) for place in range(len(kinds))])
+            wide = {int(term.name): next(types) for term in kept}
+            things = [
+                [one for one in every if wide[i] in ("object", *self.upwards(self.lowest.get(one, "object")))]
+                if i in wide
+                else self.problem.classes[kind]
+                for i, kind in enumerate(kinds)
+            ]
+            missing = (row for row in product(*things) if row not in self.existing.get(situation, ()))
+            yield from ((self.amount(situation, self.terms(row, {})), Fraction(0)) for row in missing)
+        for relation in sorted(self.measured):
             for row in sorted(self.problem.relations.get(relation, ())):
-                words = " ".join([name, *(self.object(one).name for one in row[:-1])])
-                yield f"(= ({words}) {decimal(Fraction(row[-1]))})"
+                yield self.measure(relation, self.terms(row[:-1], {})), Fraction(row[-1])
         for predicate, rows in sorted(self.statics.items()):
             for row in sorted(rows):
-                yield formula_text(self.atom(predicate, [self.object(one) for one in row]))
-
-    def _call(self, symbol: Symbol) -> str:
-        call = self.amount(symbol.situation, self.terms(symbol.arguments, {}))
-        return f"({' '.join([call.function, *(term.name for term in call.terms)])})"
+                yield self.atom(predicate, self.terms(row, {}))
 
     def declared(self, ours: str) -> str:
         """Return an object with its type."""
         return f"{self.name('object', ours)} - {self.lowest.get(ours, 'object')}"
-

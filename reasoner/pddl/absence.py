@@ -1,0 +1,101 @@
+"""What an export keeps up to date so that an action can ask whether nothing has a value: "free", or one contrary per object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from reasoner.pddl.formulas import Atom, Term
+from reasoner.pddl.vocabulary import Vocabulary
+from reasoner.symbols import Behavior, Condition, Problem, ValueCondition, Witness
+
+
+class Kept:
+    """Predicates of the export that say what isn't so.
+
+    `contrary` has the situation types whose contrary is kept, with the values of which it is; `free` has a class and a situation
+    type for which no two individuals can have the same value, with the values that are asked about.
+    """
+
+    def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
+        self.problem, self.behaviors, self.words = problem, behaviors, words
+        self.contrary: dict[str, set[str]] = {}
+        self.free: dict[tuple[str, str], frozenset[str]] = {}
+        for behavior in behaviors:
+            for condition in behavior.preconditions:
+                if absent := self.absent(condition):
+                    self.keep(behavior, *absent)
+
+    def absent(self, condition: Condition) -> tuple[str, str, str] | None:
+        """Return class, situation type and value of "no individual of the class has this value"."""
+        match condition:
+            case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
+                known = situation not in self.problem.domain.rules and not self.words.situations[situation].boolean
+                if about == variable != value and known:
+                    return kind, situation, value
+            case _:
+                pass
+        return None
+
+    def keep(self, behavior: Behavior, kind: str, situation: str, value: str) -> None:
+        """Note what has to be kept up to date so that a behaviour can ask whether nothing has a value."""
+        if (kind, situation) not in self.free and self.exclusive(kind, situation):
+            self.free[kind, situation] = self.asked(kind, situation)
+        if (kind, situation) not in self.free:
+            self.contrary.setdefault(situation, set()).update(self.members(behavior, value))
+
+    def members(self, behavior: Behavior, term: str) -> frozenset[str]:
+        """Return what a term of a behaviour can stand for."""
+        return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
+
+    def asked(self, kind: str, situation: str) -> frozenset[str]:
+        """Return the values of which behaviours ask whether no individual of a class has them."""
+        found = frozenset[str]()
+        for behavior in self.behaviors:
+            for absent in map(self.absent, behavior.preconditions):
+                if absent and absent[:2] == (kind, situation):
+                    found |= self.members(behavior, absent[2])
+        return found
+
+    def exclusive(self, kind: str, situation: str) -> bool:
+        """Return whether no two individuals of a class can come to have the same value, of those asked about."""
+        asked, its = self.asked(kind, situation), self.problem.members(kind)
+        held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
+        held = [value for value in held if value in asked]
+        if len(held) > len(set(held)):
+            return False
+        for behavior in self.behaviors:
+            empty = {a[2] for a in map(self.absent, behavior.preconditions) if a and a[:2] == (kind, situation)}
+            filling = [
+                effect
+                for effect in behavior.effects
+                if effect.situation == situation
+                and self.members(behavior, effect.arguments[0]) & its
+                and self.members(behavior, effect.value) & asked
+            ]
+            if len(filling) > 1 or any(effect.when or effect.value not in empty for effect in filling):
+                return False
+        return True
+
+    def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
+        """Return that a symbol doesn't have a value, as a predicate of its own."""
+        words = self.words
+        name = words.name("predicate", f"not {situation}", f"not_{situation}")
+        return words.atom(name, (*words.about(situation, terms), value))
+
+    def nobody(self, kind: str, situation: str, value: Term) -> Atom:
+        """Return that no individual of a class has a value, as a predicate of its own."""
+        name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
+        return self.words.atom(name, (value,))
+
+    def facts(self) -> Iterator[Atom]:
+        """Yield what holds at first of what is kept up to date."""
+        state = self.problem.initial
+        for situation, values in sorted(self.contrary.items()):
+            for symbol, has in state.items():
+                if symbol.situation == situation:
+                    terms = self.words.terms(symbol.arguments, {})
+                    yield from (self.lacks(situation, terms, self.words.object(v)) for v in sorted(values - {has}))
+        for (kind, situation), asked in self.free.items():
+            its = self.problem.members(kind)
+            held = {has for s, has in state.items() if s.situation == situation and s.arguments[0] in its}
+            yield from (self.nobody(kind, situation, self.words.object(v)) for v in sorted(asked - held))
