@@ -408,7 +408,7 @@ class _Import:
                 found.append(condition)
             elif holds is negated:
                 return None
-        return tuple(found)
+        return None if any(replace(one, negated=not one.negated) in found for one in found) else tuple(found)
 
     def inhabited(self, kind: str) -> bool:
         """Return whether a class that is a type has an individual."""
@@ -423,7 +423,7 @@ class _Import:
             return None
         conditions = tuple(dict.fromkeys(found))
         effects = self.value_effects(name, variables, conditions)
-        amounts = self.amount_effects(name, variables)
+        amounts = self.amount_effects(name, variables, conditions)
         used = {word for atom in words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
@@ -481,7 +481,9 @@ class _Import:
             return Amount(self.name("situation", f"({item.head})"), terms or (THE_WORLD,))
         return Measure(self.name("static", f"({item.head})"), terms)
 
-    def amount_effects(self, name: str, variables: _Variables) -> tuple[AmountEffect, ...]:
+    def amount_effects(
+        self, name: str, variables: _Variables, conditions: Sequence[Condition]
+    ) -> tuple[AmountEffect, ...]:
         """Return an action's effects on amounts."""
         found = []
         for effect in self.numeric[name]:
@@ -496,7 +498,7 @@ class _Import:
                 when = self.simplified(
                     c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
                 )
-                if when is None:
+                if when is None or self.simplified((*conditions, *when)) is None:
                     continue
                 at, by = self.number(effect.function, named), self.number(effect.amount, named)
                 assert isinstance(at, Amount)
@@ -522,7 +524,7 @@ class _Import:
             when = self.simplified(
                 c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
             )
-            if when is None:
+            if when is None or self.simplified((*conditions, *when)) is None:
                 continue
             at = self.atom(effect.atom)
             put = tuple(named.get(a, a) for a in (*at.arguments, at.value))
