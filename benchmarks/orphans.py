@@ -74,14 +74,14 @@ def served(scene: Path) -> None:
 
 
 def begun(run: Callable[[], object]) -> int:
-    """Run something in a process, and session, of its own; return its number."""
+    """Run something in a process, and process group, of its own; return its number."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python warns of forking beside threads
         child = os.fork()
     if child == 0:
         code = 1
         try:
-            os.setsid()
+            os.setpgid(0, 0)
             faulthandler.disable()
             signal.signal(signal.SIGINT, signal.default_int_handler)
             nowhere = os.open(os.devnull, os.O_RDWR)
@@ -91,6 +91,7 @@ def begun(run: Callable[[], object]) -> int:
             code = 0
         finally:
             os._exit(code)
+    os.setpgid(child, child)  # the child does so, too; one of both is first
     return child
 
 

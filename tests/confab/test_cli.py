@@ -101,7 +101,7 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
         ),
         (["memory", "show", "m.ttl", "--most", "-1"], 2, "--most"),
         (["generate", "served", "-o", "s.ttl", "--seed", "-1"], 2, "--seed"),
-        (["generate", "served", "-o", "/"], 2, "ends in .ttl"),
+        (["generate", "served", "-o", "/"], 2, "wanted the name of a file"),
         (["learn", "beverage-serving", "--memory", "."], 2, ".: is a folder"),
         (["plan", "beverage-serving", "--from-observed", os.devnull], 2, "no such file of observed facts"),
         (["plan", "beverage-serving", "--wrong"], 2, "see confab plan --help"),
