@@ -329,7 +329,7 @@ class Reading:
                     rows = sorted(self.problem.relations.get(relation, ()))
                 else:
                     rows = lowest.rows(relation, known).get(env.get(terms[known], terms[known]), ())
-            case EqualityCondition(left, right, False) if len(unknown) == 1:
+            case EqualityCondition(left, right, False) if len(unknown) == 1 and left != right:
                 terms, other = (unknown[0],), right if left == unknown[0] else left
                 rows = [(env.get(other, other),)]
             case ValueCondition(situation, arguments, value, False):

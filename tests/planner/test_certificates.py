@@ -17,9 +17,10 @@ from planner.certificates import Certificate, certificate_from, certificate_json
 from planner.certifying import certify
 from planner.plan import Outcome, Reason, Status
 from planner.solve import MODES, Request, certified, solve
-from reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
+from reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol
 from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy
+from worlds.writing import becomes, behavior, world
 
 CASES = Path(__file__).with_name("cases")
 
@@ -159,3 +160,14 @@ def test_json_has_the_certificate_and_the_checker_accepts_it() -> None:
     certificate = certificate_from(result.json()["certificate"])
     assert refusal(result.problem, certificate) is None
     assert Fact(Symbol("LOCK", ("cabinet0",)), "unlocked") in certificate.never
+
+
+def test_a_condition_that_a_variable_is_itself_leaves_it_open() -> None:
+    itself = EqualityCondition("?c", "?c")
+    move = behavior("MOVE", 1, "?c:Cup", [itself], [becomes("AT", "?c", "sink")])
+    at = SituationType("AT", ("Cup",), "Place")
+    kinds = {"Cup": ("cup1",), "Place": ("shelf", "sink")}
+    problem = world([at], [move], kinds, {"AT cup1": "shelf"}, {"AT cup1": "sink"})
+    assert certify(problem) is None
+    forged = Certificate(never=frozenset(map(Fact, problem.goal, problem.goal.values())))
+    assert refusal(problem, replace(forged, unmet=tuple(forged.never))) is not None
