@@ -443,8 +443,4 @@ def unified(
 
 def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
     """Yield the individuals for a behaviour's own variables with which it may be done, some of them given."""
-    for env in reading.solutions(behavior.preconditions, given, behavior.kinds):
-        left = [p for p in behavior.parameters if p.name not in env]
-        for values in product(*(reading.problem.classes.get(p.kind, ()) for p in left)):
-            reading.lowest.spend()
-            yield {**env, **{p.name: value for p, value in zip(left, values, strict=True)}}
+    yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import TypeAlias
 
 from planner.certificate_checks import (
@@ -30,7 +30,7 @@ from planner.certificates import Certificate
 from planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
 from planner.validation import Facts, Rules
 from reasoner.amounts import meets, number, written
-from reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Condition, Effect, Fact, Problem, State, Symbol
+from reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
 """How much may be done to find a certificate: tests of conditions, and behaviours tried in a case."""
@@ -110,7 +110,6 @@ class Relaxed:
         self._readers: dict[Key, dict[Key, None]] = {}
         self._waiting: dict[Key, None] = {}
         self._asking: Key | None = None
-        self._joint: dict[int, tuple[Condition, ...]] = {}
 
     # ------------------------------------------------------------------------------------------- what is known, so far
 
@@ -201,12 +200,7 @@ class Relaxed:
         given = unified(self.problem, behavior, own, terms, words)
         if given is None:
             return
-        both = self._joint.setdefault(id(effect), (*behavior.preconditions, *effect.when))
-        for env in reading.solutions(both, given, behavior.kinds):
-            left = [p for p in behavior.parameters if p.name not in env]
-            for values in product(*(self.problem.classes.get(p.kind, ()) for p in left)):
-                self.lowest.spend()
-                yield {**env, **{p.name: v for p, v in zip(left, values, strict=True)}}
+        yield from reading.solutions(self.lowest.asked(behavior, effect.when), given, behavior.kinds)
 
     def _wider(self, reading: Reading, symbol: Symbol) -> bool:
         first = number(self.lowest.initial(symbol))

@@ -103,6 +103,7 @@ class Lowest:
         self._rows: dict[tuple[str, int], dict[str, list[tuple[str, ...]]]] = {}
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
         self._inner: dict[int, tuple[Condition, ...]] = {}
+        self._asked: dict[tuple[int, int], tuple[Condition, ...]] = {}
         self._kept: list[object] = []  # so that no id is given twice
 
     def spend(self, work: int = 1) -> None:
@@ -180,6 +181,15 @@ class Lowest:
                 return 1 if len(unknown) < len({*condition.arguments, condition.value}) else 4
             return 3 if unknown == {condition.value} else 5
         return 5 + len(unknown)
+
+    def asked(self, behavior: Behavior, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
+        """Return a behaviour's preconditions with those of an effect; parameters are bound before nested ones are read."""
+        key = id(behavior), id(when)
+        if key not in self._asked:
+            self._kept += [behavior, when]
+            kinds = tuple(ClassCondition(parameter.name, parameter.kind) for parameter in behavior.parameters)
+            self._asked[key] = (*behavior.preconditions, *when, *kinds)
+        return self._asked[key]
 
     def inside(self, witness: Witness) -> tuple[Condition, ...]:
         """Return the conditions of a witness, its class among them."""

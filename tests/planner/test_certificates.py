@@ -17,9 +17,11 @@ from planner.certificates import Certificate, certificate_from, certificate_json
 from planner.certifying import certify
 from planner.plan import Outcome, Reason, Status
 from planner.solve import MODES, Request, certified, solve
-from reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol
+from reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
 from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy
+from worlds.interpreter import Interpreter, TooManyStatesError
+from worlds.mixed import mixed
 from worlds.writing import becomes, behavior, world
 
 CASES = Path(__file__).with_name("cases")
@@ -171,3 +173,18 @@ def test_a_condition_that_a_variable_is_itself_leaves_it_open() -> None:
     assert certify(problem) is None
     forged = Certificate(never=frozenset(map(Fact, problem.goal, problem.goal.values())))
     assert refusal(problem, replace(forged, unmet=tuple(forged.never))) is not None
+
+
+@pytest.mark.parametrize("first", [9_000_270, 9_000_150])
+def test_in_mixed_worlds_exactly_what_has_no_plan_has_a_certificate(first: int) -> None:
+    for seed in range(first, first + 20):
+        drawn = mixed(seed).problem
+        behaviors = {name: spread(one, drawn.classes) for name, one in drawn.domain.behaviors.items()}
+        problem = replace(drawn, domain=replace(drawn.domain, behaviors=behaviors))
+        try:
+            truth = Interpreter(drawn).explored(drawn.domain.levels[-1], 600)
+        except TooManyStatesError:
+            continue
+        certificate = certify(problem)
+        assert (certificate is None) == (truth.least is not None), seed
+        assert certificate is None or refusal(problem, certificate) is None, seed
