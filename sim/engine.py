@@ -103,13 +103,12 @@ class Engine:
         self.standing: dict[str, Spheres] = {}
         self.mechanics: list[Mechanic] = []
         self.links: dict[str, Mechanic] = {}  # by the names of their links
-        self.shifts: dict[int, Array] = {}  # by the mechanism's body: error of its perceived position at the last look
+        self.shifts: dict[int, Array] = {}  # by the mechanism's body: error of its perceived position
         self.errors: dict[
             str, tuple[int, Array]
         ] = {}  # by body: step of the last look, error of the perceived position
-        self.known: dict[
-            str, tuple[str, Array, Array]
-        ] = {}  # by body: its carrier when last seen, and its rotation and base in the carrier's frame
+        # by body: its carrier when last seen, and its rotation and base in the carrier's frame
+        self.known: dict[str, tuple[str, Array, Array]] = {}
         self.last_amounts: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
         self.sighted: tuple[int, Sight] | None = None
         self.remembered: dict[str, int] = {}
@@ -275,10 +274,8 @@ class Engine:
             before = self._believed(name)[1]
             if float(np.linalg.norm(position - before)) < STEADY * self.blur:
                 position = before + (position - before) / LOOKS
-        self.known[name], self.remembered[name] = (
-            (carrier, frame.T @ rotation, frame.T @ (position - origin)),
-            self.steps,
-        )
+        self.known[name] = carrier, frame.T @ rotation, frame.T @ (position - origin)
+        self.remembered[name] = self.steps
 
     def sight(self) -> Sight:
         """Return what the cameras see, and forget the pose of each body that they see to be gone."""
@@ -461,10 +458,8 @@ class Engine:
             if name != held and self.knows(name):
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
                 for low, high, radius in cylinders(thing.shape):
-                    size, center = (
-                        np.array([radius, radius, (high - low) / 2]),
-                        base + rotation[:, 2] * (low + high) / 2,
-                    )
+                    size = np.array([radius, radius, (high - low) / 2])
+                    center = base + rotation[:, 2] * (low + high) / 2
                     solids.append(Solid(name, "cylinder", size, center, rotation))
         around = Surroundings(tuple(solids))
         for name, spheres in self.standing.items():
