@@ -104,9 +104,8 @@ class Engine:
         self.mechanics: list[Mechanic] = []
         self.links: dict[str, Mechanic] = {}  # by the names of their links
         self.shifts: dict[int, Array] = {}  # by the mechanism's body: error of its perceived position
-        self.errors: dict[
-            str, tuple[int, Array]
-        ] = {}  # by body: step of the last look, error of the perceived position
+        # by body: step of the last look, error of the perceived position
+        self.errors: dict[str, tuple[int, Array]] = {}
         # by body: its carrier when last seen, and its rotation and base in the carrier's frame
         self.known: dict[str, tuple[str, Array, Array]] = {}
         self.last_amounts: dict[tuple[str, str], float] = {}  # by vessel and filling: servings when last seen
