@@ -30,7 +30,7 @@ LEFT: dict[str, int] = {
     "planner/hierarchical": 48,
     "reasoner": 6,
     "reasoner/graph": 4,
-    "reasoner/pddl": 3,
+    "reasoner/pddl": 12,
     "reasoner/reading": 30,
     "reasoner/updates": 5,
     "reasoner/validation": 13,
