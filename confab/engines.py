@@ -31,6 +31,8 @@ from reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
 """What an engine may take if nothing is said."""
+IMPORTING = 1.0
+"""What importing unified-planning takes: with less time left, no engine is asked."""
 READING = 0.93
 """Of its time, the share after which an engine is stopped: what is left is for reading and checking its plan."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
@@ -71,7 +73,7 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
     wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
     exported = to_pddl(wanted, level)
-    if deadline.left == 0:  # importing unified-planning takes a second
+    if deadline.left is not None and deadline.left < IMPORTING:
         return Outcome(Status.GAVE_UP, None, Reason("timeout"), seconds=perf_counter() - began)
     name, said, lines = answer(exported.domain, exported.problem, engine, deadline)
 
