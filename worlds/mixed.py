@@ -43,7 +43,7 @@ UNBOUNDED = 0.03
 """The share of worlds that may be larger: there the truth may stay unknown."""
 FEW = 12
 """Worlds with fewer states are mostly drawn again."""
-EXCLUDED = 0.4
+EXCLUDED = 0.33
 """In this share of worlds it is tried to want what no state has."""
 TRIES = 8
 NEAR = 0.25
@@ -109,16 +109,15 @@ class _Wishes:
 
     def goal(self, excluded: bool) -> dict[Symbol, str]:
         """Return a goal that doesn't hold at first, one that no state has if that is asked for and found; or nothing."""
-        for _ in range(TRIES):
+        for _ in range(3 * TRIES if excluded else TRIES):
             kind = "random" if self.rng.random() < 0.12 else "two" if excluded else "one"
             goal = self.drawn(kind)
             states = self.states if excluded else self.states[:1]
-            if goal and not any(self.has(state, goal) for state in states) and not (excluded and kind == "random"):
+            if goal and not any(self.has(state, goal) for state in states) and (kind == "two" or not excluded or self.rng.random() < 0.3):
                 near = (state for state in self.states[1:] if self.has(state, goal))
                 cost = self.costs[next(near, self.states[0])]
                 if excluded or not cost or cost > 1 or self.rng.random() < NEAR:
                     return goal
-            excluded = excluded and self.rng.random() < 0.9
         return {}
 
     def has(self, state: State, goal: Mapping[Symbol, str]) -> bool:
@@ -129,9 +128,9 @@ class _Wishes:
         """Return what some states have: one, two mixed, or any values at all."""
         rng = self.rng
         sources = [rng.choice(self.states[-1 - len(self.states) // 6 :])]
-        sources += [rng.choice(self.states)] if kind == "two" else []
+        sources += [rng.choice(self.states), rng.choice(self.states)] if kind == "two" else []
         found: dict[Symbol, str] = {}
-        for _ in range(rng.choice((1, 1, 2, 2, 3, 4)) + (kind == "two")):
+        for _ in range(rng.choice((1, 1, 2, 2, 3, 4)) + 2 * (kind == "two")):
             source = rng.choice(sources)
             changed = [s for s, i in self.of.slots.items() if source[i] != self.of.initial[i]]
             if kind == "random" or not changed or rng.random() < 0.15:
