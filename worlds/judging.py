@@ -29,7 +29,7 @@ from reasoner.language import DomainError
 from reasoner.limits import LimitError
 from reasoner.symbols import Problem, Symbol
 from worlds.corrupted import corrupted, numbered, random_steps
-from worlds.interpreter import Interpreter, TooManyStatesError
+from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import World
 from worlds.scenes import scene
 from worlds.walking import cost, faults
@@ -92,12 +92,20 @@ class Judge:
     """Judges one world: by the sample that its seed draws, with everything, or in one mode only."""
 
     def __init__(
-        self, world: World, folder: Path, every: bool = False, only: str = "", meant: Interpreter | None = None
+        self,
+        world: World,
+        folder: Path,
+        every: bool = False,
+        only: str = "",
+        meant: Interpreter | None = None,
+        exports: bool = True,
     ) -> None:
         self.world, self.folder, self.every, self.only = world, folder, every or bool(only), only
+        self.exports = exports
         self.found = Judged()
         self.meant = meant or Interpreter(world.problem)
         self.rng = Random(f"judge {world.seed}")
+        self.reached: list[State] = []
 
     def complain(self, kind: str, mode: str, text: object = "") -> None:
         """Note that something is wrong."""
@@ -127,6 +135,7 @@ class Judge:
         try:
             truth = self.meant.explored(level, MOST)
             found.least, found.states = truth.least, len(truth.costs)
+            self.reached = list(dict.fromkeys(state for state, _ in truth.costs))
         except TooManyStatesError:
             found.known, found.states = False, MOST
         self.surely = found.least
@@ -187,7 +196,7 @@ class Judge:
         if not self.only or self.only == "checker":
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
             self.call("checker", lambda: self.checker(read, plans))
-        if self.sampled(EXPORTS, "export", "export"):
+        if self.exports and self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
         if self.sampled(EXECUTIONS, "execute", "execute"):
@@ -200,10 +209,10 @@ class Judge:
             return None
         outcome = result.outcome
         self.found.status[name] = outcome.status.value
-        self.judge(name, outcome, result.problem)
+        self.judge(name, outcome)
         return outcome
 
-    def judge(self, mode: str, outcome: Outcome, problem: Any = None) -> None:
+    def judge(self, mode: str, outcome: Outcome) -> None:
         """Hold an outcome against the truth."""
         least, surely, known = self.found.least, self.surely, self.found.known
         if outcome.plan is not None:
@@ -220,7 +229,7 @@ class Judge:
         if outcome.status is Status.UNSOLVABLE:
             if known and least is not None and mode != "strict levels":
                 self.complain("false unsolvable", mode, outcome.reason.text if outcome.reason else "")
-            self.certificate(mode, outcome, problem)
+            self.certificate(mode, outcome)
         if outcome.status is Status.GAVE_UP:
             text = outcome.reason.text if outcome.reason else ""
             self.found.remarks.append(Complaint("gave-up", mode, text))
@@ -233,12 +242,22 @@ class Judge:
             elif mode == "optimal" and outcome.bound < own - 1e-9:
                 self.found.remarks.append(Complaint("unproved", mode, f"{outcome.bound} … {own}"))
 
-    def certificate(self, mode: str, outcome: Outcome, problem: Any) -> None:
-        """Ask for what proves that there is no plan, and have it checked."""
+    def certificate(self, mode: str, outcome: Outcome) -> None:
+        """Hold what proves that there is no plan against all states that can be reached."""
+        certificate = getattr(outcome, "certificate", None)
         if not hasattr(outcome, "certificate"):
             return
-        if outcome.certificate is None:
+        if certificate is None:
             self.complain("uncertified", mode, outcome.reason.text if outcome.reason else "")
+            return
+        for fact in certificate.never:
+            if any(self.meant.meets(state, fact.symbol, fact.value) for state in self.reached):
+                self.complain("a false certificate", mode, f"{fact} can come to hold")
+                return
+        for symbol, value in certificate.always.items():
+            if not all(self.meant.meets(state, symbol, value) for state in self.reached):
+                self.complain("a false certificate", mode, f"{symbol} isn't always {value}")
+                return
 
     def checker(self, read: Scene, plans: Sequence[Plan]) -> None:
         """Hold the checker of plans against the interpreter, in plans that are mostly none."""

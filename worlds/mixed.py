@@ -113,7 +113,11 @@ class _Wishes:
             kind = "random" if self.rng.random() < 0.12 else "two" if excluded else "one"
             goal = self.drawn(kind)
             states = self.states if excluded else self.states[:1]
-            if goal and not any(self.has(state, goal) for state in states) and (kind == "two" or not excluded or self.rng.random() < 0.3):
+            if (
+                goal
+                and not any(self.has(state, goal) for state in states)
+                and (kind == "two" or not excluded or self.rng.random() < 0.3)
+            ):
                 near = (state for state in self.states[1:] if self.has(state, goal))
                 cost = self.costs[next(near, self.states[0])]
                 if excluded or not cost or cost > 1 or self.rng.random() < NEAR:
