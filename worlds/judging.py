@@ -125,7 +125,7 @@ class Judge:
         try:
             self.modes(file)
         finally:
-            file.unlink()
+            file.unlink(missing_ok=True)
         return self.found
 
     def truth(self) -> None:
