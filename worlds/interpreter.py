@@ -21,6 +21,7 @@ from typing import Any
 
 from reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
 from reasoner.derivation import strata
+from reasoner.language import situations_of, walk
 from reasoner.symbols import (
     FALSE,
     TRUE,
@@ -131,7 +132,7 @@ class Interpreter:
                 self.slots[Symbol(name, arguments)] = len(initial)
                 initial.append(FALSE)
         self.symbols = list(self.slots)
-        self.rules = [self.derivations(group) for group in strata(domain.rules)]
+        self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
         self.initial = self.closed(initial)
         self.rests = self.unsettled()
         self._actions: dict[int, list[Action]] = {}
@@ -236,17 +237,23 @@ class Interpreter:
                     ways.setdefault(self.slots[symbol], []).append(said)
         return [(slot, eval(f"lambda s: {_joined(said, 'or', 'False', 'True')}", NAMES)) for slot, said in ways.items()]
 
+    def recursive(self, names: Iterable[str]) -> bool:
+        """Return whether rules of a group may need what others of it, or they themselves, conclude."""
+        group = set(names)
+        rules = [rule for name in group for rule in self.problem.domain.rules[name]]
+        return any(group & situations_of(inner) for rule in rules for c in rule.conditions for inner in walk(c))
+
     def closed(self, values: list[Any]) -> State:
         """Return a state with all that follows from it: group by group, from nothing upwards."""
         for slot in range(self.stated, len(values)):
             values[slot] = FALSE
-        for group in self.rules:
+        for group, recursive in self.rules:
             more = True
             while more:
                 found = [slot for slot, test in group if values[slot] == FALSE and test(values)]
                 for slot in found:
                     values[slot] = TRUE
-                more = bool(found)
+                more = recursive and bool(found)
         return tuple(values)
 
     def actions(self, level: int) -> list[Action]:
@@ -315,7 +322,11 @@ class Interpreter:
         """Return that an amount is one of those that it may be."""
         quantity = self.kinds[symbol.situation].quantity
         assert quantity is not None
-        said = [f"{amount} == {amount}", f"abs({amount}) <= {LARGEST}", f"Fraction({amount}).denominator <= {LARGEST}"]
+        said = [
+            f"{amount} == {amount}",
+            f"abs({amount}) <= {LARGEST}",
+            f"(type({amount}) is int or {amount}.denominator <= {LARGEST})",
+        ]
         said += [f"{amount} >= {number(quantity.least)!r}"] if quantity.least is not None else []
         said += [f"{amount} <= {number(quantity.most)!r}"] if quantity.most is not None else []
         said += [f"{amount} == int({amount})"] if quantity.whole else []

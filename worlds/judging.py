@@ -38,8 +38,9 @@ SECONDS, CPU = 3.0, 4.0
 """The time limit of a call, and the CPU time after which it is taken for one that doesn't return."""
 MOST = 5_000
 """So many nodes are searched for the truth."""
-EXPORTS, EXECUTIONS, LESSONS, READERS = 8, 6, 8, 250
-"""One of so many worlds is exported and imported, carried out, planned in with a memory, and read by unified-planning."""
+OPTIMAL, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS = 2, 2, 8, 6, 8, 250
+"""One of so many worlds is planned in optimally, without leaving levels, and with a memory; exported, and read by
+unified-planning; and carried out."""
 MOST_ACTIONS = 1_500
 """So many quantified behaviours may what was exported and imported have, if it is to be searched."""
 T = TypeVar("T")
@@ -178,8 +179,10 @@ class Judge:
         read = self.call("load", lambda: load(file))
         if read is None:
             return
-        modes: dict[str, dict[str, Any]] = {"guarded": {}, "optimal": {"mode": "optimal"}, "paper": {"mode": "paper"}}
-        if len(self.world.problem.domain.levels) > 1:
+        modes: dict[str, dict[str, Any]] = {"guarded": {}, "paper": {"mode": "paper"}}
+        if self.sampled(OPTIMAL, "optimal", "optimal"):
+            modes["optimal"] = {"mode": "optimal"}
+        if len(self.world.problem.domain.levels) > 1 and self.sampled(STRICT, "strict", "strict"):
             modes["strict levels"] = {"leave_levels": False}
         if self.only and "/" not in self.only:
             first = self.only if self.only in modes else "guarded"

@@ -37,7 +37,7 @@ from reasoner.symbols import (
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
 
-MOST = 600
+MOST = 300
 """So many nodes of the lowest level may be reachable in most worlds."""
 UNBOUNDED = 0.03
 """The share of worlds that may be larger: there the truth may stay unknown."""
