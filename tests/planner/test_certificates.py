@@ -32,7 +32,9 @@ def answered(case: str, mode: str) -> Outcome:
 
 
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "leading"])
-@pytest.mark.parametrize("case", ["false-unsolvable-1", "false-unsolvable-2", "no-operators-solvable"])
+@pytest.mark.parametrize(
+    "case", ["false-unsolvable-1", "false-unsolvable-2", "no-operators-solvable", "equal-to-itself"]
+)
 def test_what_a_few_steps_solve_is_not_called_unsolvable(case: str, mode: str) -> None:
     outcome = answered(f"{case}.ttl", mode)
     assert outcome.plan is not None and len(outcome.plan.primitives) <= 2
