@@ -481,7 +481,8 @@ def _situations(
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
         value_property = schema.values(iri, "valueProperty")
-        boolean = set(classes.get(name, ())) <= {TRUE, FALSE}
+        # A value property says so even where no individual that was read is one of its values.
+        boolean = not value_property and set(classes.get(name, ())) <= {TRUE, FALSE}
         if iri in schema.pairs:
             arguments, boolean = (*arguments, name), True
         for iri_of_property in value_property:

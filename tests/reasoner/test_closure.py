@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from reasoner.graph.knowledge import load
 from reasoner.reading.problem import read
 from reasoner.reading.relevance import recognise
 from tests.reasoner.test_recognition import solvable
@@ -112,3 +113,12 @@ def test_what_nothing_asks_or_changes_is_left_out(tmp_path: Path) -> None:
     sliced = recognise(graph_of(HEAD + THINGS, tmp_path)).problem
     assert sliced.classes["Thing"] == ("x",)
     assert sliced.classes["Spot"] == ()
+
+
+def test_a_situation_type_none_of_whose_values_is_in_the_slice_has_values_all_the_same() -> None:
+    path = Path(__file__).parents[1] / "planner/cases/values-outside-of-the-slice.ttl"
+    slice_, whole = recognise(load(path)).problem, read(load(path)).problem
+    assert "F0v0" not in slice_.classes.get("F0", ())
+    assert {name: s.boolean for name, s in slice_.domain.situations.items()} == {
+        name: s.boolean for name, s in whole.domain.situations.items()
+    }
