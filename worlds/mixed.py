@@ -41,7 +41,7 @@ MOST = 300
 """So many nodes of the lowest level may be reachable in most worlds."""
 UNBOUNDED = 0.03
 """The share of worlds that may be larger: there the truth may stay unknown."""
-FEW = 12
+FEW = 8
 """Worlds with fewer states are mostly drawn again."""
 EXCLUDED = 0.33
 """In this share of worlds it is tried to want what no state has."""
@@ -78,7 +78,7 @@ def mixed(seed: int) -> World:
 def drawn(seed: int) -> tuple[World, Interpreter]:
     """Return the random world of a seed, and an interpreter of it."""
     rng = Random(f"mixed {seed}")
-    most, least = (MOST, FEW if rng.random() < 0.6 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
+    most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
         world = _Draft(rng, seed).world()
         interpreter = Interpreter(world.problem)
