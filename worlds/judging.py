@@ -396,9 +396,18 @@ class Judge:
         if episode.status is End.GAVE_UP:
             self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
 
+    def alone(self, situation: str) -> bool:
+        """Return whether no other situation type has a value of this one: else a change takes objects from where they were."""
+        members = self.world.problem.members
+        others = [kind for name, kind in self.meant.kinds.items() if name != situation and not kind.boolean]
+        own = members(self.meant.kinds[situation].range)
+        return self.meant.kinds[situation].boolean or not any(own & members(kind.range) for kind in others)
+
     def fact(self) -> str:
         """Return a fact that may come to hold, or nothing."""
-        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated]
+        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and self.alone(s.situation)]
+        if not symbols:
+            return ""
         symbol: Symbol = self.rng.choice(symbols)
         kind = self.meant.kinds[symbol.situation]
         if kind.quantity is not None:
