@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 import time
 from collections import Counter
@@ -218,10 +219,11 @@ def main(arguments: Sequence[str] = ()) -> int:
     parser.add_argument("--mutants", type=int, nargs="?", const=MUTANTS)
     asked = parser.parse_args(arguments)
     if asked.mutants is not None:
-        from benchmarks.mixed_mutants import kills
-
-        kills(asked.mutants, asked.into or Path("confab-out"))
-        return 0
+        words = [
+            str(asked.mutants),
+            str(asked.into or "confab-out"),
+        ]  # a process of its own, without what is to get faults
+        return subprocess.run([sys.executable, "-m", "benchmarks.mixed_mutants", *words], check=False).returncode
     if asked.seed is not None:
         with TemporaryDirectory() as folder:
             its = judged(asked.seed, Path(folder), every=True)
