@@ -102,7 +102,8 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     """Find values that behaviours or goals ask for, which are neither there at first nor the effect of any behaviour.
 
-    What can't be reached only because something else can't be is said with that.
+    What can't be reached only because something else can't be is said with that. Behaviours for which the scene has no objects
+    are of other scenes: nothing is said of these, nor of what needs them.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -115,7 +116,8 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         for behavior in ready:
             del waiting[behavior.name]
             there |= given[behavior.name]
-    lacking = {name: [c for c in b.preconditions if not _possible(c, b, problem, there)] for name, b in waiting.items()}
+    applicable = {name: b for name, b in waiting.items() if all(problem.members(p.kind) for p in b.parameters)}
+    lacking = {name: [c for c in b.preconditions if not _possible(c, b, problem, there)] for name, b in applicable.items()}
     wanted = {
         (symbol.situation, value): symbol
         for symbol, value in problem.goal.items()
