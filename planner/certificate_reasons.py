@@ -13,6 +13,8 @@ from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitErr
 from reasoner.amounts import MORE, Expression, terms_of, towards, written
 from reasoner.sentences import said
 from reasoner.symbols import (
+    FALSE,
+    TRUE,
     AmountEffect,
     Behavior,
     ClassCondition,
@@ -74,7 +76,7 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         cases = f"{certificate.cases} combination{'' if one else 's'} of values of {about} can be reached"
         how = "exclude each other" if many else "can't be reached"
         values = {(fact.symbol.situation, fact.value) for fact in goals}
-        if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1:
+        if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
             ((situation, value),) = values
             return Reason(f"{what} {how}: only one at a time is {situation} {value}", tuple(dict.fromkeys(terms)))
         text = f"{what} {how}: {cases}, {'and not' if one else 'none'} with {'all of them' if many else 'it'}"

@@ -10,10 +10,12 @@ is no way left, or the way succeeds: then there is a plan.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise
+from functools import partial
+from itertools import combinations, pairwise
+from operator import itemgetter
 from typing import TypeAlias
 
 from planner.certificate_checks import (
@@ -36,6 +38,8 @@ WORK = 3_000_000
 """How much may be done to find a certificate: tests of conditions, and behaviours tried in a case."""
 LITTLE = 2_000, 20_000
 """So many tests for each goal by itself, and then so many, before all of them are looked into to the end."""
+PAIR, SHARE = 100_000, 0.5
+"""So many tests for each pair of goals, and this share of all of them for all pairs."""
 FEW = 3
 """If more values of a symbol are to be told apart, all are."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
@@ -56,7 +60,8 @@ def certify(problem: Problem, most: float = WORK) -> Certificate | None:
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
-            or _by_cases(lowest, relaxed)
+            or _by_pairs(lowest, relaxed)
+            or _by_cases(lowest, relaxed, problem.goal)
         )
     except (WorkLimitError, RecursionError):
         return None
@@ -64,18 +69,25 @@ def certify(problem: Problem, most: float = WORK) -> Certificate | None:
 
 def _at_once(lowest: Lowest, little: int) -> Certificate | None:
     """Return a certificate for a goal of which little has to be asked; each is asked for by itself, with so much work."""
+    for symbol, wanted in sorted(lowest.problem.goal.items()):
+        alone = {symbol: wanted}
+        if (found := _with_little(lowest, little, partial(Relaxed(lowest).certificate, alone))) is not None:
+            return found
+        if lowest.work >= lowest.most:
+            break
+    return None
+
+
+def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
+    """Return the certificate that is found with so much work; None if there is none or it takes more."""
     most = lowest.most
     try:
-        for symbol, wanted in sorted(lowest.problem.goal.items()):
-            lowest.most = min(most, lowest.work + little)
-            with suppress(WorkLimitError):
-                if (found := Relaxed(lowest).certificate({symbol: wanted})) is not None:
-                    return found
-            if lowest.work >= most:
-                break
+        lowest.most = min(most, lowest.work + little)
+        with suppress(WorkLimitError):
+            return find()
+        return None
     finally:
         lowest.most = most
-    return None
 
 
 def _contested(lowest: Lowest) -> Certificate | None:
@@ -287,8 +299,26 @@ def _number(effect: AmountEffect) -> bool:
 # -------------------------------------------------------------------------------------------------------------- by cases
 
 
-def _by_cases(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Tell values apart, one after the other, until no case is left in which the goal could hold."""
+def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
+    """Return a certificate for two goals about the same individual that can't hold together, with what has to be at rest."""
+    last = lowest.work + SHARE * (lowest.most - lowest.work)
+    pairs = []
+    for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
+        if a in other.arguments or b in one.arguments:  # one is about the value of the other: these come first
+            pairs.append((0, {one: a, other: b}))
+        elif not {*one.arguments}.isdisjoint(other.arguments):
+            pairs.append((1, {one: a, other: b}))
+    for _, pair in sorted(pairs, key=itemgetter(0)):
+        little = min(PAIR, last - lowest.work)
+        if little <= 0:
+            break
+        if (found := _with_little(lowest, little, partial(_by_cases, lowest, relaxed, pair))) is not None:
+            return found
+    return None
+
+
+def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
+    """Tell values apart, one after the other, until no case is left in which the goal, or some of it, could hold."""
     certificate = Certificate(cases=0)
     while True:
         cases = Cases(lowest, certificate)
@@ -297,13 +327,13 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
             return None
         if cases.reached is None:
             return replace(certificate, cases=len(cases.came_from))
-        refined = _refined(cases, cases.reached, relaxed)
+        refined = _refined(cases, cases.reached, relaxed, goal)
         if refined is None or refined == certificate:
             return None
         certificate = refined
 
 
-def _refined(cases: Cases, end: Case, relaxed: Relaxed) -> Certificate | None:
+def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certificate | None:
     """Return a certificate that tells apart what a way through the cases fails on; None if it succeeds."""
     lowest, problem = cases.lowest, cases.problem
     path: list[tuple[Case, Try, Case]] = []
@@ -324,7 +354,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed) -> Certificate | None:
             facts.put(situation, key, value)
         if changes is None or not _is(cases, facts, after, bool(wrong)):
             return _told_apart(cases, relaxed, wrong or view.unknown or [])
-    goals = [Fact(symbol, wanted) for symbol, wanted in sorted(problem.goal.items())]
+    goals = [Fact(symbol, wanted) for symbol, wanted in sorted(goal.items())]
     open_ = [fact for fact in goals if not _met(problem, facts, fact)]
     rests = [] if open_ else _restless(problem, lowest.level, facts)
     for fact in open_ or rests:

@@ -191,10 +191,11 @@ def _paper(request: Request) -> Outcome:
 
 
 def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:
-    from planner.hierarchical.unsolvability import exhausted, impossible, proved
+    from planner.hierarchical.unsolvability import AT_ONCE, PAIRS, exhausted, impossible, proved
 
-    if not states:
-        return impossible(problem)
+    proof = impossible(problem, PAIRS if states else AT_ONCE)
+    if proof is not None or not states:
+        return proof
     with suppress(OutOfTimeError):  # then nothing is shown
         try:
             task = proved(problem, problem.domain.levels[-1], deadline)

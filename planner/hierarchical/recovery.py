@@ -15,7 +15,7 @@ from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE, WIDER
 from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from planner.hierarchical.subplans import Effort
 from planner.hierarchical.subproblem import MAKING
-from planner.hierarchical.unsolvability import MOST_ROWS, closed, impossible, looked_at, proved
+from planner.hierarchical.unsolvability import MOST_ROWS, PAIRS, TEST, closed, impossible, looked_at, proved
 from planner.plan import Reason, TooLargeError
 from planner.transitions import Cell
 from reasoner.symbols import State
@@ -55,6 +55,7 @@ class Recovery:
     _doubted: bool = False
     _lowest: Task | Reason | None = None
     _looked: int = 0
+    _tested: int = 1
     _finished: int = 0
     _tried: dict[int, int] = field(default_factory=dict)
 
@@ -151,7 +152,7 @@ class Recovery:
     def doubt(self) -> None:
         """Raise `UnsolvableError` if there is no plan and the lowest level is so small that looking at its states is no work."""
         call = self.call
-        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.segments.worked:
+        if not self.solvable and FEW * call.program.size(call.program.levels[-1]) <= call.segments.effort:
             self._prove()
 
     def _prove(self) -> None:
@@ -162,6 +163,11 @@ class Recovery:
         call = self.call
         if call.advice is not None and call.advice.expects and call.segments.worked < WIDER.work:
             return
+        tests = min(call.segments.effort // TEST, PAIRS)
+        if tests >= 2 * self._tested:
+            self._tested = tests
+            if proof := impossible(call.problem, tests):
+                raise proof
         if self._lowest is None:
             self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline)
         if not isinstance(self._lowest, Reason):

@@ -222,7 +222,14 @@ class Segments:
         self.expanded += 1
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
+        self._ask()
         self.check_time()
+
+    def _ask(self) -> None:
+        """Ask whether there is a plan at all, each time that the effort has doubled."""
+        if self.effort > self.doubted:
+            self.doubted = 2 * self.effort
+            self.doubt()
 
     def spend(self, level: int, counts: Counts, work: int) -> None:
         """Count what a search elsewhere did, and its work in states times operators."""
@@ -231,9 +238,7 @@ class Segments:
         self.worked += work
         if self.expanded > self.most:
             raise LimitError(f"{self.most} expansions")
-        if self.worked > self.doubted:
-            self.doubted = 2 * self.worked
-            self.doubt()
+        self._ask()
         if self.worked > min(self.most_work, self.enough):
             raise LimitError(f"{min(self.most_work, self.enough):.0f} states times operators")
         self.check_time()

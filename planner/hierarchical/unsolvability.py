@@ -22,15 +22,17 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """The work of looking at all states, in states times relaxed operators, that no search has to come before."""
-AT_ONCE = 20_000
-"""So many tests of conditions are little work."""
+AT_ONCE, PAIRS = 20_000, 500_000
+"""So many tests of conditions are little work; and so many, at most, are done for a certificate once searches have failed."""
+TEST = 2
+"""The effort of a test, about in microseconds."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
 
-def impossible(problem: Problem) -> UnsolvableError | None:
-    """Return why a problem has no plan, with a certificate, if little work shows it."""
-    certificate = certify(problem, AT_ONCE)
+def impossible(problem: Problem, most: int = AT_ONCE) -> UnsolvableError | None:
+    """Return why a problem has no plan, with a certificate, if so much work shows it."""
+    certificate = certify(problem, most)
     return None if certificate is None else UnsolvableError(told(problem, certificate), certificate)
 
 

@@ -117,7 +117,9 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
             del waiting[behavior.name]
             there |= given[behavior.name]
     applicable = {name: b for name, b in waiting.items() if all(problem.members(p.kind) for p in b.parameters)}
-    lacking = {name: [c for c in b.preconditions if not _possible(c, b, problem, there)] for name, b in applicable.items()}
+    lacking = {
+        name: [c for c in b.preconditions if not _possible(c, b, problem, there)] for name, b in applicable.items()
+    }
     wanted = {
         (symbol.situation, value): symbol
         for symbol, value in problem.goal.items()

@@ -56,6 +56,19 @@ def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: str) -> None:
     assert "no Key opens cabinet0, which L2_UNLOCK needs; so never cabinet0 LOCK unlocked" in outcome.reason.text
 
 
+def test_goals_about_one_object_that_exclude_each_other_with_what_rests_are_unsolvable() -> None:
+    outcome = confab.load("beverage-serving").plan("left_hand HOLDS cup1", mode="paper", time_limit=20.0).outcome
+    assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
+    goals = {"left_hand HOLDS cup1", "cup1 LOCATION location7", "left_hand HAND_POSITION raised"}
+    assert {str(fact) for fact in outcome.certificate.unmet} == goals
+
+
+def test_a_search_among_few_states_ends() -> None:
+    outcome = answered("goals-of-one-rule.ttl", "guarded")
+    assert outcome.status is Status.UNSOLVABLE and outcome.reason is not None
+    assert "b5 D0 b5 false and b6 D0 b6 false exclude each other" in outcome.reason.text
+
+
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
 def test_the_reason_names_the_bound_that_an_amount_would_exceed(mode: str) -> None:
     outcome = answered("reason-wrong-sign/depot-small.ttl", mode)
