@@ -193,7 +193,7 @@ def _paper(request: Request) -> Outcome:
 def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:
     from planner.hierarchical.unsolvability import AT_ONCE, PAIRS, exhausted, impossible, proved
 
-    proof = impossible(problem, PAIRS if states else AT_ONCE)
+    proof = impossible(problem, PAIRS if states else AT_ONCE, deadline)
     if proof is not None or not states:
         return proof
     with suppress(OutOfTimeError):  # then nothing is shown

@@ -146,7 +146,7 @@ class Recovery:
         """Raise `UnsolvableError` if it can be shown at once that there is no plan."""
         if not self._doubted:
             self._doubted = True
-            if proof := impossible(self.call.problem):
+            if proof := impossible(self.call.problem, deadline=self.call.segments.deadline):
                 raise proof
 
     def doubt(self) -> None:
@@ -166,7 +166,7 @@ class Recovery:
         tests = min(call.segments.effort // TEST, PAIRS)
         if tests >= 2 * self._tested:
             self._tested = tests
-            if proof := impossible(call.problem, tests):
+            if proof := impossible(call.problem, tests, call.segments.deadline):
                 raise proof
         if self._lowest is None:
             self._lowest = proved(call.problem, call.program.levels[-1], call.segments.deadline)

@@ -7,6 +7,7 @@ What says "no" here is a reason to stop searching; the proof is the certificate,
 from __future__ import annotations
 
 import math
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 from planner.certificate_reasons import told
@@ -14,6 +15,7 @@ from planner.certifying import certify
 from planner.hierarchical.subplans import Segments
 from planner.hierarchical.subproblem import LEAST
 from planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
+from reasoner.limits import within
 from reasoner.symbols import Fact, Problem, State
 
 if TYPE_CHECKING:
@@ -30,10 +32,11 @@ MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """The largest join of relaxed reachability (some 200 MB), and the most changes of a level that is grounded (600 MB)."""
 
 
-def impossible(problem: Problem, most: int = AT_ONCE) -> UnsolvableError | None:
-    """Return why a problem has no plan, with a certificate, if so much work shows it."""
-    certificate = certify(problem, most)
-    return None if certificate is None else UnsolvableError(told(problem, certificate), certificate)
+def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
+    """Return why a problem has no plan, with a certificate, if so much work until a deadline shows it."""
+    with within(None if deadline is None else max(0.0, deadline - perf_counter())):
+        certificate = certify(problem, most)
+        return None if certificate is None else UnsolvableError(told(problem, certificate), certificate)
 
 
 # ---------------------------------------------------------------------------------------- on the lowest level, grounded
