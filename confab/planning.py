@@ -18,7 +18,7 @@ from confab.interchange import outcome_json
 from confab.known import Known
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
 from planner.solve import DEFAULT_MODE, MODES, Request, certified, solve
-from planner.validation import validate
+from planner.validation import Fault, validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline, within
 from reasoner.memory.links import Links
@@ -200,7 +200,8 @@ def _plan(
         if anew != problem:
             problem, outcome = anew, search(anew)
     queries = scene.knowledge.round_trips - asked
-    return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries)
+    part = None if problem is not seen.problem or seen.whole else seen
+    return Result(scene, problem, outcome, {**scene.seconds, "quantify": quantified}, queries, part, tuple(goals))
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
@@ -228,7 +229,8 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
 class Result:
     """What came of planning: the outcome, and the scene in which it holds.
 
-    `problem` has the individuals that the task can need; `queries` is how many the store was asked.
+    `problem` has the individuals that the task can need; `queries` is how many the store was asked. `part` is the part of the
+    scene that the problem was read from, if it isn't the whole scene, and `goals` are those that replaced some of the task's.
     """
 
     scene: Known
@@ -236,6 +238,15 @@ class Result:
     outcome: Outcome
     seconds: dict[str, float]
     queries: int = 0
+    part: Reading | None = None
+    goals: tuple[str, ...] = ()
+
+    def faults(self, plan: Plan) -> list[Fault]:
+        """Return what is wrong with a plan for the same task, in the whole scene; nothing if it is one."""
+        faults = validate(self.problem, plan)
+        if faults or self.part is None:
+            return faults
+        return refused(self.scene.knowledge, self.part, plan, self.goals)
 
     @property
     def plan(self) -> Plan:
@@ -267,7 +278,7 @@ class Result:
             )
         steps = [waiting.pop(next(i for i, step in enumerate(waiting) if step.id == wanted)) for wanted in ids]
         plan = Plan(renumbered(steps))
-        if faults := validate(self.problem, plan):
+        if faults := self.faults(plan):
             raise KnowledgeError(f"the plan can't be done in that order: {faults[0].text}")
         return plan
 
@@ -346,7 +357,12 @@ class Result:
 
         place = None if instead is None else find_step(self.plan, instead, labels)
         with within(seconds):
-            return why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+            told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+            own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors  # `replan` checks the others
+            if not own or self.part is None or told.plan is None or not self.faults(told.plan):
+                return told
+            whole = replace(self, problem=with_goals(self.scene.problem, self.goals), part=None)
+            return whole.why_not(asked, instead)
 
     def explain(self) -> Account:
         """Return why each step of the plan is there; or, where there is no plan, why."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import confab
 from confab.checking import refused
 from planner.plan import Plan, Status, Step
-from planner.validation import carried_out, successor, validate
+from planner.validation import Fault, carried_out, successor, validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.language import DomainError
 from reasoner.reading import relevance
@@ -136,3 +136,11 @@ def test_a_goal_on_a_class_that_recognition_loses_a_member_of_is_reached_for_all
         forgetful.lost = None
     assert len(result.problem.goal) == 2
     assert not validate(result.problem, result.plan)
+
+
+def test_another_order_is_checked_in_the_whole_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = confab.load("living-room").plan()
+    assert result.part is not None and result.in_order(*(step.id for step in result.plan.steps)) == result.plan
+    monkeypatch.setattr("confab.planning.refused", lambda *_: [Fault((), "it breaks a bound")])
+    with pytest.raises(KnowledgeError, match="it breaks a bound"):
+        result.in_order(*(step.id for step in result.plan.steps))
