@@ -10,8 +10,6 @@ import math
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from planner.certificate_reasons import told
-from planner.certifying import certify
 from planner.hierarchical.subplans import Segments
 from planner.hierarchical.subproblem import LEAST
 from planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
@@ -34,6 +32,9 @@ MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 
 def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
     """Return why a problem has no plan, with a certificate, if so much work until a deadline shows it."""
+    from planner.certificate_reasons import told
+    from planner.certifying import certify
+
     with within(None if deadline is None else max(0.0, deadline - perf_counter())):
         certificate = certify(problem, most)
         return None if certificate is None else UnsolvableError(told(problem, certificate), certificate)

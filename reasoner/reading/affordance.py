@@ -17,8 +17,9 @@ negated                    ``FILTER NOT EXISTS { … }``
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import pyoxigraph as ox
 
@@ -30,6 +31,7 @@ from reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
 from reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -38,6 +40,7 @@ from reasoner.symbols import (
     EqualityCondition,
     Fact,
     RelationCondition,
+    SituationType,
     State,
     Symbol,
     ValueCondition,
@@ -52,6 +55,9 @@ RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
 TYPE = ox.NamedNode(RDF + "type")
+SIGNS = {"increase": "+", "decrease": "-"}
+MOST_TOGETHER = 3
+"""Maximum number of other effects that may change the same amount; of more, the query asks nothing."""
 
 
 @dataclass(frozen=True, order=True)
@@ -179,6 +185,44 @@ def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
     return Fact(Symbol(said.situation, arguments), bindings.get(said.value, said.value))
 
 
+def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
+    """Yield the preconditions that follow from the bounds of amounts that several effects of a behaviour may change at once.
+
+    Each effect is added up with those that change the same symbol where their arguments are equal.
+    """
+    for effect in behavior.amounts:
+        quantity = situations[effect.situation].quantity
+        every = [other for other in behavior.amounts if other.situation == effect.situation and other is not effect]
+        others = [other for other in every if _may_coincide(effect, other)]
+        added = all(one.operation in SIGNS for one in (effect, *others))
+        if quantity is None or not every or not added or len(others) > MOST_TOGETHER:
+            continue
+        for same in product((True, False), repeat=len(others)):
+            total: Expression = Amount(effect.situation, effect.arguments)
+            total = Calculation(SIGNS[effect.operation], total, effect.amount)
+            where: list[Condition] = [*effect.when]
+            for other, is_same in zip(others, same, strict=True):
+                pairs = zip(effect.arguments, other.arguments, strict=True)
+                equal = (*(EqualityCondition(a, b) for a, b in pairs if a != b), *other.when)
+                if not (equal or is_same):
+                    break  # they change one symbol wherever both do
+                if is_same:
+                    total = Calculation(SIGNS[other.operation], total, other.amount)
+                    where += equal
+                else:
+                    where.append(AnyOf((equal,), negated=True))
+            else:
+                for wrong, limit in (("<", quantity.least), (">", quantity.most)):
+                    if limit is not None:
+                        yield AnyOf(((*where, Comparison(total, wrong, limit)),), negated=True)
+
+
+def _may_coincide(one: AmountEffect, other: AmountEffect) -> bool:
+    """Return whether two effects can change one symbol."""
+    pairs = zip(one.arguments, other.arguments, strict=True)
+    return all(a == b or a.startswith("?") or b.startswith("?") for a, b in pairs)
+
+
 class _Writer:
     """Writes conditions as SPARQL patterns."""
 
@@ -215,7 +259,9 @@ class _Writer:
     def query(self, behavior: Behavior, when: Sequence[Condition] = ()) -> str:
         names = self.names(behavior, when)
         kinds = behavior.kinds
-        conditions = (*behavior.preconditions, *allowed(behavior, self.reading.problem.domain.situations), *when)
+        situations = self.reading.problem.domain.situations
+        bounds = (*allowed(behavior, situations), *allowed_together(behavior, situations))
+        conditions = (*behavior.preconditions, *bounds, *when)
         lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]
         head = f"# {behavior.name}: where its preconditions hold in the graph {SITUATION}\n"

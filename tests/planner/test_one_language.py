@@ -173,7 +173,7 @@ CASES = {
     "planner/transitions.py": "expression",
     "planner/grounded/formulas.py": "condition",
     "reasoner/reading/affordance.py": "positive",
-    "planner/validation.py": "test",
+    "planner/checked_conditions.py": "test",
     "tests/planner/naive.py": "holds",
 }
 """The function in which each evaluator has a case for every kind of condition."""

@@ -8,6 +8,7 @@ import pytest
 
 from planner.grounded.best_first import plan_level
 from planner.plan import Status
+from planner.solve import Request, solve
 from reasoner.amounts import Measure
 from reasoner.graph.knowledge import load
 from reasoner.pddl.exporting import to_pddl
@@ -470,9 +471,9 @@ def test_a_cost_with_many_values_is_one_price() -> None:
     [
         (
             "(or (q a) (q b))",
-            "the_world GOAL_REACHED true can't be reached, which needs a Q true, which needs the end of a P true",
+            "the_world GOAL_REACHED true can't be reached: never (a Q true or b Q true), which REACH_GOAL needs",
         ),
-        ("(q a)", "a Q true can't be reached, which needs the end of a P true"),
+        ("(q a)", "a Q true can't be reached: never a P false, which F needs"),
     ],
 )
 def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> None:
@@ -480,7 +481,7 @@ def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> No
      (:action f :parameters (?x) :precondition (not (p ?x)) :effect (q ?x))
      (:action g :parameters (?x) :precondition (q ?x) :effect (not (p ?x))))"""
     problem = f"(define (problem e) (:domain d) (:objects a b) (:init (p a) (p b)) (:goal {goal}))"
-    outcome = plan_level(imported(parse(domain, problem)).problem)
+    outcome = solve(Request(imported(parse(domain, problem)).problem))
     assert outcome.status is Status.UNSOLVABLE and outcome.reason is not None
     assert outcome.reason.text == reason
 
