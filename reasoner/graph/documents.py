@@ -13,14 +13,12 @@ import re
 from collections import Counter
 from functools import lru_cache
 from pathlib import Path
-from subprocess import TimeoutExpired
 from xml.parsers import expat
 
 import pyoxigraph as ox
 
 from reasoner.limits import check, current
 from reasoner.nesting import JSON, MOST_NESTED, TURTLE, nested, nested_elements
-from reasoner.workers import WorkerError, call
 
 log = logging.getLogger(__name__)
 
@@ -115,6 +113,10 @@ def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFo
 
 @lru_cache(maxsize=8)
 def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
+    from subprocess import TimeoutExpired
+
+    from reasoner.workers import WorkerError, call
+
     left = current().left
     try:
         parsed: bytes = call(as_trig, content, media_type, base, seconds=SECONDS, megabytes=MEGABYTES, timeout=left)
