@@ -1,7 +1,10 @@
 """How long commands and calls go on after their time limit; how long `confab validate` takes.
 
-    python -m benchmarks.overrun [--limits 1,5] [FILE.ttl …]    every command and call, in hard scenes and in the files
+    python -m benchmarks.overrun [--limits 1,5] [--rows 3,7] [FILE.ttl …]    commands and calls, in hard scenes and in the files
     python -m benchmarks.overrun validated                      what validation takes
+
+The longest limit comes first, in one scene after the other, until one takes longer; the others are tried in that scene.
+A call that ends before its limit says nothing about it: its cell says "before".
 
 The limit is one of the clock, so a call is watched from outside: what CPU time it has used when the limit is over, and in the end,
 with that of all processes that it runs.
@@ -14,11 +17,13 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from time import sleep
+from time import perf_counter
 
 SCENES = {
     "1,000 objects": ("served", "--objects", "1000"),
@@ -31,6 +36,14 @@ SCENES = {
 """Generated scenes that aren't planned in within five seconds, most of them."""
 VALIDATED = ("1,000 objects", "10,000 objects")
 EASY, TABLE = "200 objects", "the paper's table"
+SERVED = (EASY, "1,000 objects", "10,000 objects")
+"""Scenes in which a cup can be asked for, and that the memory is about."""
+LARGE = ("10,000 objects", "100,000 irrelevant objects")
+BODIES = (EASY, "three cups", TABLE)
+"""Scenes that physics can carry out."""
+SHIPPED = {TABLE: "beverage-serving", "three cups": "three-cups"}
+TRIED = 4
+"""Scenes in which a call is tried with the longest limit."""
 EVERY = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 COMMANDS: tuple[tuple[str, ...], ...] = (
     ("plan", "SCENE"),
@@ -39,23 +52,23 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("plan", "SCENE", "--mode", "optimal"),
     ("plan", "SCENE", "--mode", "paper"),
     ("plan", "SCENE", "--levels", "strict"),
-    ("plan", "SCENE", "--memory", "MEMORY"),
+    ("plan", "SERVED", "--memory", "MEMORY"),
     ("execute", "SCENE"),
     ("execute", "SCENE", "--mode", "paper"),
-    ("execute", TABLE, "--world", "pybullet"),
+    ("execute", "BODIES", "--world", "pybullet"),
     ("explain", "SCENE"),
-    ("explain", EASY, "--not", "cup1 LOCATION location3"),
+    ("explain", "SERVED", "--not", "cup1 LOCATION location3"),
     ("learn", "SCENE", "--memory", "NEW.ttl"),
     ("query", "SCENE", EVERY),
-    ("query", "SCENE", "--affords", "all"),
-    ("validate", "SCENE"),
-    ("export", "SCENE", "-o", "NEW"),
+    ("query", "LARGE", "--affords", "all"),
+    ("validate", "LARGE"),
+    ("export", "LARGE", "-o", "NEW"),
     ("run", "SCENE", "--no-video", "-o", "NEW"),
-    ("run", TABLE, "--no-video", "-o", "NEW"),
+    ("run", "BODIES", "--no-video", "-o", "NEW"),
     ("verify", TABLE, "PLAN.json", "--rollouts", "100"),
     ("verify", TABLE, "PLAN.json", "--rollouts", "100", "--workers", "2"),
 )
-"""Commands; each is tried with each limit, SCENE being one hard scene after the other."""
+"""Commands and where each is tried: in hard scenes, each beginning with another one (SCENE), in those above, or in one."""
 CALLS: tuple[tuple[str, str], ...] = (
     ("SCENE", "scene.plan(time_limit=S)"),
     ("SCENE", "scene.plan(time_limit=S, engine='none')"),
@@ -63,16 +76,16 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("SCENE", "scene.plan(time_limit=S, mode='paper')"),
     ("SCENE", "scene.explain(time_limit=S)"),
     ("SCENE", "scene.execute(time_limit=S)"),
-    (TABLE, "scene.execute(time_limit=S, world='pybullet')"),
+    ("BODIES", "scene.execute(time_limit=S, world='pybullet')"),
     (TABLE, "result.verify(100, time_limit=S)"),
-    (EASY, "result.why_not('cup1 LOCATION location3', seconds=S)"),
-    (EASY, "within: result.explain()"),
-    (EASY, "within: confab.Memory.of(scene).teach(scene, result)"),
-    ("SCENE", "within: confab.load(scene.knowledge.path)"),
-    ("SCENE", "within: scene.affordances()"),
+    ("SERVED", "result.why_not('cup1 LOCATION location3', seconds=S)"),
+    ("SERVED", "within: result.explain()"),
+    ("SERVED", "within: confab.Memory.of(scene).teach(scene, result)"),
+    ("LARGE", "within: confab.load(scene.knowledge.path)"),
+    ("LARGE", "within: scene.affordances()"),
     ("SCENE", "within: scene.query(EVERY)"),
-    ("SCENE", "within: confab.validate(scene.knowledge.path)"),
-    ("SCENE", "within: scene.problem"),
+    ("LARGE", "within: confab.validate(scene.knowledge.path)"),
+    ("LARGE", "within: scene.problem"),
 )
 """Calls in Python with the scene in which they are made; `within` stands for a block of `confab.within(S)`."""
 BEGUN = """
@@ -95,18 +108,40 @@ if 'result.' in sys.argv[3] or 'result)' in sys.argv[3]:
 try:
     if sys.argv[3].startswith("within: "):
         with confab.within(S):
-            eval(sys.argv[3].removeprefix("within: "))
+            got = eval(sys.argv[3].removeprefix("within: "))
     else:
-        eval(sys.argv[3])
+        got = eval(sys.argv[3])
 except Exception as error:
     from reasoner.limits import LimitError
     os._exit(3 if isinstance(error, LimitError) else print(repr(error)[:300], file=sys.stderr) or 4)
-os._exit(0)
+ended = getattr(got, 'outcome', None) or getattr(got, 'episode', None)
+os._exit(3 if ended and ended.status.value == 'gave-up' else 0)
 """
 
 
-def overrun(code: str, arguments: Sequence[str], seconds: float) -> tuple[int, float]:
-    """Return how a process ended that runs a code, and the CPU seconds that it used after its limit."""
+@dataclass(frozen=True)
+class Ended:
+    """How a process ended.
+
+    `took` are seconds of the clock since its limit began, `after` the seconds of CPU time after the limit; None: it ended before.
+    """
+
+    code: int
+    took: float
+    after: float | None
+
+    @property
+    def measured(self) -> bool:
+        """Whether the limit came before its end, or ended it early."""
+        return self.after is not None or self.code == 3
+
+    def share(self, seconds: float) -> str:
+        """Return what was used after the limit as a share of it, with the exit code."""
+        return f"{(self.after or 0.0) / seconds:.0%} ({self.code})" if self.measured else f"before ({self.code})"
+
+
+def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
+    """Run a code in a process of its own until it ends; it has to look at a limit of so many seconds."""
     told, tell = os.pipe()
     with subprocess.Popen(
         [sys.executable, "-c", (BEGUN + code).replace("SECONDS", repr(seconds)), *arguments],
@@ -117,13 +152,17 @@ def overrun(code: str, arguments: Sequence[str], seconds: float) -> tuple[int, f
     ) as process:
         os.close(tell)
         os.read(told, 1)
-        sleep(seconds)
-        used = cpu_seconds(process.pid) if process.poll() is None else None
-        _, state, resources = os.wait4(process.pid, 0) if used is not None else (0, process.returncode << 8, None)
+        began = perf_counter()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(seconds)
+            os.close(told)
+            return Ended(process.returncode, perf_counter() - began, None)
+        used = cpu_seconds(process.pid)
+        _, state, resources = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(state)
         os.close(told)
-    after = 0.0 if resources is None or used is None else resources.ru_utime + resources.ru_stime - used
-    return process.returncode, max(0.0, after)
+    after = resources.ru_utime + resources.ru_stime - used
+    return Ended(process.returncode, perf_counter() - began, max(0.0, after))
 
 
 def cpu_seconds(process: int) -> float:
@@ -146,8 +185,8 @@ def confab(*arguments: str) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def main(limits: Sequence[float], files: Sequence[str]) -> None:
-    """Print a row for each command and call: by limit the share of it that was used after it, and how the call ended."""
+def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str]) -> None:
+    """Print a row for each command and call, or for those chosen by number: by limit the share of it that was used after it."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
         scenes = {Path(file).stem: file for file in files}
         for number, (name, family) in enumerate({**SCENES, EASY: ("served", "--objects", "200")}.items()):
@@ -158,27 +197,39 @@ def main(limits: Sequence[float], files: Sequence[str]) -> None:
         confab("generate", "served", "--objects", "8", "-o", taught)
         confab("learn", taught, "--memory", memory)
         confab("plan", "beverage-serving", "-o", plan)
-        known = {**scenes, TABLE: "beverage-serving", "MEMORY": memory, "PLAN.json": plan}
-        hard, new = [name for name in scenes if name != EASY], count()
-        print(f"| call | scene | {' | '.join(f'{seconds:g} s' for seconds in limits)} |")
-        print("|---|---|" + "---|" * len(limits))
+        hard, turn, new = [name for name in scenes if name != EASY], count(), count()
+        known = {**scenes, **SHIPPED, "MEMORY": memory, "PLAN.json": plan}
+
+        def tried(said: str, words: Sequence[str], name: str, seconds: float) -> Ended:
+            if not words:
+                return overrun(CALL, [known[name], EVERY, said], seconds)
+            made = {word: str(Path(folder, f"{next(new)}{word}")) for word in ("NEW", "NEW.ttl")}
+            put = {**known, words[1]: known[name], **made}
+            return overrun(COMMAND, [*(put.get(word, word) for word in words), "--time-limit", f"{seconds:g}"], seconds)
+
+        print(f"| | call | scene | {' | '.join(f'{seconds:g} s' for seconds in limits)} |")
+        print("|---|---|---|" + "---|" * len(limits))
         rows: list[tuple[str, str, tuple[str, ...]]] = [
             (words[1], " ".join(("confab", words[0], *words[2:])), words) for words in COMMANDS
         ]
         rows += [(where, call, ()) for where, call in CALLS]
-        for number, (where, said, words) in enumerate(rows):
-            name = hard[number % len(hard)] if where == "SCENE" else where
-            print(f"| `{said.replace(EVERY, 'EVERY')}` | {name}", end="", flush=True)
+        for number, (where, said, words) in enumerate(rows, 1):
+            first = next(turn) if where == "SCENE" else 0
+            if chosen and number not in chosen:
+                continue
+            groups = {"SCENE": hard[first % len(hard) :] + hard[: first % len(hard)]}
+            groups |= {"SERVED": [*SERVED], "LARGE": [*LARGE], "BODIES": [*BODIES]}
+            ended: dict[tuple[str, float], Ended] = {}
+            for name in groups.get(where, [where])[:TRIED]:
+                ended[name, max(limits)] = tried(said, words, name, max(limits))
+                if ended[name, max(limits)].measured:
+                    break
+            scene = max(ended, key=lambda one: (ended[one].measured, ended[one].took))[0]
             for seconds in limits:
-                if words:
-                    made = {word: str(Path(folder, f"{next(new)}{word}")) for word in ("NEW", "NEW.ttl")}
-                    put = {**known, "SCENE": known[name], **made}
-                    arguments = [*(put.get(word, word) for word in words), "--time-limit", f"{seconds:g}"]
-                    code, after = overrun(COMMAND, arguments, seconds)
-                else:
-                    code, after = overrun(CALL, [known[name], EVERY, said], seconds)
-                print(f" | {after / seconds:.0%} ({code})", end="", flush=True)
-            print(" |", flush=True)
+                if (scene, seconds) not in ended:
+                    ended[scene, seconds] = tried(said, words, scene, seconds)
+            cells = " | ".join(ended[scene, seconds].share(seconds) for seconds in limits)
+            print(f"| {number} | `{said.replace(EVERY, 'EVERY')}` | {scene} | {cells} |", flush=True)
 
 
 def validated() -> None:
@@ -197,4 +248,9 @@ if __name__ == "__main__":
         validated()
     else:
         asked = given.pop(given.index("--limits") + 1) if "--limits" in given else "1,5,20"
-        main([float(one) for one in asked.split(",")], [word for word in given if word != "--limits"])
+        rows = given.pop(given.index("--rows") + 1) if "--rows" in given else ""
+        main(
+            [float(one) for one in asked.split(",")],
+            {int(one) for one in rows.split(",") if one},
+            [word for word in given if word not in ("--limits", "--rows")],
+        )

@@ -55,8 +55,11 @@ class PlanTree:
                 _grow(tree, step, self.notes)
             yield tree
         else:
-            lines = (self.title, *_drawn(self.plan.steps, self.notes, ""))
-            yield Segment(strip_control_codes("\n".join(lines)) + "\n")
+            yield Segment(f"{strip_control_codes(self.title)}\n")
+            for line in _drawn(
+                self.plan.steps, self.notes, ""
+            ):  # rich splits a segment of many lines in quadratic time
+                yield Segment(f"{strip_control_codes(line)}\n")
 
 
 def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:

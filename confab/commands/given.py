@@ -31,7 +31,7 @@ def load_scene(source: str, iri: str | None = None) -> Scene:
 def doubt(scene: Scene, deadline: Deadline) -> None:
     """Say in one line if `confab validate` would find errors in a scene of the user's own, as far as there is time to look."""
     path = scene.knowledge.path
-    if path is None or path.is_relative_to(ontology.ROOT):
+    if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return
     from reasoner.limits import LimitError, within
     from reasoner.validation.validate import quick_errors
@@ -44,13 +44,15 @@ def doubt(scene: Scene, deadline: Deadline) -> None:
         remark(f"'confab validate {path}' finds errors, so this may not be what was meant: {errors[0].what}{more}")
 
 
-def blame_reach(scene: Scene, outcome: Outcome) -> None:
-    """Say in a line each, where there is no plan, which places no hand reaches and what is in the way."""
-    if outcome.plan is None:
+def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
+    """Say which places no hand reaches and what is in the way, a line each: where there is no plan, and time is left."""
+    if outcome.plan is None and deadline.left != 0:
         from confab.reaching import unreached
+        from reasoner.limits import LimitError, within
 
-        for line in unreached(scene):
-            remark(line)
+        with suppress(LimitError), within(deadline):
+            for line in unreached(scene):
+                remark(line)
 
 
 NAMED = 3

@@ -117,7 +117,7 @@ def plan(
         # What draws trees is imported for a plan alone: there may be no time left for it.
         show_result(result.json() if as_json else result if result.solved else str(result))
     doubt(loaded, deadline)
-    blame_reach(loaded, result.outcome)
+    blame_reach(loaded, result.outcome, deadline)
     raise Exit(EXIT[result.outcome.status.value])
 
 

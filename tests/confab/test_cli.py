@@ -11,6 +11,9 @@ import pytest
 from rich.console import Console
 
 from confab import load
+from confab.commands.given import blame_reach
+from planner.plan import Outcome, Status
+from reasoner.limits import Deadline
 
 
 def confab(*arguments: str, cwd: Path | None = None, **env: str) -> subprocess.CompletedProcess[str]:
@@ -42,6 +45,17 @@ def test_a_plan_is_the_same_tree_in_a_pipe_as_in_a_terminal() -> None:
     assert [line.rstrip() for line in plain.getvalue().splitlines()] == [
         line.rstrip() for line in shown.getvalue().splitlines()
     ]
+
+
+def test_a_plan_is_drawn_into_a_pipe_line_by_line_which_takes_time_that_grows_with_its_length() -> None:
+    pieces = Console(file=StringIO(), width=200).render(load("beverage-serving").plan())
+    assert max(piece.text.count("\n") for piece in pieces) == 1
+
+
+def test_once_the_limit_is_over_a_plan_command_looks_for_nothing_more_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load("beverage-serving")
+    monkeypatch.setattr("confab.reaching.unreached", lambda _: pytest.fail("reach is looked at after the limit"))
+    blame_reach(scene, Outcome(Status.GAVE_UP, None), Deadline.after(0.0))
 
 
 def test_plan_as_json_has_the_documented_keys() -> None:
