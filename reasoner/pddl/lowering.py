@@ -22,7 +22,9 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
+from reasoner.amounts import inside as parts
 from reasoner.derivation import circular
+from reasoner.graph.knowledge import KnowledgeError
 from reasoner.pddl.absence import Kept
 from reasoner.pddl.formulas import FALSE as NEVER
 from reasoner.pddl.formulas import TRUE as ALWAYS
@@ -412,6 +414,7 @@ class Lowering:
         for effect in behavior.amounts:
             cell, inside = self.cell(effect, terms, scope)
             if cell.when != NEVER:
+                self.check_whole(behavior, effect)
                 there = both(self.words.there(effect.amount, inside))
                 scope.needs.append(no(some(cell.own, both([cell.when, no(there)]))))
                 at = self.words.amount(effect.situation, cell.terms)
@@ -433,6 +436,29 @@ class Lowering:
                 yield from (Change(Assignment(operation, at, by), when, own) for operation, by, _ in changes)
             else:
                 yield Change(Assignment("assign", at, result), when, own)
+
+    def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
+        """Raise `KnowledgeError` where an effect may give a fraction of an amount of whole numbers: PDDL has only numbers."""
+        situations = self.words.situations
+        quantity = situations[effect.situation].quantity
+        if quantity is None or not quantity.whole:
+            return
+        for part in parts(effect.amount):
+            match part:
+                case Calculation("/"):
+                    fraction = True
+                case Amount(situation):
+                    fraction = not getattr(situations[situation].quantity, "whole", False)
+                case Measure(relation):
+                    rows = self.problem.relations.get(relation, frozenset())
+                    fraction = any(Fraction(row[-1]).denominator > 1 for row in rows)
+                case _:
+                    fraction = isinstance(part, Fraction) and part.denominator > 1
+            if fraction:
+                raise KnowledgeError(
+                    f"{behavior.name} may give {effect.situation} a fraction, which its whole numbers forbid and PDDL can't; "
+                    "change it by whole numbers to export it"
+                )
 
     # ------------------------------------------------------------------------------------------------------- goals
 
