@@ -16,8 +16,9 @@ from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
 from confab.interchange import outcome_json
 from confab.known import Known
+from planner.certified import certified
 from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
-from planner.solve import DEFAULT_MODE, MODES, Request, certified, solve
+from planner.solve import DEFAULT_MODE, MODES, Request, solve
 from planner.validation import Fault, validate
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.limits import Deadline, within
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
     from planner.causal_links import Purpose
+    from planner.certificates import Certificate
 
 NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
@@ -367,10 +369,17 @@ class Result:
     def explain(self) -> Account:
         """Return why each step of the plan is there; or, where there is no plan, why."""
         from confab.show import summary
-        from confab.why import Account, account
+        from confab.why import Account, account, proved
 
         headline = summary(self.outcome)
-        return account(self.plan, self.purposes, self.labels, headline) if self.solved else Account(headline)
+        if self.solved:
+            return account(self.plan, self.purposes, self.labels, headline)
+        return Account(headline, proof=() if self.certificate is None else proved(self.certificate, self.labels))
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """What proves that there is no plan, verified by `planner.certificate_checks`; None unless it is unsolvable."""
+        return self.outcome.certificate
 
     @property
     def solved(self) -> bool:

@@ -20,8 +20,13 @@ from reasoner.names import nearest
 from reasoner.reading.goals import parse_fact
 from reasoner.symbols import Behavior, Fact, Problem, Symbol
 
+MOST_TOLD = 12
+"""Maximum number of facts of one kind that are told of a certificate."""
+
 if TYPE_CHECKING:
     from rich.tree import Tree
+
+    from planner.certificates import Certificate
 
 Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
 """Plans anew for some goals; also returns the problem that was planned in, and what people call what is in it."""
@@ -142,19 +147,24 @@ class WhyNot:
 
 @dataclass(frozen=True)
 class Account:
-    """Why a plan is as it is, step by step; or, where there is none, why: `reason`."""
+    """Why a plan is as it is, step by step; or, where there is none, why: `proof` says what a certificate claims."""
 
     headline: str
     steps: tuple[Because, ...] = ()
     plan: Plan | None = field(default=None, repr=False)
+    proof: tuple[str, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {"headline": self.headline, "steps": [step.json() for step in self.steps]}
+        return {
+            "headline": self.headline,
+            "steps": [step.json() for step in self.steps],
+            "proof": list(self.proof),
+        }
 
     def __str__(self) -> str:
         """Return it as text, a step to a line, and what needs it behind it."""
-        lines = [self.headline]
+        lines = [self.headline, *(f"  {line}" for line in self.proof)]
         for step in self.steps:
             why = f": {step.needs[0]}" if step.needs else ""
             lines.append(f"{'  ' * len(step.path)}{step.number}  {step.what}{why}")
@@ -171,6 +181,8 @@ class Account:
 
         tree = Tree(Text(self.headline), guide_style="dim")
         branches: dict[tuple[int, ...], Tree] = {(): tree}
+        for line in self.proof:
+            tree.add(Text(line))
         for step in self.steps:
             why = Text(f"  {step.needs[0]}" if step.needs else "", "italic dim")
             branches[step.path] = branches[step.path[:-1]].add(
@@ -190,7 +202,8 @@ class Account:
             return tag("li", tag("details", inside, open=len(step.path) == 1))
 
         steps = [item(step) for step in below.get((), ())]
-        return styled(tag("p", self.headline), tag("ul", steps, class_="plan"))
+        lines = [tag("li", line) for line in self.proof]
+        return styled(tag("p", self.headline), tag("ul", [*lines, *steps], class_="plan"))
 
 
 # ------------------------------------------------------------------------------------------------------------------ why
@@ -282,6 +295,38 @@ def _because(step: Step, purpose: Purpose, labels: Labels, steps: Steps, number:
         tuple(f"{labels.fact(change.fact)} (before: {labels.name(change.before)})" for change in purpose.gives),
         needs or ("nothing that follows needs what it gives",),
     )
+
+
+def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
+    """Return what a certificate of unsolvability claims, a sentence a line.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    labels : Labels
+        What people call the facts that the certificate names.
+    """
+    amounts = {name for name, kind in labels.domain.situations.items() if kind.quantity is not None}
+    kept = [Fact(symbol, value) for symbol, value in sorted(certificate.always.items())]
+    lines = ["An independent checker has verified this of every state that can be reached:"]
+    lines += _listed("never: ", [labels.fact(fact) for fact in sorted(certificate.never)])
+    lines += _listed("always: ", [labels.fact(fact) for fact in kept if fact.symbol.situation not in amounts])
+    bounded = [f"{labels.about(fact.symbol)} is {fact.value}" for fact in kept if fact.symbol.situation in amounts]
+    lines += _listed("always: ", bounded)
+    if certificate.told_apart:
+        about = [labels.about(symbol) for symbol in sorted(certificate.told_apart)]
+        more = f" and {len(about) - MOST_TOLD} more" * (len(about) > MOST_TOLD)
+        cases = f"{certificate.cases} combination{'s' * (certificate.cases != 1)}"
+        lines.append(f"of the values of {'; '.join(about[:MOST_TOLD])}{more}, {cases} can be reached")
+    goals = " and ".join(labels.fact(fact) for fact in certificate.unmet[:MOST_TOLD])
+    together = "they never hold together" if len(certificate.unmet) > 1 else "that never holds"
+    return (*lines, f"It is wanted that {goals}: {together}.")
+
+
+def _listed(before: str, sentences: Sequence[str]) -> list[str]:
+    """Return a line for each of some sentences, and one that counts the others."""
+    lines = [f"{before}{sentence}" for sentence in sentences[:MOST_TOLD]]
+    return [*lines, *([f"{before}{len(sentences) - MOST_TOLD} facts more"] if len(sentences) > MOST_TOLD else [])]
 
 
 def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Labels, headline: str) -> Account:

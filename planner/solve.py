@@ -21,21 +21,19 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
+from planner.certified import certified
 from planner.levels import levels_left
-from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, TooLargeError, UnsolvableError
+from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
 from planner.plan_costs import cost_of
 from planner.validation import validate
 from reasoner.limits import Deadline, OutOfTimeError, within
 from reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
-    from planner.certificates import Certificate
     from planner.experience.advice import Memory
     from reasoner.memory.links import Links
 
 DEFAULT_MODE = "guarded"
-ADDED_UP = 200_000
-"""Joins of at most so many rows are made to find out by how much an amount falls short."""
 
 
 class RejectedPlanError(Exception):
@@ -111,54 +109,6 @@ def solve(request: Request) -> Outcome:
     if all(step.level == first for step in plan.steps):
         return outcome  # no level is left: nothing to tell
     return replace(outcome, left=tuple(levels_left(request.problem, plan)))
-
-
-def certified(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return an outcome; "unsolvable" with a certificate that the checker accepts, or as given up where there is none.
-
-    Parameters
-    ----------
-    problem : Problem
-        The whole task.
-    outcome : Outcome
-        If it has a certificate already, that one is tried first.
-    """
-    if outcome.status is not Status.UNSOLVABLE:
-        return outcome
-    from planner.certificate_checks import refusal
-    from planner.certificate_reasons import told
-    from planner.certifying import certify
-
-    why = "none was found within the work that is allowed"
-    certificate, tried = outcome.certificate, False
-    while certificate is not None or not tried:
-        if certificate is None:
-            certificate, tried = certify(problem), True
-        if certificate is not None:
-            refused = refusal(problem, certificate)
-            if refused is None:
-                reason = _added_up(problem, certificate) or told(problem, certificate)
-                return replace(outcome, certificate=certificate, reason=reason)
-            why = f"the checker refuses it: {refused}"
-            certificate = None
-    said = f"; {outcome.reason.text}" if outcome.reason else ""
-    reason = Reason(
-        f"no plan was found, and that there is none couldn't be certified: {why}{said}",
-        outcome.reason.terms if outcome.reason else (),
-    )
-    return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)
-
-
-def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
-    """Return by how much an amount falls short, which says more than the combinations in which it does."""
-    if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
-        return None
-    from planner.grounded.grounding import ground
-
-    with suppress(TooLargeError, MemoryError, OutOfTimeError):
-        task = ground(problem, most=ADDED_UP)
-        return task if isinstance(task, Reason) and task.terms else None
-    return None
 
 
 def _with_experience(request: Request) -> Outcome:

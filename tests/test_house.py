@@ -149,6 +149,7 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 "validation",
                 "checked_amounts",
                 "checked_definitions",
+                "certified",
                 "certifying",
                 "certificate_reasons",
                 "language",

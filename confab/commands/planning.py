@@ -351,9 +351,11 @@ def explain(
 
     with limited(time_limit):
         told = _explained(scene, which, instead, goal, memory, step, level, against, plot)
-    show_result(told.json() if as_json else told)
     if isinstance(told, Result):
+        because = told.explain()
+        show_result({**told.json(), "proof": list(because.proof)} if as_json else because)
         raise Exit(EXIT[told.outcome.status.value])
+    show_result(told.json() if as_json else told)
 
 
 def _explained(

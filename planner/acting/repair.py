@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
+from planner.certified import certified
 from planner.hierarchical.planner import plan as fast_plan
 from planner.hierarchical.recovery import Recovery
 from planner.hierarchical.refinement_cache import RefinedStep
@@ -29,7 +30,7 @@ from planner.plan_costs import cost_of, costs_of_steps
 from planner.transitions import Cell, arguments_of, key_of
 from planner.validation import validate
 from reasoner.amounts import meets
-from reasoner.limits import LimitError
+from reasoner.limits import LimitError, within
 from reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1
@@ -171,7 +172,8 @@ def replan(
     left = limits.until(end)
     outcome = planner(problem, limits=left) if planner else fast_plan(problem, limits=left, using=using)
     if outcome.plan is None:
-        return None, outcome
+        with within(left.seconds):
+            return None, certified(now, outcome)
     steps = renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps
     reason = rejected(now, steps)
     return (None, replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason)) if reason else (steps, outcome)

@@ -157,6 +157,19 @@ def test_no_plan_is_explained() -> None:
     assert "location7" in told.headline
 
 
+def test_what_proves_that_there_is_no_plan_is_told_in_the_scenes_words() -> None:
+    ward = str(Path(__file__).parents[1] / "planner/cases/reason-key-opens-nothing/ward-small.ttl")
+    result = confab.load(ward).plan()
+    assert result.certificate is not None
+    told = str(result.explain())
+    assert "no Key opens cabinet0" in told
+    assert "never: cabinet0 lock unlocked" in told
+    assert told.endswith("It is wanted that patient0 received drug0: that never holds.")
+    shown = CliRunner().invoke(app, ["explain", ward])
+    assert shown.exit_code == 1
+    assert "An independent checker has verified this" in shown.output
+
+
 def test_the_command_line_tells_all_of_it() -> None:
     run = CliRunner().invoke
     assert "it is wanted that cup 1" in run(app, ["explain", "beverage-serving"]).output

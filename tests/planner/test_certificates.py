@@ -14,9 +14,10 @@ import pytest
 import confab
 from planner.certificate_checks import refusal
 from planner.certificates import Certificate, certificate_from, certificate_json
+from planner.certified import certified
 from planner.certifying import certify
 from planner.plan import Outcome, Reason, Status
-from planner.solve import MODES, Request, certified, solve
+from planner.solve import MODES, Request, solve
 from reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
 from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy

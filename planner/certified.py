@@ -1,0 +1,65 @@
+"""The door through which an "unsolvable" leaves: with a certificate that an independent checker accepts, or as given up."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from planner.plan import Outcome, Reason, Status, TooLargeError
+from reasoner.limits import OutOfTimeError
+from reasoner.symbols import Problem
+
+if TYPE_CHECKING:
+    from planner.certificates import Certificate
+
+ADDED_UP = 200_000
+"""Maximum rows of a join that is made to find out by how much an amount falls short."""
+
+
+def certified(problem: Problem, outcome: Outcome) -> Outcome:
+    """Return an outcome; "unsolvable" with a certificate that the checker accepts, or as given up where there is none.
+
+    Parameters
+    ----------
+    problem : Problem
+        The whole task.
+    outcome : Outcome
+        If it has a certificate already, that one is tried first.
+    """
+    if outcome.status is not Status.UNSOLVABLE:
+        return outcome
+    from planner.certificate_checks import refusal
+    from planner.certificate_reasons import told
+    from planner.certifying import certify
+
+    why = "none was found within the work that is allowed"
+    certificate, tried = outcome.certificate, False
+    while certificate is not None or not tried:
+        if certificate is None:
+            certificate, tried = certify(problem), True
+        if certificate is not None:
+            refused = refusal(problem, certificate)
+            if refused is None:
+                reason = _added_up(problem, certificate) or told(problem, certificate)
+                return replace(outcome, certificate=certificate, reason=reason)
+            why = f"the checker refuses it: {refused}"
+            certificate = None
+    said = f"; {outcome.reason.text}" if outcome.reason else ""
+    reason = Reason(
+        f"no plan was found, and that there is none couldn't be certified: {why}{said}",
+        outcome.reason.terms if outcome.reason else (),
+    )
+    return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)
+
+
+def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
+    """Return by how much an amount falls short, which says more than the combinations in which it does."""
+    if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
+        return None
+    from planner.grounded.grounding import ground
+
+    with suppress(TooLargeError, MemoryError, OutOfTimeError):
+        task = ground(problem, most=ADDED_UP)
+        return task if isinstance(task, Reason) and task.terms else None
+    return None
