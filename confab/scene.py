@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import ontology
 from confab import planning
-from confab.accepting import AnyPlan, Facts, plan_of
+from confab.accepting import AnyPlan, Facts, number, plan_of
 from confab.known import Known
 from confab.planning import Result
 from planner.plan import Plan
@@ -18,6 +18,7 @@ from planner.solve import DEFAULT_MODE
 from reasoner.graph.inference import infer
 from reasoner.graph.knowledge import KnowledgeError
 from reasoner.graph.knowledge import load as load_graph
+from reasoner.limits import Deadline, within
 from reasoner.memory.links import Links
 from reasoner.symbols import FALSE, Fact
 
@@ -159,8 +160,18 @@ class Scene(Known):
         return export_pddl(self.problem, level, Path(folder))
 
     def explain(self, goals: Facts = (), **options: Any) -> Account:
-        """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes."""
-        return self.plan(goals, **options).explain()
+        """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes.
+
+        Raises
+        ------
+        reasoner.limits.OutOfTimeError
+            The time limit, which holds for both, is over before it is known why.
+        """
+        limit = options.get("time_limit")
+        if not isinstance(limit, Deadline):
+            number("time_limit", limit, "seconds as a number, e.g. 5")
+        with within(limit) as deadline:
+            return self.plan(goals, **options | ({} if limit is None else {"time_limit": deadline})).explain()
 
     def _repr_html_(self) -> str:
         from confab.labels import labels_of

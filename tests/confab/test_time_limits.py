@@ -18,7 +18,7 @@ from confab.scene import Scene
 from confab.terminal import GAVE_UP
 from planner.plan import Status
 from reasoner.generate import write_scene
-from reasoner.limits import LimitError, OutOfTimeError
+from reasoner.limits import LimitError, OutOfTimeError, current
 
 SOON, SLACK = 0.1, 1.5
 """The limit, and CPU seconds within which a call ends, imports included: without a limit each takes longer, or doesn't end."""
@@ -119,3 +119,16 @@ def test_a_simulation_ends_by_its_time_limit() -> None:
     with pytest.raises(OutOfTimeError, match="while simulating"):
         scene.verify(result, 50, time_limit=1.0)
     assert process_time() - begin < 4.0
+
+
+def test_explaining_a_plan_is_within_the_limit_of_planning_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    held: list[float] = []
+    explain = Result.explain
+
+    def watched(result: Result) -> object:
+        held.append(current().seconds)
+        return explain(result)
+
+    monkeypatch.setattr(Result, "explain", watched)
+    confab.load("beverage-serving").explain(time_limit=60.0)
+    assert held == [60.0]
