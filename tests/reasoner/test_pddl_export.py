@@ -66,7 +66,11 @@ def test_a_random_world_costs_the_same_behind_its_export_on_every_level(seed: in
     behaviors = {name: spread(one, meant.classes) for name, one in meant.domain.behaviors.items()}
     problem = replace(meant, scene="x/d/p", domain=replace(meant.domain, behaviors=behaviors))
     for level in problem.domain.levels:
-        again = round_trip(problem, level)
+        try:
+            again = round_trip(problem, level)
+        except KnowledgeError as refused:
+            assert "a fraction, which its whole numbers forbid and PDDL can't" in str(refused)
+            continue
         try:
             assert least(again, most=4 * MOST) == pytest.approx(least(problem, level))
         except TooManyStatesError:
