@@ -11,14 +11,14 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.pddl import Run, planners, run
-from planner.hierarchical import bounds as optimal
-from planner.plan import Limits
-from planner.plan_costs import cost_of
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import load
-from reasoner.pddl.exporting import to_pddl
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem
+from confab.planner.hierarchical import bounds as optimal
+from confab.planner.plan import Limits
+from confab.planner.plan_costs import cost_of
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem
 
 HERE = Path(__file__).parent
 SHORT, LONG, PROVING = 60, 300, 20

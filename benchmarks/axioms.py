@@ -23,16 +23,16 @@ from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks.pddl import peers, planners, run
-from planner.plan import Limits, Status
-from planner.solve import Request, solve
-from planner.validation import Facts
-from reasoner.derivation import circular
-from reasoner.graph.knowledge import load
-from reasoner.pddl.exporting import to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.reading.problem import read
-from reasoner.symbols import TRUE, Problem, Symbol
+from confab.planner.plan import Limits, Status
+from confab.planner.solve import Request, solve
+from confab.planner.validation import Facts
+from confab.reasoner.derivation import circular
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import TRUE, Problem, Symbol
 from worlds.axioms import Plain, axioms
 
 SECONDS = 60.0

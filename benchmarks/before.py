@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from statistics import mean
 
-from reasoner.generate import write_scene
+from confab.reasoner.generate import write_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED, LONG, LIMIT = 100, 1.0, 60.0

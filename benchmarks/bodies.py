@@ -25,12 +25,12 @@ from statistics import median
 from typing import Any
 
 import confab
+from confab.planner.plan import Step
+from confab.reasoner.symbols import Fact
 from confab.scene import Scene
-from planner.plan import Step
-from reasoner.symbols import Fact
-from sim.rollouts import Trial, wilson
-from sim.staging import Perturbation
-from sim.verify import Rollout, expectations
+from confab.sim.rollouts import Trial, wilson
+from confab.sim.staging import Perturbation
+from confab.sim.verify import Rollout, expectations
 
 KEPT = Path("confab-out/bodies.jsonl")
 DEVELOPMENT, REPORTING = 7000, 80000

@@ -15,7 +15,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
+from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 
 HERE = Path(__file__).resolve().parent
 TYPE = ox.NamedNode(RDF + "type")
@@ -81,9 +81,9 @@ def sources(folder: Path) -> None:
     from confab.authoring import new_domain
     from confab.memory import Memory
     from confab.pddl_commands import import_pddl
-    from reasoner.generate import write_scene
-    from reasoner.memory.links import Links
-    from reasoner.reading.observed import save_observed
+    from confab.reasoner.generate import write_scene
+    from confab.reasoner.memory.links import Links
+    from confab.reasoner.reading.observed import save_observed
 
     new_domain("tearoom", folder / "tearoom")
     (folder / "tearoom" / "tearoom-scene.ttl").rename(folder / "tearoom" / "scene.ttl")

@@ -20,7 +20,7 @@ from benchmarks.broken_inputs import (
     mutated_triples,
     mutated_words,
 )
-from reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
+from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS, XSD
 
 ROOT = HERE.parent
 WORLDS = {"defined": ("packing", "gallery"), "amounts": ("canteen",), "updates": ("packing-updates", "canteen-updates")}
@@ -120,7 +120,7 @@ def sources(folder: Path) -> None:
     """Write what the cases begin with: small worlds with definitions or amounts, in both forms; a memory of each."""
     import confab
     from confab.memory import Memory
-    from reasoner.updates.converting import convert
+    from confab.reasoner.updates.converting import convert
 
     for world in ("packing", "gallery", "canteen"):
         place = folder / world

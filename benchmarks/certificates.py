@@ -12,11 +12,11 @@ from dataclasses import replace
 from random import Random
 from time import process_time
 
-from planner.certificate_checks import refusal
-from planner.certificates import Certificate
-from planner.plan import Limits, Status
-from planner.solve import Request, solve
-from reasoner.symbols import TRUE, Fact, Problem, Symbol
+from confab.planner.certificate_checks import refusal
+from confab.planner.certificates import Certificate
+from confab.planner.plan import Limits, Status
+from confab.planner.solve import Request, solve
+from confab.reasoner.symbols import TRUE, Fact, Problem, Symbol
 from worlds.agreement import solvable
 from worlds.families import random_table
 from worlds.hierarchies import hierarchy

@@ -22,14 +22,14 @@ from time import process_time
 from typing import TypeAlias
 
 from benchmarks.execution import KINDS, Trial, after_intervention, random_intervention, rest_after, served
-from planner.acting.repair import mend
-from planner.experience import advice
-from planner.grounded.best_first import plan_level
-from planner.hierarchical.planner import plan
-from planner.hierarchical.serialization import compiled
-from planner.hierarchical.unsolvability import impossible
-from planner.paper.hierarchy import plan as paper_plan
-from planner.plan import Limits, Outcome
+from confab.planner.acting.repair import mend
+from confab.planner.experience import advice
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.hierarchical.planner import plan
+from confab.planner.hierarchical.serialization import compiled
+from confab.planner.hierarchical.unsolvability import impossible
+from confab.planner.paper.hierarchy import plan as paper_plan
+from confab.planner.plan import Limits, Outcome
 from worlds.families import FAMILIES, family, random_table
 from worlds.hierarchies import hierarchy
 from worlds.lessons import taught

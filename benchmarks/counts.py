@@ -13,10 +13,10 @@ from statistics import median
 from time import process_time
 
 import confab
-from ontology import scenes
-from planner.plan import Outcome
-from reasoner.generate import write_scene
-from reasoner.symbols import Problem
+from confab.ontology import scenes
+from confab.planner.plan import Outcome
+from confab.reasoner.generate import write_scene
+from confab.reasoner.symbols import Problem
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SIZES, SEED, SECONDS = (4, 10, 20, 50), 100, 60.0

@@ -18,14 +18,14 @@ from pathlib import Path
 from random import Random
 from time import process_time
 
-from planner.hierarchical.operators import Program
-from planner.transitions import Table, key_of
-from planner.validation import Facts
-from reasoner.amounts import written
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.reading.rows import decimal
-from reasoner.symbols import TRUE, Problem, Symbol
+from confab.planner.hierarchical.operators import Program
+from confab.planner.transitions import Table, key_of
+from confab.planner.validation import Facts
+from confab.reasoner.amounts import written
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.rows import decimal
+from confab.reasoner.symbols import TRUE, Problem, Symbol
 from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, plainly, random_state
 
 BATCH = 500

@@ -21,21 +21,21 @@ import confab
 from confab.execution import execute
 from confab.gantt import save_gantt
 from confab.labels import labels_of
+from confab.planner.acting.episode import Change, End, Episode, Intervention
+from confab.planner.acting.executive import Patience, act
+from confab.planner.acting.failure_memory import Caution
+from confab.planner.acting.repair import difference, mend, replan
+from confab.planner.acting.symbolic_world import Said, SymbolicWorld, disturbed, with_individual
+from confab.planner.hierarchical.planner import compiled
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.plan import Limits, Plan, Step
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import successor
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 from confab.scene import Scene
-from planner.acting.episode import Change, End, Episode, Intervention
-from planner.acting.executive import Patience, act
-from planner.acting.failure_memory import Caution
-from planner.acting.repair import difference, mend, replan
-from planner.acting.symbolic_world import Said, SymbolicWorld, disturbed, with_individual
-from planner.hierarchical.planner import compiled
-from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import Limits, Plan, Step
-from planner.plan_costs import cost_of
-from planner.validation import successor
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
 
 KINDS = ("move", "remove", "add", "empty", "fill", "goal changed", "goal added", "goal dropped")
 OUT = Path("confab-out/execution")
@@ -428,9 +428,9 @@ def _is_source(problem: Problem, step: Step) -> bool:
 
 def both_hands() -> None:
     """Print makespan with both hands against serial, and draw the Gantt strip."""
-    from sim.together import perform_together
-    from sim.verify import expectations, verify
-    from sim.world import World
+    from confab.sim.together import perform_together
+    from confab.sim.verify import expectations, verify
+    from confab.sim.world import World
 
     scene = confab.load("beverage-serving")
     plan = Trial.of(scene.problem).plan

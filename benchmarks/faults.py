@@ -13,10 +13,10 @@ from functools import cache
 
 import confab
 from benchmarks.physics import case
-from sim import faults
-from sim.faults import PlantedFault
-from sim.rollouts import Trial
-from sim.verify import Rollout, expectations
+from confab.sim import faults
+from confab.sim.faults import PlantedFault
+from confab.sim.rollouts import Trial
+from confab.sim.verify import Rollout, expectations
 
 MEANS = {
     "unreachable": "beyond_m",
@@ -168,7 +168,9 @@ def rows() -> Iterator[tuple[bool, str]]:
 
 def main() -> None:
     """Print the table."""
-    print("| fault | planted as (`sim.faults`) | stops at | code | objects | number |\n|---|---|---|---|---|---|")
+    print(
+        "| fault | planted as (`confab.sim.faults`) | stops at | code | objects | number |\n|---|---|---|---|---|---|"
+    )
     good = 0
     for found, text in rows():
         good += found

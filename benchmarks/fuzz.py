@@ -43,8 +43,8 @@ import pyoxigraph as ox
 from benchmarks import broken_inputs, broken_worlds
 from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Call
 from benchmarks.broken_worlds import WORLDS
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.symbols import Problem
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     from confab.planning import Result
@@ -263,8 +263,8 @@ def _check_files(call: Call, case: Path) -> None:
 
 def _check_plan(result: Result) -> None:
     """Raise AssertionError if a plan is none, or if there is one where the answer is that there is none."""
-    from planner.plan import Status
-    from planner.validation import validate
+    from confab.planner.plan import Status
+    from confab.planner.validation import validate
     from worlds.agreement import cheapest
 
     outcome, problem = result.outcome, result.problem

@@ -30,9 +30,9 @@ import pyoxigraph as ox
 from confab import load as confab_scene
 from confab.cli import main as confab
 from confab.memory import Memory
+from confab.reasoner.files import alone
+from confab.reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 from confab.terminal import INTERRUPTED
-from reasoner.files import alone
-from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
 COMMANDS = {
     "learn": "learn",

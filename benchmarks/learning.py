@@ -61,13 +61,13 @@ def domains(folder: Path) -> Iterator[tuple[Path, list[Path], dict[str, list[Pat
 
 def teach(domain: Path, training: list[Path], target: Path) -> str:
     """Learn from problems as long as there is time, write what was learned, and say how much."""
-    from planner.experience.leading import rules_in
-    from planner.experience.lessons import teach as learn
-    from reasoner.memory.experience import Experience
-    from reasoner.memory.experience_file import save
-    from reasoner.names import Names
-    from reasoner.pddl.importing import imported
-    from reasoner.pddl.syntax import parse_files
+    from confab.planner.experience.leading import rules_in
+    from confab.planner.experience.lessons import teach as learn
+    from confab.reasoner.memory.experience import Experience
+    from confab.reasoner.memory.experience_file import save
+    from confab.reasoner.names import Names
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
 
     experience, begin = Experience("lesson"), process_time()
     for file in training:
@@ -87,13 +87,13 @@ def _said(runs: list[Run], lama: list[Run]) -> str:
 
 def solve(domain: str, problem: str, target: str, memory: str | None = None) -> None:
     """Solve one problem, and write its plan (what a benchmarked process does)."""
-    from planner.experience.advice import Memory, plan
-    from planner.plan import Limits
-    from planner.validation import validate
-    from reasoner.memory.experience_file import load
-    from reasoner.names import Names
-    from reasoner.pddl.importing import imported
-    from reasoner.pddl.syntax import parse_files
+    from confab.planner.experience.advice import Memory, plan
+    from confab.planner.plan import Limits
+    from confab.planner.validation import validate
+    from confab.reasoner.memory.experience_file import load
+    from confab.reasoner.names import Names
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
     known = None if memory is None else Memory(load(Path(memory), Names(())))

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from statistics import median
 from time import process_time
 
-from planner.hierarchical.planner import plan as default_plan
-from planner.paper.hierarchy import plan as paper_plan
-from planner.plan import Limits, Outcome, Plan, Status
-from reasoner.symbols import Problem
+from confab.planner.hierarchical.planner import plan as default_plan
+from confab.planner.paper.hierarchy import plan as paper_plan
+from confab.planner.plan import Limits, Outcome, Plan, Status
+from confab.reasoner.symbols import Problem
 from worlds.agreement import complaints, on_top, solvable
 from worlds.hierarchies import hierarchy
 

@@ -22,19 +22,19 @@ from statistics import median
 from time import process_time
 
 import confab
-import ontology
-from planner.experience.advice import Memory, plan
-from planner.experience.leading import rules_in
-from planner.experience.lessons import live, teach
-from planner.hierarchical import planner as fast
-from planner.plan import Limits, Outcome
-from planner.validation import validate
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Tally
-from reasoner.memory.experience_file import load, save
-from reasoner.names import Names
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import PddlError, parse_files
-from reasoner.symbols import Problem
+from confab import ontology
+from confab.planner.experience.advice import Memory, plan
+from confab.planner.experience.leading import rules_in
+from confab.planner.experience.lessons import live, teach
+from confab.planner.hierarchical import planner as fast
+from confab.planner.plan import Limits, Outcome
+from confab.planner.validation import validate
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Tally
+from confab.reasoner.memory.experience_file import load, save
+from confab.reasoner.names import Names
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import PddlError, parse_files
+from confab.reasoner.symbols import Problem
 from worlds.lessons import backwards, problem, taught
 
 FAMILIES = ("served", "swap", "rotate", "full", "handover", "blocked")

@@ -24,8 +24,8 @@ from unittest.mock import patch
 
 import confab
 from benchmarks.before import SEED
-from reasoner.generate import write_scene
-from reasoner.reading import problem
+from confab.reasoner.generate import write_scene
+from confab.reasoner.reading import problem
 
 CASES = (("served", 50), ("handover", 50), ("served", 200), ("served", 1000))
 """Families and how many objects."""
@@ -35,12 +35,12 @@ PART = re.compile(
 )
 """A part of the query for the schema that serves only what is derived or counted."""
 COMPARING = (
-    "planner.hierarchical.subplans",
-    "planner.hierarchical.refinement_cache",
-    "planner.hierarchical.subproblem",
-    "planner.hierarchical.serialization",
-    "planner.hierarchical.planner",
-    "planner.validation",
+    "confab.planner.hierarchical.subplans",
+    "confab.planner.hierarchical.refinement_cache",
+    "confab.planner.hierarchical.subproblem",
+    "confab.planner.hierarchical.serialization",
+    "confab.planner.hierarchical.planner",
+    "confab.planner.validation",
 )
 """The modules that ask whether a value is as wanted."""
 

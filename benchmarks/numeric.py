@@ -16,13 +16,13 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from benchmarks.pddl import accepted
-from planner.plan import Limits, Status
-from planner.plan_costs import cost_of
-from planner.solve import Request, solve
-from planner.validation import validate
-from reasoner.language import DomainError
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import PddlError, parse
+from confab.planner.plan import Limits, Status
+from confab.planner.plan_costs import cost_of
+from confab.planner.solve import Request, solve
+from confab.planner.validation import validate
+from confab.reasoner.language import DomainError
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import PddlError, parse
 from worlds.numbers import jugs, rounds
 
 MODES = ("guarded", "optimal", "paper")

@@ -15,11 +15,11 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from reasoner.generate import write_scene
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import load
-from reasoner.validation import hermit
-from reasoner.validation.validate import validate
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.validation import hermit
+from confab.reasoner.validation.validate import validate
 
 REPEATS = 3
 AXIOM = """

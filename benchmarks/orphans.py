@@ -34,7 +34,14 @@ MARK = "CONFAB_ORPHANS"
 CROSS = "SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }"
 
 
-IMPORTED = ("confab.engines", "confab.serving", "reasoner.validation.validate", "rdflib", "sim.film", "sim.rollouts")
+IMPORTED = (
+    "confab.engines",
+    "confab.serving",
+    "confab.reasoner.validation.validate",
+    "rdflib",
+    "confab.sim.film",
+    "confab.sim.rollouts",
+)
 """What the commands import, once for all."""
 
 

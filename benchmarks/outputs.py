@@ -19,7 +19,7 @@ from shutil import copy, copytree
 
 from confab.authoring import new_domain
 from confab.cli import main as confab
-from reasoner.kinds import (
+from confab.reasoner.kinds import (
     CONSTRUCTED,
     CONVERTED,
     DOMAIN,

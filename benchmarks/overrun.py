@@ -90,7 +90,7 @@ CALLS: tuple[tuple[str, str], ...] = (
 """Calls in Python with the scene in which they are made; `within` stands for a block of `confab.within(S)`."""
 BEGUN = """
 import os, sys
-from reasoner.limits import Deadline
+from confab.reasoner.limits import Deadline
 begin = Deadline.after.__func__
 def after(cls, seconds):
     if seconds == SECONDS:
@@ -112,7 +112,7 @@ try:
     else:
         got = eval(sys.argv[3])
 except Exception as error:
-    from reasoner.limits import LimitError
+    from confab.reasoner.limits import LimitError
     os._exit(3 if isinstance(error, LimitError) else print(repr(error)[:300], file=sys.stderr) or 4)
 ended = getattr(got, 'outcome', None) or getattr(got, 'episode', None)
 os._exit(3 if ended and ended.status.value == 'gave-up' else 0)

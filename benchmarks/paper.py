@@ -8,13 +8,13 @@ from collections.abc import Callable
 from statistics import median
 from time import perf_counter
 
-from planner.hierarchical.planner import plan as fast_plan
-from planner.paper.cogency import PAPER
-from planner.paper.hierarchy import flat
-from planner.paper.hierarchy import plan as paper_plan
-from planner.plan import Limits, Outcome
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.paper.cogency import PAPER
+from confab.planner.paper.hierarchy import flat
+from confab.planner.paper.hierarchy import plan as paper_plan
+from confab.planner.plan import Limits, Outcome
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
 
 FLAT_LIMIT = 100_000
 REPEATS = 7

@@ -289,10 +289,10 @@ def trucks(size: int) -> str:
 
 def grounding(found: Sequence[tuple[str, Path, Path]], python: str) -> None:
     """Print the time to ground, from the text on, beside that of Fast Downward's translator."""
-    from planner.grounded.grounding import ground
-    from planner.grounded.task import Task
-    from reasoner.pddl.importing import imported
-    from reasoner.pddl.syntax import parse_files
+    from confab.planner.grounded.grounding import ground
+    from confab.planner.grounded.task import Task
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
 
     translate = planners(python)["translate"]
     with tempfile.TemporaryDirectory() as folder:
@@ -323,7 +323,7 @@ def read_back(python: str) -> None:
     """Print what becomes of Fast Downward's plan for a scene's primitive level: checked symbolically, then in physics."""
     import confab
     from confab.pddl_commands import read_pddl_plan
-    from planner.validation import validate
+    from confab.planner.validation import validate
 
     command, program = planners(python)["lama-first"], [str(Path(sys.executable).parent / "confab")]
     print("\nPrimitive level exported, planned by Fast Downward (lama-first), read back\n")
@@ -349,12 +349,12 @@ def read_back(python: str) -> None:
 def _solve(domain: str, problem: str, target: str) -> None:
     """Solve one problem with the flat core and write its plan (what a benchmarked process does)."""
     gc.disable()
-    from planner.grounded.best_first import search
-    from planner.grounded.grounding import ground
-    from planner.grounded.task import Task
-    from planner.plan import OUT_OF_MEMORY, Limits, Status
-    from reasoner.pddl.importing import imported
-    from reasoner.pddl.syntax import parse_files
+    from confab.planner.grounded.best_first import search
+    from confab.planner.grounded.grounding import ground
+    from confab.planner.grounded.task import Task
+    from confab.planner.plan import OUT_OF_MEMORY, Limits, Status
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
     try:
@@ -380,8 +380,8 @@ def _solve(domain: str, problem: str, target: str) -> None:
 def _by_engine(domain: str, problem: str, target: str, engine: str) -> None:
     """Solve one problem with an engine, as ``confab plan --engine`` does, and write its plan."""
     from confab.engines import plan_by_engine
-    from reasoner.pddl.importing import imported
-    from reasoner.pddl.syntax import parse_files
+    from confab.reasoner.pddl.importing import imported
+    from confab.reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
     found = plan_by_engine(scene.problem, engine)

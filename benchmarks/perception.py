@@ -17,14 +17,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import confab
-from reasoner.embodiment.values import Embodiment, SkillUse
-from reasoner.symbols import Symbol
-from sim.bodies import outer_radius
-from sim.faults import displaced, lying
-from sim.skills import perform
-from sim.staging import Perturbation
-from sim.verdict import SkillError
-from sim.world import World
+from confab.reasoner.embodiment.values import Embodiment, SkillUse
+from confab.reasoner.symbols import Symbol
+from confab.sim.bodies import outer_radius
+from confab.sim.faults import displaced, lying
+from confab.sim.skills import perform
+from confab.sim.staging import Perturbation
+from confab.sim.verdict import SkillError
+from confab.sim.world import World
 
 NOISE = (0.0, 0.002, 0.005, 0.01, 0.02)
 """Standard deviations of perceived positions in metres."""

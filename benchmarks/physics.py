@@ -30,10 +30,10 @@ import pybullet
 
 import confab
 from benchmarks.perception import perception
-from sim.rollouts import Trial, rollouts, wilson
-from sim.staging import Perturbation
-from sim.verify import Rollout, expectations
-from sim.world import World
+from confab.sim.rollouts import Trial, rollouts, wilson
+from confab.sim.staging import Perturbation
+from confab.sim.verify import Rollout, expectations
+from confab.sim.world import World
 
 WORKERS = 2
 """Processes that share perturbed rollouts."""

@@ -85,7 +85,7 @@ def measured(*arguments: object) -> dict[str, Any]:
 
 def scene(folder: Path, objects: int = 4, clutter: int = 0) -> Path:
     """Return a generated scene of the family served."""
-    from reasoner.generate import write_scene
+    from confab.reasoner.generate import write_scene
 
     path = folder / f"served-{objects}-{clutter}.ttl"
     if not path.is_file():
@@ -156,9 +156,9 @@ def grounding(folder: Path) -> None:
 
 def ground(path: str) -> dict[str, float]:
     """Measure the quantification of one behaviour in a scene."""
-    from reasoner.graph.knowledge import load
-    from reasoner.reading.problem import read
-    from reasoner.reading.quantification import query_for
+    from confab.reasoner.graph.knowledge import load
+    from confab.reasoner.reading.problem import read
+    from confab.reasoner.reading.quantification import query_for
 
     graph = load(path)
     reading = read(graph)
@@ -211,11 +211,11 @@ def worlds(folder: Path) -> None:
 
 def plan(source: str) -> dict[str, float | str]:
     """Measure loading, task recognition and planning, in a file or behind an endpoint."""
-    from planner.hierarchical.planner import plan as fast
-    from planner.paper.hierarchy import plan as paper
-    from reasoner.graph.knowledge import load
-    from reasoner.graph.stores import connect
-    from reasoner.reading.relevance import recognise
+    from confab.planner.hierarchical.planner import plan as fast
+    from confab.planner.paper.hierarchy import plan as paper
+    from confab.reasoner.graph.knowledge import load
+    from confab.reasoner.graph.stores import connect
+    from confab.reasoner.reading.relevance import recognise
 
     begin = perf_counter()
     graph = connect(source) if "://" in source else load(source)
@@ -235,7 +235,7 @@ def oxigraph(path: Path) -> Iterator[str]:
     """Run the Oxigraph server on loopback with a scene and what it imports, and yield its address."""
     import urllib3
 
-    from reasoner.graph.knowledge import load
+    from confab.reasoner.graph.knowledge import load
 
     bare = load(scene(path.parent))
     files = [file for iri, file in bare.files.items() if iri != bare.scene] + [path]
@@ -273,10 +273,10 @@ def rdflib_engine(folder: Path) -> None:
     """Print how long rdflib's own SPARQL engine takes for the same query."""
     import rdflib
 
-    from reasoner.graph.knowledge import load
-    from reasoner.reading.problem import read
-    from reasoner.reading.quantification import query_for
-    from reasoner.vocabulary import PREFIXES
+    from confab.reasoner.graph.knowledge import load
+    from confab.reasoner.reading.problem import read
+    from confab.reasoner.reading.quantification import query_for
+    from confab.reasoner.vocabulary import PREFIXES
 
     rows: list[list[Any]] = []
     for objects in RDFLIB_OBJECTS:
@@ -302,11 +302,11 @@ def rdflib_engine(folder: Path) -> None:
 def translator(folder: Path) -> None:
     """Print how long Fast Downward's translator takes to ground the exported problem, beside ours."""
     from benchmarks.pddl import peers, planners
-    from planner.grounded.grounding import ground as ground_level
-    from planner.plan import Reason
-    from reasoner.graph.knowledge import load
-    from reasoner.pddl.exporting import to_pddl
-    from reasoner.reading.relevance import recognise
+    from confab.planner.grounded.grounding import ground as ground_level
+    from confab.planner.plan import Reason
+    from confab.reasoner.graph.knowledge import load
+    from confab.reasoner.pddl.exporting import to_pddl
+    from confab.reasoner.reading.relevance import recognise
 
     try:
         command = planners(peers())["translate"]

@@ -15,9 +15,9 @@ import random
 import tempfile
 from pathlib import Path
 
-from reasoner.memory.experience import Experience
-from reasoner.memory.experience_file import load, save
-from reasoner.names import Names
+from confab.reasoner.memory.experience import Experience
+from confab.reasoner.memory.experience_file import load, save
+from confab.reasoner.names import Names
 
 SCENE = "https://example.org/table"
 FAMILIES = ("served", "swap", "rotate", "handover", "blocked", "full")
@@ -67,7 +67,7 @@ def lived(folder: Path, robots: int, rounds: int, chance: random.Random) -> tupl
 
 def episode(folder: Path, robot: int, number: int | None, peers: list[int]) -> None:
     """Learn from a table, if there is an episode, and merge what others know; written whole or not at all."""
-    from planner.experience.lessons import teach
+    from confab.planner.experience.lessons import teach
     from worlds.lessons import problem
 
     own = _file(folder, robot)

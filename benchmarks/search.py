@@ -35,22 +35,22 @@ from typing import Any
 
 from benchmarks._beside import beside_peers, optimal_costs
 from benchmarks.pddl import peers
-from planner.experience.advice import Memory
-from planner.experience.advice import plan as guided
-from planner.experience.lessons import teach
-from planner.grounded.best_first import plan_level
-from planner.hierarchical import serialization as serialise
-from planner.hierarchical.planner import Compiled, compiled, plan
-from planner.hierarchical.refinement_cache import Template
-from planner.hierarchical.subplans import Ground, Segments
-from planner.plan import Limits, Outcome, Reason, Status
-from planner.validation import validate
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import load
-from reasoner.limits import LimitError
-from reasoner.memory.experience import Experience
-from reasoner.reading.problem import read
-from reasoner.symbols import Domain, Problem
+from confab.planner.experience.advice import Memory
+from confab.planner.experience.advice import plan as guided
+from confab.planner.experience.lessons import teach
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.hierarchical import serialization as serialise
+from confab.planner.hierarchical.planner import Compiled, compiled, plan
+from confab.planner.hierarchical.refinement_cache import Template
+from confab.planner.hierarchical.subplans import Ground, Segments
+from confab.planner.plan import Limits, Outcome, Reason, Status
+from confab.planner.validation import validate
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.limits import LimitError
+from confab.reasoner.memory.experience import Experience
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Domain, Problem
 from worlds.families import family as packed
 from worlds.families import random_table
 from worlds.lessons import problem as lesson
@@ -347,7 +347,7 @@ class Everything(Segments):
 
     def relevant(self, level: int, off: Any, depth: int) -> Iterator[Ground]:
         """Yield every applicable behaviour."""
-        from planner.paper.transitions import ground
+        from confab.planner.paper.transitions import ground
 
         cache = self.__dict__.setdefault("grounds", {})
         if level not in cache:

@@ -17,7 +17,7 @@ from pathlib import Path
 from time import process_time
 
 import confab
-import sim  # noqa: F401 - imports PyBullet without its banner
+from confab import sim  # noqa: F401 - imports PyBullet without its banner
 from confab.memory import Memory
 
 import pybullet  # isort: skip

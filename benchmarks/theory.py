@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import confab
-from planner.plan import Limits, Outcome
-from planner.solve import Request, solve
-from reasoner.reading.quantification import quantify
-from reasoner.symbols import Problem
+from confab.planner.plan import Limits, Outcome
+from confab.planner.solve import Request, solve
+from confab.reasoner.reading.quantification import quantify
+from confab.reasoner.symbols import Problem
 
 EPISODES = 5
 FLAT = 200_000

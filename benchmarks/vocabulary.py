@@ -8,8 +8,8 @@ from pathlib import Path
 import rdflib
 from rdflib import DCTERMS, OWL, RDF, RDFS, SKOS, XSD, URIRef
 
-import ontology
-from reasoner.names import local_name
+from confab import ontology
+from confab.reasoner.names import local_name
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "vocabulary.md"
 FILES = ("core.ttl", "embodiment.ttl", "episodes.ttl")

@@ -33,10 +33,10 @@ if _TYPE_CHECKING:
     from confab.memory import Memory
     from confab.physics import Report
     from confab.planning import Result
+    from confab.reasoner.graph.knowledge import KnowledgeError
+    from confab.reasoner.limits import within
     from confab.scene import Scene, load, scenes
     from confab.table import Table
-    from reasoner.graph.knowledge import KnowledgeError
-    from reasoner.limits import within
 
 __version__ = "0.1.0"
 __all__ = [
@@ -60,7 +60,7 @@ __all__ = [
 _HOMES = {
     "Curve": "confab.curve",
     "Execution": "confab.execution",
-    "KnowledgeError": "reasoner.graph.knowledge",
+    "KnowledgeError": "confab.reasoner.graph.knowledge",
     "Memory": "confab.memory",
     "Report": "confab.physics",
     "Result": "confab.planning",
@@ -72,7 +72,7 @@ _HOMES = {
     "practise": "confab.curve",
     "scenes": "confab.scene",
     "validate": "confab.authoring",
-    "within": "reasoner.limits",
+    "within": "confab.reasoner.limits",
 }
 
 

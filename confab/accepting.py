@@ -8,13 +8,13 @@ from numbers import Real
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-import ontology
+from confab import ontology
 from confab.interchange import read_plan
-from planner.plan import Plan
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import nearest
-from reasoner.possible import ImpossibleStateError
-from reasoner.symbols import FALSE, TRUE, Problem
+from confab.planner.plan import Plan
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import nearest
+from confab.reasoner.possible import ImpossibleStateError
+from confab.reasoner.symbols import FALSE, TRUE, Problem
 
 
 class HasPlan(Protocol):
@@ -102,7 +102,7 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
     >>> number("time_limit", 2.5)
     >>> number("time_limit", "5", "seconds as a number")
     Traceback (most recent call last):
-    reasoner.graph.knowledge.KnowledgeError: time_limit='5' is no number; wanted seconds as a number
+    confab.reasoner.graph.knowledge.KnowledgeError: time_limit='5' is no number; wanted seconds as a number
     """
     if given is not None and (isinstance(given, bool) or not isinstance(given, Real) or given != given):
         raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")

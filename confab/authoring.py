@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import pyoxigraph as ox
 
-import ontology
+from confab import ontology
 from confab.memory import Memory
+from confab.planner.paper.transitions import ground
+from confab.reasoner.files import alone, write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.memory.experience_file import Lines
+from confab.reasoner.names import local_name, nearest
+from confab.reasoner.vocabulary import ARGUMENTS, CORE
 from confab.table import Table
-from planner.paper.transitions import ground
-from reasoner.files import alone, write_whole
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.memory.experience_file import Lines
-from reasoner.names import local_name, nearest
-from reasoner.vocabulary import ARGUMENTS, CORE
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -92,7 +92,7 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
     >>> len(validate("beverage-serving"))
     0
     """
-    from reasoner.validation.validate import validate as check
+    from confab.reasoner.validation.validate import validate as check
 
     columns = ("severity", "place", "rule", "what", "why", "do")
     rows = (
@@ -117,8 +117,8 @@ def generate(family: str, path: str | Path, objects: int = 4, hands: int = 2, cl
     ...     generate("served", folder + "/table.ttl", objects=10).plan().plan.length[1]
     11
     """
+    from confab.reasoner.generate import write_scene
     from confab.scene import load
-    from reasoner.generate import write_scene
 
     write_scene(turtle_path(path), family, objects, hands, clutter, seed)
     return load(path)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 from confab.accepting import check_goal, possible
 from confab.known import Known
 from confab.labels import Labels, labels_of
+from confab.planner.plan import Limits
+from confab.planner.solve import DEFAULT_MODE, Request, solve
 from confab.planning import Result
-from planner.plan import Limits
-from planner.solve import DEFAULT_MODE, Request, solve
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import nearest
-from reasoner.possible import refuse_impossible
-from reasoner.symbols import FALSE, TRUE, Problem, Symbol
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import nearest
+from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.symbols import FALSE, TRUE, Problem, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution

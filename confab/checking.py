@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.checked_conditions import Lookups
-from planner.plan import Plan
-from planner.validation import Fault, carried_out
-from reasoner.graph.knowledge import KnowledgeGraph
-from reasoner.limits import overtime
-from reasoner.reading.goals import parse_fact
-from reasoner.reading.problem import Reading
-from reasoner.reading.surroundings import Surroundings
+from confab.planner.checked_conditions import Lookups
+from confab.planner.plan import Plan
+from confab.planner.validation import Fault, carried_out
+from confab.reasoner.graph.knowledge import KnowledgeGraph
+from confab.reasoner.limits import overtime
+from confab.reasoner.reading.goals import parse_fact
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.reading.surroundings import Surroundings
 
 
 def refused(graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = ()) -> list[Fault]:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planner.plan import Status
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import LimitError
-from reasoner.names import local_name
+from confab.planner.plan import Status
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
+from confab.reasoner.names import local_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,7 +1,7 @@
 """A level handed to a planner that people already have, through unified-planning: exported, planned, read back, put in order.
 
 The plan is one of ours then: its steps stand behind what they depend on, and under behaviours of the levels above wherever a run of
-steps does what one of them says; `planner.validation` has the last word.
+steps does what one of them says; `confab.planner.validation` has the last word.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-from planner.hierarchical.regrouping import under_the_levels_above
-from planner.levels import levels_left
-from planner.plan import Outcome, Plan, Reason, Status
-from planner.validation import validate
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import Deadline, within
-from reasoner.pddl.exporting import to_pddl
-from reasoner.symbols import Problem, Symbol
-from reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
+from confab.planner.hierarchical.regrouping import under_the_levels_above
+from confab.planner.levels import levels_left
+from confab.planner.plan import Outcome, Plan, Reason, Status
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline, within
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
 
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
@@ -159,7 +159,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return what unified-planning answers to a level that it reads itself, in the process of `reasoner.workers.call`."""
+    """Return what unified-planning answers to a level that it reads itself, in the process of `confab.reasoner.workers.call`."""
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
-from planner.acting.episode import Change, End, Episode, Intervention, World
-from planner.acting.executive import Moment, Patience, act
-from planner.acting.failure_memory import Caution
-from planner.acting.symbolic_world import SymbolicWorld
-from planner.plan import Plan, Planner, Step, renumbered
-from planner.solve import DEFAULT_MODE
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import within
-from reasoner.memory.links import Links
-from reasoner.names import nearest
-from reasoner.possible import refuse_impossible
-from reasoner.reading.goals import parse_fact, with_goals
-from reasoner.symbols import Fact, Problem, Symbol
+from confab.planner.acting.episode import Change, End, Episode, Intervention, World
+from confab.planner.acting.executive import Moment, Patience, act
+from confab.planner.acting.failure_memory import Caution
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.plan import Plan, Planner, Step, renumbered
+from confab.planner.solve import DEFAULT_MODE
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import within
+from confab.reasoner.memory.links import Links
+from confab.reasoner.names import nearest
+from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.reading.goals import parse_fact, with_goals
+from confab.reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
     import networkx
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from confab.known import Known
     from confab.memory import Memory
     from confab.show import PlanTree
-    from sim.live import LiveWorld
+    from confab.sim.live import LiveWorld
 
 WORLDS = ("symbolic", "pybullet")
 
@@ -140,7 +140,7 @@ def _known(problem: Problem, individual: str, text: str) -> str:
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
     """Read ``KIND NAME`` and facts about it without its name: ``LOCATION location5 BEVERAGE no_beverage``."""
-    from planner.acting.symbolic_world import with_individual
+    from confab.planner.acting.symbolic_world import with_individual
 
     if len(words) < 4 or len(words) % 2:
         raise KnowledgeError(f"'{text}': wanted 'add CLASS NAME SITUATION value …'")
@@ -280,14 +280,14 @@ class Execution:
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of what was done: an edge from each primitive to those that need it done before."""
-        from planner.acting.schedule import partial_order
+        from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
         return partial_order(problem, self.episode.done.primitives)
 
     def save(self, path: str | Path) -> Path:
         """Write the episode as Turtle (PROV-O), whole or not at all, and return where."""
-        from reasoner.memory.episodes import save_episode
+        from confab.reasoner.memory.episodes import save_episode
 
         save_episode(Path(path), self.json(), self.scene.names)
         return Path(path)
@@ -348,7 +348,7 @@ def carry_out(
         memory = Memory.load(memory, scene)
     planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
     if planner is None and memory is not None and not isinstance(memory, Links):
-        from planner.experience.advice import plan as plan_with
+        from confab.planner.experience.advice import plan as plan_with
 
         planner = partial(plan_with, memory=memory.advisor, mode=mode)
     number("seed", seed, "an integer")
@@ -366,13 +366,13 @@ def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
     KnowledgeError
         No such mode.
     """
-    from planner.solve import MODES
+    from confab.planner.solve import MODES
 
     if mode not in MODES:
         raise KnowledgeError(f"unknown mode '{mode}'; wanted one of {', '.join(MODES)}")
     if mode != "paper":
         return None
-    from planner.paper.hierarchy import plan as paper_plan
+    from confab.planner.paper.hierarchy import plan as paper_plan
 
     return partial(paper_plan, links=memory)
 
@@ -438,9 +438,9 @@ def execute(
     if world != "pybullet":
         raise KnowledgeError(f"unknown world '{world}'; wanted {' or '.join(WORLDS)}")
     from confab.physics import require_skills
-    from sim.live import LiveWorld
-    from sim.staging import Perturbation
-    from sim.world import World as Physics
+    from confab.sim.live import LiveWorld
+    from confab.sim.staging import Perturbation
+    from confab.sim.world import World as Physics
 
     lowest = problem.domain.at_level(problem.domain.levels[-1])
     require_skills(scene, [behavior.name for behavior in lowest])
@@ -467,9 +467,9 @@ def _with_both_hands(
     caution: Caution | None,
 ) -> Episode:
     """Carry a plan out with all hands at once as far as that goes, and the rest in a closed loop."""
-    from planner.acting.episode import Event, Failure
-    from planner.hierarchical.planner import plan as fast_plan
-    from sim.together import perform_together
+    from confab.planner.acting.episode import Event, Failure
+    from confab.planner.hierarchical.planner import plan as fast_plan
+    from confab.sim.together import perform_together
 
     if plan is None:
         begin, limits = planner or fast_plan, patience.planning

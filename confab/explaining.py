@@ -9,15 +9,15 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from confab.lifted import Sayings
+from confab.planner.experience.advice import Memory as Advisor
+from confab.planner.experience.chaining import Candidate
+from confab.planner.experience.evidence import View
+from confab.planner.experience.leading import Guide
+from confab.planner.hierarchical.serialization import Call, compiled
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally
+from confab.reasoner.symbols import Problem
 from confab.report.markup import styled, tag
-from planner.experience.advice import Memory as Advisor
-from planner.experience.chaining import Candidate
-from planner.experience.evidence import View
-from planner.experience.leading import Guide
-from planner.hierarchical.serialization import Call, compiled
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Fact, Ground, Tally
-from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

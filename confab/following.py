@@ -8,15 +8,15 @@ from itertools import product
 
 import pyoxigraph as ox
 
-from planner.derived_facts import Rules
-from planner.transitions import Table, Writer, key_of
-from reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
-from reasoner.limits import check
-from reasoner.names import local_name
-from reasoner.reading.problem import Reading
-from reasoner.reading.restating import said, value_properties
-from reasoner.symbols import TRUE, Fact, Problem, Symbol
-from reasoner.vocabulary import CORE, TYPE
+from confab.planner.derived_facts import Rules
+from confab.planner.transitions import Table, Writer, key_of
+from confab.reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
+from confab.reasoner.limits import check
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.reading.restating import said, value_properties
+from confab.reasoner.symbols import TRUE, Fact, Problem, Symbol
+from confab.reasoner.vocabulary import CORE, TYPE
 
 DEFINED = """
 ASK {

@@ -7,7 +7,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from planner.acting.schedule import Slot
+from confab.planner.acting.schedule import Slot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,11 +8,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from planner.certificates import certificate_json
-from planner.plan import Outcome, Plan, Status, Step
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import nearest
-from reasoner.symbols import Behavior, Problem
+from confab.planner.certificates import certificate_json
+from confab.planner.plan import Outcome, Plan, Status, Step
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import nearest
+from confab.reasoner.symbols import Behavior, Problem
 
 DEEPEST = 50
 """Steps inside one another in a plan that is read."""

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 import pyoxigraph as ox
 
 from confab.accepting import sparql_of
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.limits import within
+from confab.reasoner.names import Names, nearest
+from confab.reasoner.reading.goals import parse_fact
+from confab.reasoner.reading.problem import Reading, read, read_names
+from confab.reasoner.symbols import Fact, Problem
 from confab.table import Table
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.limits import within
-from reasoner.names import Names, nearest
-from reasoner.reading.goals import parse_fact
-from reasoner.reading.problem import Reading, read, read_names
-from reasoner.symbols import Fact, Problem
 
 if TYPE_CHECKING:
     import rdflib
 
-    from reasoner.embodiment.values import Embodiment
-    from reasoner.graph.apart import QueryLimits
-    from reasoner.graph.mirror import Mirror
+    from confab.reasoner.embodiment.values import Embodiment
+    from confab.reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.mirror import Mirror
 
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
@@ -145,7 +145,7 @@ class Known:
         >>> confab.load("beverage-serving").with_fact("cup1 LOCATION location7").plan().plan.length
         {1: 3, 2: 8, 3: 26}
         """
-        from reasoner.reading.restating import with_facts
+        from confab.reasoner.reading.restating import with_facts
 
         return self._restated(with_facts, facts)
 
@@ -163,7 +163,7 @@ class Known:
         >>> confab.load("beverage-serving").with_goal("cup2 LOCATION location8").plan().plan.length
         {1: 5, 2: 12, 3: 38}
         """
-        from reasoner.reading.restating import with_goals
+        from confab.reasoner.reading.restating import with_goals
 
         return self._restated(with_goals, goals)
 
@@ -178,7 +178,7 @@ class Known:
     @cached_property
     def graph(self) -> rdflib.Graph:
         """The scene's triples as an rdflib graph; what is added to it or removed from it counts in `query` and `plan` at once."""
-        from reasoner.graph.rdflib_graph import rdflib_graph
+        from confab.reasoner.graph.rdflib_graph import rdflib_graph
 
         self.settle()
         return rdflib_graph(self.knowledge, self._forget)
@@ -194,7 +194,7 @@ class Known:
         EmbodimentError
             Something that physics needs isn't said; the message names it.
         """
-        from reasoner.embodiment.reading import read_embodiment
+        from confab.reasoner.embodiment.reading import read_embodiment
 
         self.knowledge.require_whole()
         if self.knowledge.select("SELECT ?why WHERE { ?ontology :symbolicOnly ?why }"):
@@ -205,7 +205,7 @@ class Known:
 
     @cached_property
     def _mirror(self) -> Mirror:
-        from reasoner.graph.mirror import Mirror
+        from confab.reasoner.graph.mirror import Mirror
 
         return Mirror(self.knowledge)
 
@@ -235,7 +235,7 @@ class Known:
         The query is given as text, as a ``.rq`` file, or by the name of a ready one (``ontology/questions``).
 
         Prefixes are those of the scene's file, then of what it imports. ``:name`` is the core's where the scene's own namespace has
-        no such name. It is answered in a process of its own: see `reasoner.graph.apart`.
+        no such name. It is answered in a process of its own: see `confab.reasoner.graph.apart`.
 
         Raises
         ------
@@ -253,7 +253,7 @@ class Known:
         >>> bool(scene.query("ASK { :cup1 k:location t:location7 }"))
         False
         """
-        from reasoner.graph.apart import ask, unheard_of
+        from confab.reasoner.graph.apart import ask, unheard_of
 
         sparql = sparql_of(sparql)
         kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
@@ -273,7 +273,7 @@ class Known:
         KnowledgeError
             A file holds no episode, or two hold one of the same name.
         """
-        from reasoner.memory.episodes import read_episodes
+        from confab.reasoner.memory.episodes import read_episodes
 
         read_episodes(self.knowledge, map(Path, files))
         return self
@@ -281,8 +281,8 @@ class Known:
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
         """Return the graph as a query shall see it; what is missing in it is told once."""
         from confab.following import write_following
-        from reasoner.graph.apart import QueryLimits
-        from reasoner.reading.affordance import SITUATION, write_situation
+        from confab.reasoner.graph.apart import QueryLimits
+        from confab.reasoner.reading.affordance import SITUATION, write_situation
 
         self.settle()
         if SITUATION in sparql:
@@ -316,7 +316,7 @@ class Known:
         """
         sparql = sparql_of(sparql)
         if path is not None:
-            from reasoner.graph.construct import write_construct
+            from confab.reasoner.graph.construct import write_construct
 
             return write_construct(self._asked(sparql, limits), sparql, Path(path), limits)
         import rdflib
@@ -325,9 +325,9 @@ class Known:
 
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for where a behaviour can be done; `query` answers it on the initial situation."""
-        from reasoner.graph.apart import standing_alone
-        from reasoner.reading.affordance import applicable_query
-        from reasoner.reading.quantification import behavior_named
+        from confab.reasoner.graph.apart import standing_alone
+        from confab.reasoner.reading.affordance import applicable_query
+        from confab.reasoner.reading.quantification import behavior_named
 
         query = applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
         return standing_alone(self.knowledge, query)
@@ -340,8 +340,8 @@ class Known:
         KnowledgeError
             There is no such behaviour, or it says something that an update can't say.
         """
-        from reasoner.reading.quantification import behavior_named
-        from reasoner.updates.converting import update_of
+        from confab.reasoner.reading.quantification import behavior_named
+        from confab.reasoner.updates.converting import update_of
 
         name = behavior_named(self.reading, behavior).name
         try:
@@ -351,8 +351,8 @@ class Known:
 
     def quantifying_query(self, behavior: str) -> str:
         """Return the SPARQL query that quantifies a behaviour: a row for each way to put individuals in for its parameters."""
-        from reasoner.graph.apart import standing_alone
-        from reasoner.reading.quantification import behavior_named, query_for
+        from confab.reasoner.graph.apart import standing_alone
+        from confab.reasoner.reading.quantification import behavior_named, query_for
 
         return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))
 
@@ -364,7 +364,7 @@ class Known:
         KnowledgeError
             There is no object of that name; ``all`` and None stand for every object.
         """
-        from reasoner.reading.affordance import affordances
+        from confab.reasoner.reading.affordance import affordances
 
         known = {name for members in self.problem.classes.values() for name in members}
         if of not in (None, "all", *known):

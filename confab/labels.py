@@ -11,11 +11,11 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from planner.plan import Step
-from reasoner.graph.knowledge import KnowledgeGraph, text
-from reasoner.names import Names
-from reasoner.sentences import denied, said
-from reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
+from confab.planner.plan import Step
+from confab.reasoner.graph.knowledge import KnowledgeGraph, text
+from confab.reasoner.names import Names
+from confab.reasoner.sentences import denied, said
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""

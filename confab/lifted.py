@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from confab.labels import Labels
-from reasoner.amounts import LESS, MORE
-from reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
-from reasoner.sentences import said as plainly
-from reasoner.symbols import (
+from confab.reasoner.amounts import LESS, MORE
+from confab.reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
+from confab.reasoner.sentences import said as plainly
+from confab.reasoner.symbols import (
     Condition,
     Domain,
     Fact,

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from planner.acting.executive import Moment
-from reasoner.symbols import Symbol
+from confab.planner.acting.executive import Moment
+from confab.reasoner.symbols import Symbol
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -68,8 +68,8 @@ class View:
         from rich.console import Group
         from rich.text import Text
 
+        from confab.planner.plan import Plan
         from confab.show import plan_tree
-        from planner.plan import Plan
 
         parts: list[Any] = [Text(line) for line in self.log[-LOG:]]
         if self.moment is not None:

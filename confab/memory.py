@@ -1,7 +1,7 @@
 """The memory at the front desk: load it, learn into it, save it, merge it, look at it.
 
-One file holds both kinds of experience: rules with counts, by which the planner is led (`reasoner.memory.experience`), and the
-paper's links between facts and quantified behaviours, which the paper's mode reads (`reasoner.memory.links`).
+One file holds both kinds of experience: rules with counts, by which the planner is led (`confab.reasoner.memory.experience`),
+and the paper's links between facts and quantified behaviours, which the paper's mode reads (`confab.reasoner.memory.links`).
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.accepting import AnyPlan, plan_of
+from confab.planner.paper.learning import LearningError
+from confab.planner.paper.learning import learn as learn_plan
+from confab.planner.plan import Plan, Step
+from confab.reasoner.files import alone, write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Method, Order, Rule, Tally
+from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
+from confab.reasoner.memory.links import Links
+from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
+from confab.reasoner.names import Names
 from confab.table import Table
-from planner.paper.learning import LearningError
-from planner.paper.learning import learn as learn_plan
-from planner.plan import Plan, Step
-from reasoner.files import alone, write_whole
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Method, Order, Rule, Tally
-from reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
-from reasoner.memory.links import Links
-from reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
-from reasoner.names import Names
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from confab.known import Known
     from confab.labels import Labels
     from confab.lifted import Sayings
-    from planner.acting.episode import Episode
-    from planner.experience.advice import Memory as Advisor
-    from reasoner.symbols import Problem
+    from confab.planner.acting.episode import Episode
+    from confab.planner.experience.advice import Memory as Advisor
+    from confab.reasoner.symbols import Problem
 
 
 MOST_LINKS = 20_000
@@ -103,7 +103,7 @@ class Memory:
         trust : bool
             Whether the experience of every replica may lead, not only of the one that learns into this file.
         lines : Lines, optional
-            The file's, if it was read already (`reasoner.memory.links_file.memory_lines`).
+            The file's, if it was read already (`confab.reasoner.memory.links_file.memory_lines`).
 
         Raises
         ------
@@ -144,8 +144,8 @@ class Memory:
         KnowledgeError
             The plan can't be done in that situation; nothing is learned then.
         """
-        from planner.acting.episode import Episode
-        from planner.experience.lessons import live
+        from confab.planner.acting.episode import Episode
+        from confab.planner.experience.lessons import live
 
         if isinstance(episode := getattr(plan, "episode", None), Episode):
             self.live(scene.problem, episode)
@@ -161,7 +161,7 @@ class Memory:
         self.links = links
 
     def teach(self, scene: Known, plan: AnyPlan) -> None:
-        """Learn how a scene is solved, with its goals in several orders: see `planner.experience.lessons`.
+        """Learn how a scene is solved, with its goals in several orders: see `confab.planner.experience.lessons`.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Memory:
         KnowledgeError
             The plan can't be done in the scene's situation; nothing is learned then.
         """
-        from planner.experience.lessons import teach
+        from confab.planner.experience.lessons import teach
 
         made = plan_of(plan, scene.problem)
         try:
@@ -220,7 +220,7 @@ class Memory:
             In which the episode's task was planned.
         episode : Episode
         """
-        from planner.experience.lessons import live
+        from confab.planner.experience.lessons import live
 
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
         vain = list(in_vain(problem, episode))
@@ -263,7 +263,7 @@ class Memory:
     @property
     def advisor(self) -> Advisor:
         """The memory as the fast planner takes it."""
-        from planner.experience.advice import Memory as Advisor
+        from confab.planner.experience.advice import Memory as Advisor
 
         mine = {self.experience.replica, *self.trusted}
         return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
@@ -322,8 +322,8 @@ class Memory:
 
     def also(self) -> list[str]:
         """Return the orders and methods that were learned, as sentences with how often."""
-        from planner.experience.evidence import DECAY
-        from planner.experience.leading import usable
+        from confab.planner.experience.evidence import DECAY
+        from confab.planner.experience.leading import usable
 
         say, totals = self.sayings(), self.experience.totals()
         orders = [

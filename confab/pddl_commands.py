@@ -7,20 +7,20 @@ from typing import TypeAlias
 
 import pyoxigraph as ox
 
-from planner.grounded.grounding import ground
-from planner.grounded.plan_windows import regrouped, shortened
-from planner.grounded.task import Task
-from planner.paper.transitions import Model, Values
-from planner.plan import Plan, Step, TooLargeError
-from reasoner.files import check_replaceable, write_whole
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
-from reasoner.limits import OutOfTimeError
-from reasoner.pddl.exporting import plan_of, to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import PddlError, parse_files
-from reasoner.pddl.turtle import turtle
-from reasoner.symbols import GroundBehavior, Problem
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.plan_windows import regrouped, shortened
+from confab.planner.grounded.task import Task
+from confab.planner.paper.transitions import Model, Values
+from confab.planner.plan import Plan, Step, TooLargeError
+from confab.reasoner.files import check_replaceable, write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.pddl.exporting import plan_of, to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import PddlError, parse_files
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.symbols import GroundBehavior, Problem
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
 """A behaviour with its arguments."""

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from confab.accepting import number
 from confab.labels import Labels, labels_of
+from confab.planner.plan import Plan
 from confab.progress import progress
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import within
+from confab.reasoner.symbols import Fact, State
+from confab.sim.engine import Engine
+from confab.sim.rollouts import Done, Trial, wilson
+from confab.sim.rollouts import rollouts as roll_out
+from confab.sim.staging import Perturbation
+from confab.sim.verify import Rollout, expectations
+from confab.sim.world import PrimitiveStep, World
 from confab.table import Table
-from planner.plan import Plan
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import within
-from reasoner.symbols import Fact, State
-from sim.engine import Engine
-from sim.rollouts import Done, Trial, wilson
-from sim.rollouts import rollouts as roll_out
-from sim.staging import Perturbation
-from sim.verify import Rollout, expectations
-from sim.world import PrimitiveStep, World
 
 if TYPE_CHECKING:
     from confab.known import Known
@@ -61,7 +61,7 @@ class Report:
     @property
     def film_speed(self) -> float:
         """Ratio of simulated time to the film's time."""
-        from sim.film import SPEED
+        from confab.sim.film import SPEED
 
         return SPEED
 
@@ -190,11 +190,11 @@ def verify(
     video
         Film the first rollout.
     prepare
-        Called with each world before the first step (`sim.faults`).
+        Called with each world before the first step (`confab.sim.faults`).
     progress
         Called before each step of a single or filmed rollout, with the number of steps done.
     workers
-        Number of processes, or a Ray cluster: see `sim.rollouts.rollouts`.
+        Number of processes, or a Ray cluster: see `confab.sim.rollouts.rollouts`.
     done
         Called with each finished rollout.
     goal
@@ -283,14 +283,14 @@ def _shown(
             one(world)
 
     if gui:
-        from sim.screen import Screen, require_screen
+        from confab.sim.screen import Screen, require_screen
 
         require_screen()
         watching.append(Screen(tuple(str(step) for step in plan.primitives)))
     if video is None:
         return trial.run(seed, watch, progress, gui)
 
-    from sim.film import Film
+    from confab.sim.film import Film
 
     titles = {step.path: f"{step.id} {labels.step(step)}" for step in plan.walk()}
     video.parent.mkdir(parents=True, exist_ok=True)

@@ -9,20 +9,20 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from reasoner.embodiment.reach import reach_relation
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import KnowledgeError, text
-from reasoner.kinds import MAKER
-from reasoner.names import local_name
-from reasoner.reading.quantification import behavior_named
+from confab.reasoner.embodiment.reach import reach_relation
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError, text
+from confab.reasoner.kinds import MAKER
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.quantification import behavior_named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from confab.known import Known
-    from sim.urdf import Array
-    from sim.world import World
+    from confab.sim.urdf import Array
+    from confab.sim.world import World
 
 KINDS = (".png", ".svg", ".pdf")
 MOST_ROWS, DEEPEST = 500, 100
@@ -214,7 +214,7 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
 
 def _top(world: World, name: str) -> Array:
     """Return the middle of a body's top."""
-    from sim.bodies import outline
+    from confab.sim.bodies import outline
 
     rotation, base = world.truth(name)
     top: Array = base + rotation[:, 2] * float(outline(world.bodies[name].shape)[0][-1])
@@ -227,8 +227,8 @@ def _table(scene: Known, path: Path) -> Path:
     from PIL.PngImagePlugin import PngInfo
 
     from confab.reaching import with_reach
-    from sim.picture import hide_vessels, picture, view_of
-    from sim.world import World
+    from confab.sim.picture import hide_vessels, picture, view_of
+    from confab.sim.world import World
 
     if not scene.embodiment.places:
         raise KnowledgeError(f"{scene.iri} has no places with coordinates, so there is no table to show")

@@ -16,18 +16,18 @@ from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
 from confab.interchange import outcome_json
 from confab.known import Known
-from planner.certified import certified
-from planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
-from planner.solve import DEFAULT_MODE, MODES, Request, solve
-from planner.validation import Fault, validate
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import Deadline, within
-from reasoner.memory.links import Links
-from reasoner.reading.goals import with_goals
-from reasoner.reading.problem import Reading, read
-from reasoner.reading.relevance import recognise
-from reasoner.refining import never_done
-from reasoner.symbols import Problem
+from confab.planner.certified import certified
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
+from confab.planner.solve import DEFAULT_MODE, MODES, Request, solve
+from confab.planner.validation import Fault, validate
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline, within
+from confab.reasoner.memory.links import Links
+from confab.reasoner.reading.goals import with_goals
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.refining import never_done
+from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     import networkx
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
+    from confab.planner.causal_links import Purpose
+    from confab.planner.certificates import Certificate
     from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
-    from planner.causal_links import Purpose
-    from planner.certificates import Certificate
 
 NO_ENGINE = "none"
 """In place of an engine's name: no engine at all."""
@@ -146,7 +146,7 @@ def _plan(
     advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
     grounds = None
     if mode == "paper":
-        from reasoner.reading.quantification import quantify
+        from confab.reasoner.reading.quantification import quantify
 
         seen = _seen(scene.reading, observed)
         grounds = {level: quantify(scene.knowledge, seen, level) for level in seen.problem.domain.levels}
@@ -222,7 +222,7 @@ def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
 
 
 def _seen(reading: Reading, observed: str | Path | None) -> Reading:
-    from reasoner.reading.observed import load_observed
+    from confab.reasoner.reading.observed import load_observed
 
     return reading if observed is None else load_observed(Path(observed), reading)
 
@@ -306,8 +306,8 @@ class Result:
 
     @cached_property
     def purposes(self) -> dict[tuple[int, ...], Purpose]:
-        """The causal links of each step, by its path (`planner.causal_links`)."""
-        from planner.causal_links import purposes
+        """The causal links of each step, by its path (`confab.planner.causal_links`)."""
+        from confab.planner.causal_links import purposes
 
         return purposes(self.problem, self.plan)
 
@@ -378,7 +378,7 @@ class Result:
 
     @property
     def certificate(self) -> Certificate | None:
-        """What proves that there is no plan, verified by `planner.certificate_checks`; None unless it is unsolvable."""
+        """What proves that there is no plan, verified by `confab.planner.certificate_checks`; None unless it is unsolvable."""
         return self.outcome.certificate
 
     @property
@@ -404,7 +404,7 @@ class Result:
 
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON and return where."""
-        from reasoner.files import write_whole
+        from confab.reasoner.files import write_whole
 
         write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
         return Path(path)

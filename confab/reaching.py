@@ -8,10 +8,10 @@ from contextlib import suppress
 
 import pyoxigraph as ox
 
-import ontology
+from confab import ontology
 from confab.known import Known, S
-from reasoner.graph.knowledge import BASE, KnowledgeError, text
-from reasoner.vocabulary import EMBODIMENT, EPISODES
+from confab.reasoner.graph.knowledge import BASE, KnowledgeError, text
+from confab.reasoner.vocabulary import EMBODIMENT, EPISODES
 
 log = logging.getLogger(__name__)
 ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
@@ -69,8 +69,8 @@ def with_reach(scene: S) -> S:
     KnowledgeError
         The scene is symbolic only, or lacks something that physics needs.
     """
-    from reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
-    from sim.reach import fingerprint, reach
+    from confab.reasoner.embodiment.reach import reach_hash, reach_relation, save_reach
+    from confab.sim.reach import fingerprint, reach
 
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):
         return scene
@@ -98,8 +98,8 @@ def with_reach(scene: S) -> S:
 
 def unreached(scene: Known) -> list[str]:
     """Return a line for each place of the first or the wanted facts that no hand reaches, with what is in the way of each hand."""
-    from reasoner.embodiment.reach import reach_relation
-    from sim.reach import hindrance
+    from confab.reasoner.embodiment.reach import reach_relation
+    from confab.sim.reach import hindrance
 
     graph = scene.knowledge
     if graph.remote or not graph.select(ROBOTS):

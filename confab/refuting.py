@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-import ontology
+from confab import ontology
 from confab.known import Known, S
-from planner.acting.failure_memory import chain_to, refuted_by
-from reasoner.embodiment.reach import add_to_reach
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.reading.restating import refuted, with_refuted
-from reasoner.refutations import Refutation
+from confab.planner.acting.failure_memory import chain_to, refuted_by
+from confab.reasoner.embodiment.reach import add_to_reach
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.reading.restating import refuted, with_refuted
+from confab.reasoner.refutations import Refutation
 
 if TYPE_CHECKING:
     from confab.physics import Report

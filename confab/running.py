@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.memory import Memory, undisturbed
+from confab.planner.plan import Status
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, unreached, with_reach
+from confab.reasoner.files import check_replaceable, has_content, write_whole
+from confab.reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, VERDICTS
+from confab.reasoner.reading.observed import assert_observed, save_observed
+from confab.reasoner.validation.findings import listing
+from confab.reasoner.validation.validate import validate
 from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene, load
 from confab.show import show
-from planner.plan import Status
-from reasoner.files import check_replaceable, has_content, write_whole
-from reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, VERDICTS
-from reasoner.reading.observed import assert_observed, save_observed
-from reasoner.validation.findings import listing
-from reasoner.validation.validate import validate
 
 if TYPE_CHECKING:
     from confab.physics import Report

@@ -8,28 +8,27 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import ontology
-from confab import planning
+from confab import ontology, planning
 from confab.accepting import AnyPlan, Facts, number, plan_of
 from confab.known import Known
+from confab.planner.plan import Plan
+from confab.planner.solve import DEFAULT_MODE
 from confab.planning import Result
-from planner.plan import Plan
-from planner.solve import DEFAULT_MODE
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.graph.knowledge import load as load_graph
-from reasoner.limits import Deadline, within
-from reasoner.memory.links import Links
-from reasoner.symbols import FALSE, Fact
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import load as load_graph
+from confab.reasoner.limits import Deadline, within
+from confab.reasoner.memory.links import Links
+from confab.reasoner.symbols import FALSE, Fact
 
 if TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
+    from confab.planner.acting.episode import World
+    from confab.planner.acting.executive import Moment
+    from confab.reasoner.graph.apart import QueryLimits
     from confab.why import Account
-    from planner.acting.episode import World
-    from planner.acting.executive import Moment
-    from reasoner.graph.apart import QueryLimits
 
 
 class Scene(Known):
@@ -164,7 +163,7 @@ class Scene(Known):
 
         Raises
         ------
-        reasoner.limits.OutOfTimeError
+        confab.reasoner.limits.OutOfTimeError
             The time limit, which holds for both, is over before it is known why.
         """
         limit = options.get("time_limit")
@@ -217,7 +216,7 @@ def load(source: str | Path, scene: str | None = None) -> Scene:
     """
     begin = perf_counter()
     if str(source).startswith(("http://", "https://")):
-        from reasoner.graph.stores import connect
+        from confab.reasoner.graph.stores import connect
 
         return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
     graph = load_graph(source, tolerant=True)

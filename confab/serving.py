@@ -5,7 +5,8 @@
 ``/``           a page that follows a running execution; ``/view`` is the part of it that changes
 ==============  ==========================================================================================================
 
-uvicorn and starlette serve HTTP. Queries run in processes of their own (`reasoner.graph.apart`), in lanes: the first one is for
+uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.apart`), in lanes: the first one
+is for
 short queries, and a query that takes longer than a lane allows starts again in the next one, with lower priority, so that short
 queries never wait for long ones. A query ends when its client leaves. Requests of other machines and other sites are refused.
 """
@@ -43,14 +44,14 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from confab.live import View
+from confab.reasoner.graph.apart import QueryLimits, QueryWorker
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
 from confab.table import Table
-from reasoner.graph.apart import QueryLimits, QueryWorker
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import LimitError
 
 if TYPE_CHECKING:
     from confab.known import Known
-    from planner.acting.executive import Moment
+    from confab.planner.acting.executive import Moment
 
 log = logging.getLogger(__name__)
 transport_log = log.getChild("transport")
@@ -150,7 +151,7 @@ class Service:
 
     def take(self, moment: Moment) -> None:
         """Note an event of an execution: the page shows it, and queries see what was observed."""
-        from reasoner.reading.observed import assert_observed
+        from confab.reasoner.reading.observed import assert_observed
 
         self.view.take(moment)
         if self.view.known:

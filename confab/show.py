@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from planner.plan import Outcome, Plan, Step
+from confab.planner.plan import Outcome, Plan, Step
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions

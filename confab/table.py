@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     import pandas

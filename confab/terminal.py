@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from confab.progress import quiet
-from reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
-    from reasoner.limits import Deadline
+    from confab.reasoner.limits import Deadline
 
 Ending = Callable[[int], NoReturn]
 """Ends the process at once with an exit code."""
@@ -38,8 +38,8 @@ WITHOUT_PHYSICS = (
 
 def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     """Run the command line: whatever happens in it ends here, as an exit code and at most one line on stderr."""
-    from reasoner.language import DomainError
-    from reasoner.limits import LimitError
+    from confab.reasoner.language import DomainError
+    from confab.reasoner.limits import LimitError
 
     _open_streams()
     try:
@@ -97,7 +97,7 @@ def _interruptible(call: Callable[[], int | None]) -> int | None:
 @contextmanager
 def limited(seconds: float | None) -> Iterator[Deadline]:
     """Let what a command does in here end within some seconds from now, by itself or, a tenth later, by force."""
-    from reasoner.limits import within
+    from confab.reasoner.limits import within
 
     with within(seconds) as deadline, ended_by(deadline, click.get_current_context().obj):
         yield deadline
@@ -107,7 +107,7 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
     """End the process where what is done in here takes a tenth longer than it may: nothing interrupts a query of a store.
 
-    Files that are written in here are written as a whole or not at all (`reasoner.files.write_whole`).
+    Files that are written in here are written as a whole or not at all (`confab.reasoner.files.write_whole`).
     """
     if deadline.left is None or ending is None:
         yield

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import sleep
 
-import ontology
-from reasoner.graph.knowledge import KnowledgeError, load, scene_file
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError, load, scene_file
 
 PAUSE = 0.3
 """Seconds between two looks."""

@@ -8,17 +8,17 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from confab.labels import Labels
+from confab.planner.causal_links import Change, Kind, Need, Purpose
+from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
+from confab.planner.levels import levels_left
+from confab.planner.plan import Outcome, Plan, Status, Step
+from confab.planner.plan_costs import cost_of
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import check
+from confab.reasoner.names import nearest
+from confab.reasoner.reading.goals import parse_fact
+from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 from confab.report.markup import Markup, styled, tag
-from planner.causal_links import Change, Kind, Need, Purpose
-from planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
-from planner.levels import levels_left
-from planner.plan import Outcome, Plan, Status, Step
-from planner.plan_costs import cost_of
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import check
-from reasoner.names import nearest
-from reasoner.reading.goals import parse_fact
-from reasoner.symbols import Behavior, Fact, Problem, Symbol
 
 MOST_TOLD = 12
 """Maximum number of facts of one kind that are told of a certificate."""
@@ -26,7 +26,7 @@ MOST_TOLD = 12
 if TYPE_CHECKING:
     from rich.tree import Tree
 
-    from planner.certificates import Certificate
+    from confab.planner.certificates import Certificate
 
 Replan = Callable[[Sequence[str]], tuple[Problem, Outcome, Labels]]
 """Plans anew for some goals; also returns the problem that was planned in, and what people call what is in it."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import TypeAlias
 
-from planner.generated import identifier, key_written, tuple_written, written
-from reasoner.amounts import (
+from confab.planner.generated import identifier, key_written, tuple_written, written
+from confab.reasoner.amounts import (
     NOTHING,
     Amount,
     Calculation,
@@ -23,8 +23,8 @@ from reasoner.amounts import (
     nearer,
     number,
 )
-from reasoner.amounts import written as amount_written
-from reasoner.symbols import AmountEffect, Comparison
+from confab.reasoner.amounts import written as amount_written
+from confab.reasoner.symbols import AmountEffect, Comparison
 
 Rows: TypeAlias = "frozenset[tuple[str, ...]]"
 Constant: TypeAlias = "Callable[[tuple[str, str], object], str]"

@@ -2,8 +2,8 @@
 
 A step is needed by a later one of its level if that one can't be done, or doesn't do what is needed of it, in the same state
 but for one fact that the earlier step gave, which is put back to what it was before. So a link is found whatever kind of
-condition makes it ("nobody stands there" as well as "the hand holds it"), and `planner.validation` rejects the rest of the plan
-without it. Each level has its own order of steps; where a plan leaves a level, the steps below stand in it.
+condition makes it ("nobody stands there" as well as "the hand holds it"), and `confab.planner.validation` rejects the rest of
+the plan without it. Each level has its own order of steps; where a plan leaves a level, the steps below stand in it.
 
 What a step is asked to look at is noted while it looks, so that only facts that it read are put back: the effort grows with
 what the plan's steps read and not with the square of its length.
@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 
-from planner.checked_conditions import Arguments
-from planner.plan import Plan, Step
-from planner.validation import Cell, Facts, Rules
-from reasoner.amounts import meets, written
-from reasoner.limits import check
-from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
+from confab.planner.checked_conditions import Arguments
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import Cell, Facts, Rules
+from confab.reasoner.amounts import meets, written
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 
 Path = tuple[int, ...]
 
@@ -73,7 +73,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
     ----------
     problem : Problem
     plan : Plan
-        One that `planner.validation.validate` finds nothing wrong with.
+        One that `confab.planner.validation.validate` finds nothing wrong with.
     """
     gives: dict[Path, tuple[Change, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}

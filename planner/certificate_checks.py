@@ -1,7 +1,7 @@
 """Does a certificate prove that a task has no plan? A checker that shares no code with any search.
 
 It works on the whole task and on its lowest level: what an upper level can't do proves nothing. With behaviours and conditions as
-they are written (`planner.possibilities`) it verifies that the certificate's set of states
+they are written (`confab.planner.possibilities`) it verifies that the certificate's set of states
 
 1. contains the state in which the task begins;
 2. is left by no behaviour of the lowest level: each case is taken up and whatever can be done in it is done;
@@ -18,10 +18,10 @@ from fractions import Fraction
 from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
-from planner.certificates import Certificate
-from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
-from reasoner.amounts import bounds, number, written
-from reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
+from confab.planner.certificates import Certificate
+from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from confab.reasoner.amounts import bounds, number, written
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 OTHER, ANY, KEPT = "", "?", "="
 """In a case: none of the values told apart; whichever value; in what comes after it: the value of before."""

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from planner.certificate_checks import Claims, View, own_variables, unified
-from planner.certificates import Certificate
-from planner.plan import Reason
-from planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
-from reasoner.amounts import MORE, Expression, terms_of, towards, written
-from reasoner.sentences import said
-from reasoner.symbols import (
+from confab.planner.certificate_checks import Claims, View, own_variables, unified
+from confab.planner.certificates import Certificate
+from confab.planner.plan import Reason
+from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, variables
+from confab.reasoner.amounts import MORE, Expression, terms_of, towards, written
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -294,7 +294,7 @@ class _Causes:
 
     def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Yield how an effect would take an amount beyond its bounds."""
-        from planner.possibilities import OPERATORS, calculated
+        from confab.planner.possibilities import OPERATORS, calculated
 
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
         quantity = self.lowest.quantity(effect.situation)

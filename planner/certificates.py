@@ -4,7 +4,7 @@ The set is described in three ways, which go together. Some facts *never* hold. 
 amount stays within bounds. And of some symbols the values are *told apart*: of all combinations of these values only some are
 reached, and those are counted. With nothing told apart there is one combination; with everything told apart, each is a state.
 
-`planner.certificate_checks` verifies a certificate, `planner.certifying` finds one.
+`confab.planner.certificate_checks` verifies a certificate, `confab.planner.certifying` finds one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from reasoner.symbols import Fact, Symbol
+from confab.reasoner.symbols import Fact, Symbol
 
 FORMAT = 1
 

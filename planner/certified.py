@@ -6,12 +6,12 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from planner.plan import Outcome, Reason, Status, TooLargeError
-from reasoner.limits import OutOfTimeError
-from reasoner.symbols import Problem
+from confab.planner.plan import Outcome, Reason, Status, TooLargeError
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
-    from planner.certificates import Certificate
+    from confab.planner.certificates import Certificate
 
 ADDED_UP = 200_000
 """Maximum rows of a join that is made to find out by how much an amount falls short."""
@@ -29,9 +29,9 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     """
     if outcome.status is not Status.UNSOLVABLE:
         return outcome
-    from planner.certificate_checks import refusal
-    from planner.certificate_reasons import told
-    from planner.certifying import certify
+    from confab.planner.certificate_checks import refusal
+    from confab.planner.certificate_reasons import told
+    from confab.planner.certifying import certify
 
     why = "none was found within the work that is allowed"
     certificate, tried = outcome.certificate, False
@@ -57,7 +57,7 @@ def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
     """Return by how much an amount falls short, which says more than the combinations in which it does."""
     if all(problem.domain.situations[symbol.situation].quantity is None for symbol in certificate.told_apart):
         return None
-    from planner.grounded.grounding import ground
+    from confab.planner.grounded.grounding import ground
 
     with suppress(TooLargeError, MemoryError, OutOfTimeError):
         task = ground(problem, most=ADDED_UP)

@@ -18,7 +18,7 @@ from itertools import combinations, pairwise
 from operator import itemgetter
 from typing import TypeAlias
 
-from planner.certificate_checks import (
+from confab.planner.certificate_checks import (
     ANY,
     Case,
     Cases,
@@ -28,11 +28,11 @@ from planner.certificate_checks import (
     unified,
     wanted_in_the_end,
 )
-from planner.certificates import Certificate
-from planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
-from planner.validation import Facts, Rules
-from reasoner.amounts import meets, number, written
-from reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
+from confab.planner.certificates import Certificate
+from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.amounts import meets, number, written
+from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
 """How much may be done to find a certificate: tests of conditions, and behaviours tried in a case."""

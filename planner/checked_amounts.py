@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, written
-from reasoner.symbols import Comparison
+from confab.reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, written
+from confab.reasoner.symbols import Comparison
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Arguments]"

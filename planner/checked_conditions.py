@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import itemgetter
 from typing import Protocol, TypeAlias
 
-from planner.checked_amounts import compares
-from reasoner.amounts import terms_of
-from reasoner.symbols import (
+from confab.planner.checked_amounts import compares
+from confab.reasoner.amounts import terms_of
+from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
     ClassCondition,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
-from reasoner.derivation import strata
-from reasoner.symbols import Rule
+from confab.reasoner.derivation import strata
+from confab.reasoner.symbols import Rule
 
 Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 

@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from planner.causal_links import on_level
-from planner.checked_conditions import Bindings
-from planner.levels import lacking
-from planner.plan import Outcome, Plan, Reason, Step, renumbered
-from planner.plan_costs import cost_of
-from planner.validation import Facts, Rules, successor, validate
-from reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
+from confab.planner.causal_links import on_level
+from confab.planner.checked_conditions import Bindings
+from confab.planner.levels import lacking
+from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import Facts, Rules, successor, validate
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, State, Symbol, substituted
 
 Ask = Callable[[Problem], Outcome]
-"""Plans: `planner.solve.solve` with whatever mode and limits."""
+"""Plans: `confab.planner.solve.solve` with whatever mode and limits."""
 
 
 class NoChoiceError(ValueError):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from planner.generated import identifier, written
-from planner.transitions import Cell, Key, Table, Writer, arguments_of
-from reasoner.derivation import strata
-from reasoner.limits import check
-from reasoner.symbols import FALSE, TRUE
+from confab.planner.generated import identifier, written
+from confab.planner.transitions import Cell, Key, Table, Writer, arguments_of
+from confab.reasoner.derivation import strata
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import FALSE, TRUE
 
 
 class Rules:

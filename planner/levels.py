@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from planner.checked_conditions import Bindings
-from planner.plan import Broken, Left, Plan, Step
-from planner.validation import Cell, Facts, Rules, stretches
-from reasoner.sentences import said
-from reasoner.symbols import (
+from confab.planner.checked_conditions import Bindings
+from confab.planner.plan import Broken, Left, Plan, Step
+from confab.planner.validation import Cell, Facts, Rules, stretches
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     Condition,
@@ -40,7 +40,7 @@ def levels_left(problem: Problem, plan: Plan) -> list[Left]:
     ----------
     problem : Problem
     plan : Plan
-        One that `planner.validation.validate` finds nothing wrong with.
+        One that `confab.planner.validation.validate` finds nothing wrong with.
     """
     return list(_Watch(problem).carried_out(plan.steps, 0))
 

@@ -11,9 +11,9 @@ from enum import Enum
 from time import perf_counter
 from typing import Protocol
 
-from planner.certificates import Certificate
-from reasoner.limits import current
-from reasoner.symbols import Condition, Fact, Problem, State
+from confab.planner.certificates import Certificate
+from confab.reasoner.limits import current
+from confab.reasoner.symbols import Condition, Fact, Problem, State
 
 
 class Status(Enum):
@@ -146,7 +146,7 @@ class Outcome:
     `cost` is what the plan costs, where some behaviour has a price; `bound` what any plan costs at least on the lowest level,
     where that was proved; `engine` the other planner whose plan it is.
     `given_up` says which level was given up for what, `left` where the plan has steps of a lower level instead, and what they
-    break that only the level above asks. `certificate` proves that a task is unsolvable; `planner.solve` lets none of these
+    break that only the level above asks. `certificate` proves that a task is unsolvable; `confab.planner.solve` lets none of these
     answers leave without one.
     """
 
@@ -181,7 +181,8 @@ class Limits:
     def end(self, share: float = 1.0) -> float | None:
         """Return when a share of the time from now on is over, on the clock of `perf_counter`; None: never.
 
-        The time ends with the seconds of these limits, or with the deadline that holds here (`reasoner.limits`) if that is earlier.
+        The time ends with the seconds of these limits, or with the deadline that holds here (`confab.reasoner.limits`) if that
+        is earlier.
         """
         left = min((seconds for seconds in (self.seconds, current().left) if seconds is not None), default=None)
         return None if left is None else perf_counter() + share * left

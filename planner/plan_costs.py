@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.plan import Plan, Step
-from planner.validation import Facts, Rules
-from reasoner.symbols import Problem
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.symbols import Problem
 
 
 def cost_of(problem: Problem, plan: Plan) -> float:

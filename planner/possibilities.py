@@ -1,8 +1,8 @@
 """What may hold, and what must, in a set of states of which only some values are known.
 
 Conditions are read as they are written, with two bounds: `may` is true unless the condition is false in all of the states, `must`
-is true only if it holds in all of them. For a single state of which everything is known both are what `planner.validation` says.
-The checker of certificates rests on this; no search does.
+is true only if it holds in all of them. For a single state of which everything is known both are what
+`confab.planner.validation` says. The checker of certificates rests on this; no search does.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from functools import partial
 from time import perf_counter
 from typing import Protocol, TypeAlias
 
-from planner.checked_definitions import Definitions
-from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds, situations_in, terms_of
-from reasoner.limits import current
-from reasoner.symbols import (
+from confab.planner.checked_definitions import Definitions
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds, situations_in, terms_of
+from confab.reasoner.limits import current
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

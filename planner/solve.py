@@ -3,15 +3,15 @@
 =========  ==========================================================  ================================
 mode       how it plans                                                 module
 =========  ==========================================================  ================================
-guarded    goals in series; rules lead where they have helped          `planner.experience.advice`
-leading    the same, and rules lead whatever their record is           `planner.experience.advice`
-strict     the same, and rules don't lead                              `planner.experience.advice`
-optimal    shortened until a lower bound is met, without memory         `planner.hierarchical.bounds`
-paper      A* with eq. (5) on each level                                `planner.paper.hierarchy`
+guarded    goals in series; rules lead where they have helped          `confab.planner.experience.advice`
+leading    the same, and rules lead whatever their record is           `confab.planner.experience.advice`
+strict     the same, and rules don't lead                              `confab.planner.experience.advice`
+optimal    shortened until a lower bound is met, without memory         `confab.planner.hierarchical.bounds`
+paper      A* with eq. (5) on each level                                `confab.planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-Every plan that leaves here was accepted by `planner.validation`, every "unsolvable" by `planner.certificate_checks`. These share no
-code with any search.
+Every plan that leaves here was accepted by `confab.planner.validation`, every "unsolvable" by
+`confab.planner.certificate_checks`. These share no code with any search.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
-from planner.certified import certified
-from planner.levels import levels_left
-from planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
-from planner.plan_costs import cost_of
-from planner.validation import validate
-from reasoner.limits import Deadline, OutOfTimeError, within
-from reasoner.symbols import GroundBehavior, Problem
+from confab.planner.certified import certified
+from confab.planner.levels import levels_left
+from confab.planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import validate
+from confab.reasoner.limits import Deadline, OutOfTimeError, within
+from confab.reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
-    from planner.experience.advice import Memory
-    from reasoner.memory.links import Links
+    from confab.planner.experience.advice import Memory
+    from confab.reasoner.memory.links import Links
 
 DEFAULT_MODE = "guarded"
 
@@ -113,22 +113,22 @@ def solve(request: Request) -> Outcome:
 
 def _with_experience(request: Request) -> Outcome:
     if request.memory is None:
-        from planner.hierarchical.planner import plan as without
+        from confab.planner.hierarchical.planner import plan as without
 
         return without(request.problem, limits=request.limits, leave_levels=request.leave_levels)
-    from planner.experience.advice import plan
+    from confab.planner.experience.advice import plan
 
     return plan(request.problem, request.memory, request.mode, request.limits, leave_levels=request.leave_levels)
 
 
 def _optimal(request: Request) -> Outcome:
-    from planner.hierarchical.bounds import plan
+    from confab.planner.hierarchical.bounds import plan
 
     return plan(request.problem, limits=request.limits)
 
 
 def _paper(request: Request) -> Outcome:
-    from planner.paper.hierarchy import plan
+    from confab.planner.paper.hierarchy import plan
 
     return plan(
         request.problem,
@@ -141,7 +141,7 @@ def _paper(request: Request) -> Outcome:
 
 
 def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:
-    from planner.hierarchical.unsolvability import AT_ONCE, PAIRS, exhausted, impossible, proved
+    from confab.planner.hierarchical.unsolvability import AT_ONCE, PAIRS, exhausted, impossible, proved
 
     proof = impossible(problem, PAIRS if states else AT_ONCE, deadline)
     if proof is not None or not states:

@@ -5,7 +5,7 @@ who    situation type → value → the keys that have it, in the order in which
 trail  what was overwritten, oldest first; `undo` takes it back to a mark
 age    how often anything was changed, undoing included: what was read off the table at this age still holds
 
-What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`planner.derived_facts`).
+What follows from other facts isn't in the table: ``now`` works it out when it is asked for it (`confab.planner.derived_facts`).
 
 Copying a state costs time in the size of the world; a change and its undoing cost a microsecond in any world. A condition becomes
 one Python expression over `now` and `who`, a behaviour a function ``forward(arguments)`` that returns the individuals of its
@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from typing import Any, TypeAlias
 
-from planner.amount_transitions import amount, change, comparison, settled
-from planner.generated import code, identifier, key_written, tuple_written, written
-from reasoner.amounts import terms_of
-from reasoner.language import DomainError, needs, nothing_determines
-from reasoner.symbols import (
+from confab.planner.amount_transitions import amount, change, comparison, settled
+from confab.planner.generated import code, identifier, key_written, tuple_written, written
+from confab.reasoner.amounts import terms_of
+from confab.reasoner.language import DomainError, needs, nothing_determines
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

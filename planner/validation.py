@@ -17,12 +17,12 @@ from functools import cached_property
 from operator import contains
 from typing import TypeAlias
 
-from planner.checked_amounts import changed, worth
-from planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
-from planner.checked_definitions import Definitions
-from planner.plan import Plan, Step
-from reasoner.amounts import meets
-from reasoner.symbols import (
+from confab.planner.checked_amounts import changed, worth
+from confab.planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
+from confab.planner.checked_definitions import Definitions
+from confab.planner.plan import Plan, Step
+from confab.reasoner.amounts import meets
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from reasoner.amounts import situations_in
-from reasoner.language import groups
-from reasoner.symbols import (
+from confab.reasoner.amounts import situations_in
+from confab.reasoner.language import groups
+from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
     ClassCondition,

@@ -15,8 +15,8 @@ from time import monotonic, sleep
 from urllib.parse import quote
 from uuid import uuid4
 
-from reasoner.kinds import Kind, kind_of
-from reasoner.limits import LimitError
+from confab.reasoner.kinds import Kind, kind_of
+from confab.reasoner.limits import LimitError
 
 log = logging.getLogger(__name__)
 PATIENCE = 600.0
@@ -49,7 +49,7 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
     """Yield the name of a temporary file to write, which replaces a file at the end of the block: all of it, or nothing.
 
     A link is followed: its target is replaced. Permissions stay as they were. A folder, a device, a file that is read-only and
-    a file whose content is of another kind than what was written (`reasoner.kinds`) are never replaced.
+    a file whose content is of another kind than what was written (`confab.reasoner.kinds`) are never replaced.
 
     Parameters
     ----------

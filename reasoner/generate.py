@@ -29,11 +29,11 @@ from pathlib import Path
 from random import Random
 from urllib.parse import quote
 
-import ontology
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.kinds import GENERATED, stamped
-from reasoner.names import nearest
+from confab import ontology
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import GENERATED, stamped
+from confab.reasoner.names import nearest
 
 FOLDER = ontology.ROOT / "families"
 WORD = re.compile(r"_([A-Z]+)_")

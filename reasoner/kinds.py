@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.nesting import MOST_NESTED, nested
-from reasoner.vocabulary import CORE, EPISODES, OWL, RDF
+from confab.reasoner.nesting import MOST_NESTED, nested
+from confab.reasoner.vocabulary import CORE, EPISODES, OWL, RDF
 
 MAKER = "Made by Confab"
 """What the metadata of pictures and films says."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from reasoner.amounts import Measure, inside, situations_in, terms_of
-from reasoner.symbols import (
+from confab.reasoner.amounts import Measure, inside, situations_in, terms_of
+from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,

@@ -12,8 +12,8 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
-from reasoner.amounts import DECIMAL, Quantity, written
-from reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
+from confab.reasoner.amounts import DECIMAL, Quantity, written
+from confab.reasoner.symbols import FALSE, TRUE, Domain, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
 """The perceivers that tell where an object is, what a hand holds and where a hand is."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from reasoner.language import situations_of, walk
-from reasoner.symbols import FALSE, AmountEffect, Behavior, Problem, ValueEffect
+from confab.reasoner.language import situations_of, walk
+from confab.reasoner.symbols import FALSE, AmountEffect, Behavior, Problem, ValueEffect
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:

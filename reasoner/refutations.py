@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, Problem, ValueCondition
+from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, Problem, ValueCondition
 
 
 @dataclass(frozen=True, order=True)

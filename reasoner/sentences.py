@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, written
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

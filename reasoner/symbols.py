@@ -26,7 +26,7 @@ from itertools import product
 from math import prod
 from typing import TypeAlias
 
-from reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
+from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
 
 TRUE = "true"
 FALSE = "false"
@@ -86,8 +86,8 @@ class SituationType:
     `arguments` are the classes of the arguments; `range` is the class of the values. A property that isn't functional has its
     value among the arguments and is `boolean`: one symbol per value, which is `TRUE` or `FALSE`. The symbols exist from
     `level` on; `rest` is the value that a refinement must restore; `default` is the value of symbols that the scene doesn't state.
-    With a `quantity` the values are numbers (`reasoner.amounts`), and only the symbols with a stated amount exist. `perceived`
-    states how physics reads the values, where it does.
+    With a `quantity` the values are numbers (`confab.reasoner.amounts`), and only the symbols with a stated amount exist.
+    `perceived` states how physics reads the values, where it does.
     """
 
     name: str
@@ -167,7 +167,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two amounts stand in the relation `operator` (a key of `reasoner.amounts.COMPARING`); false if one of them is missing."""
+    """Two amounts stand in the relation `operator` (a key of `amounts.COMPARING`); false if one of them is missing."""
 
     left: Expression
     operator: str
@@ -289,7 +289,7 @@ class Rule:
 
     If a situation type has several rules, one suffices; if none applies it is false. States do not contain its symbols: their
     values are computed on demand. Rules may depend on each other, but not on the negation of a situation type that depends on them
-    (`reasoner.derivation`).
+    (`confab.reasoner.derivation`).
 
     Parameters
     ----------

@@ -151,7 +151,9 @@ def call(
     import pickle
     from subprocess import PIPE
 
-    code = "import sys; sys.path[:] = sys.argv[2:]; from reasoner.workers import answer; answer(int(sys.argv[1]))"
+    code = (
+        "import sys; sys.path[:] = sys.argv[2:]; from confab.reasoner.workers import answer; answer(int(sys.argv[1]))"
+    )
     process = start(
         [sys.executable, "-c", code, str(megabytes or 0), *sys.path], seconds, stdin=PIPE, stdout=PIPE, stderr=PIPE
     )

@@ -1,13 +1,13 @@
 """Plan in, physical verdict out: the PyBullet world, robot, skills, perception and verification.
 
-=============================================== =====================================================================
-`sim.verify.verify(embodiment, initial, …)`     executes a plan's primitives in a new world; returns a `Rollout`
-`sim.verify.expectations(problem, steps)`       the states that the rollout is compared with
-`sim.world.World(embodiment, initial, seed=0)`  the world itself, `observe()` and `execute(step)`, for closed loops
-`sim.reach.reach(embodiment)`                   the places within reach of each hand, by geometry alone
-`sim.film.Film(path, steps, titles)`            records a rollout as a film
-`sim.verdict.CODES`                             the failure codes of a primitive
-=============================================== =====================================================================
+====================================================== ==============================================================
+`confab.sim.verify.verify(embodiment, initial, …)`     executes a plan's primitives in a new world; returns a `Rollout`
+`confab.sim.verify.expectations(problem, steps)`       the states that the rollout is compared with
+`confab.sim.world.World(embodiment, initial, seed=0)`  the world itself, `observe()` and `execute(step)`, for closed loops
+`confab.sim.reach.reach(embodiment)`                   the places within reach of each hand, by geometry alone
+`confab.sim.film.Film(path, steps, titles)`            records a rollout as a film
+`confab.sim.verdict.CODES`                             the failure codes of a primitive
+====================================================== ==============================================================
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.urdf import Array, UrdfModel, rotation
+from confab.sim.urdf import Array, UrdfModel, rotation
 
 Flags: TypeAlias = NDArray[np.bool_]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from reasoner.embodiment.values import Hand, Robot
-from sim.urdf import Array, UrdfModel, mesh_file, read_model, read_urdf
+from confab.reasoner.embodiment.values import Hand, Robot
+from confab.sim.urdf import Array, UrdfModel, mesh_file, read_model, read_urdf
 
 DRIVE = (("drive_x", "prismatic", "1 0 0"), ("drive_y", "prismatic", "0 1 0"), ("drive_yaw", "continuous", "0 0 1"))
 """Joints below the base of a mobile robot: along x, along y and about z."""

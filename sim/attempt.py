@@ -11,9 +11,9 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.collision import Mover, Surroundings, free
-from sim.engine import Engine
-from sim.motion import (
+from confab.sim.collision import Mover, Surroundings, free
+from confab.sim.engine import Engine
+from confab.sim.motion import (
     SWIVELS,
     MotionLimits,
     Reacher,
@@ -27,11 +27,11 @@ from sim.motion import (
     timed,
     turned_near,
 )
-from sim.perception import tilt_of
-from sim.robot import Manipulator
-from sim.stages import MARGIN, Numbers, Stage
-from sim.urdf import Array
-from sim.verdict import REFUTED, SkillError, named
+from confab.sim.perception import tilt_of
+from confab.sim.robot import Manipulator
+from confab.sim.stages import MARGIN, Numbers, Stage
+from confab.sim.urdf import Array
+from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
 """Margin in metres on short lines whose ends were chosen with the full margin: the load may have slipped a little since."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Robot, Stand
-from sim.assembly import DRIVE
-from sim.urdf import Array
+from confab.reasoner.embodiment.values import Robot, Stand
+from confab.sim.assembly import DRIVE
+from confab.sim.urdf import Array
 
 FORCE = 5000.0
 """Maximum force, in newtons or newton metres, of each motor of a base."""

@@ -26,8 +26,8 @@ import numpy as np
 import pybullet
 from numpy.typing import ArrayLike
 
-from reasoner.embodiment.values import Shape
-from sim.urdf import Array
+from confab.reasoner.embodiment.values import Shape
+from confab.sim.urdf import Array
 
 PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from reasoner.embodiment.values import Fixture
-from sim.arms import Arm, Flags, link_transforms, turn
-from sim.urdf import Array, Spheres, UrdfModel
+from confab.reasoner.embodiment.values import Fixture
+from confab.sim.arms import Arm, Flags, link_transforms, turn
+from confab.sim.urdf import Array, Spheres, UrdfModel
 
 EDGE, BETWEEN = 0.004, 0.02
 """Radius of the spheres along the lower edge of a load, and distance between neighbours, in metres."""

@@ -1,7 +1,7 @@
 """Motions of a mobile base among obstacles, with the arms at rest in their present postures.
 
-A path is planned as a hand's is (`sim.motion.connect`). The base's pose is (x, y, 0, yaw, 0, 0); it is free if no sphere of robot
-and load touches anything. After the drive the arms' kinematics start from the base's new pose.
+A path is planned as a hand's is (`confab.sim.motion.connect`). The base's pose is (x, y, 0, yaw, 0, 0); it is free if no sphere
+of robot and load touches anything. After the drive the arms' kinematics start from the base's new pose.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.arms import Flags, read_arm
-from sim.assembly import read_robot
-from sim.base import Base
-from sim.collision import Surroundings, clearances, fixed_spheres, free
-from sim.engine import Engine
-from sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
-from sim.urdf import Array, Spheres
-from sim.verdict import SkillError, named
+from confab.sim.arms import Flags, read_arm
+from confab.sim.assembly import read_robot
+from confab.sim.base import Base
+from confab.sim.collision import Surroundings, clearances, fixed_spheres, free
+from confab.sim.engine import Engine
+from confab.sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
+from confab.sim.urdf import Array, Spheres
+from confab.sim.verdict import SkillError, named
 
 BASE = np.array([0, 1, 3])
 """Indices of x, y and yaw in a pose."""

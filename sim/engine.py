@@ -1,8 +1,8 @@
 """PyBullet with the bodies of a scene: simulation steps and perception.
 
 Rule 1: time is counted in steps of ``1 / RATE`` seconds, and every loop has a bound in steps.
-Rule 2: only motor targets are set. Exceptions: `sim.staging` before the first step, planted faults (`sim.faults`) and
-interventions (`sim.live`).
+Rule 2: only motor targets are set. Exceptions: `confab.sim.staging` before the first step, planted faults (`confab.sim.faults`) and
+interventions (`confab.sim.live`).
 Rule 3: every random number comes from `Engine.rng`, so the same arguments give the same world, bit by bit.
 """
 
@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Embodiment, Shape
-from reasoner.limits import check
-from sim.base import Base
-from sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
-from sim.collision import Solid, Surroundings, box, column, rim
-from sim.mechanisms import Mechanic
-from sim.robot import Manipulator
-from sim.sight import Sight, Sought, look, over_the_shoulders
-from sim.urdf import Array, Spheres
-from sim.verdict import SkillError
+from confab.reasoner.embodiment.values import Embodiment, Shape
+from confab.reasoner.limits import check
+from confab.sim.base import Base
+from confab.sim.bodies import center_height, cylinders, height_of, inner_radius, outer_radius, outline, vessel_height
+from confab.sim.collision import Solid, Surroundings, box, column, rim
+from confab.sim.mechanisms import Mechanic
+from confab.sim.robot import Manipulator
+from confab.sim.sight import Sight, Sought, look, over_the_shoulders
+from confab.sim.urdf import Array, Spheres
+from confab.sim.verdict import SkillError
 
 RATE = 240.0
 """Simulation steps per second."""
@@ -86,7 +86,7 @@ class Engine:
     noise : float
         Standard deviation in metres of perceived positions.
     gui : bool
-        Open PyBullet's window. Call `sim.screen.require_screen` first: without a screen PyBullet ends the process.
+        Open PyBullet's window. Call `confab.sim.screen.require_screen` first: without a screen PyBullet ends the process.
     """
 
     def __init__(self, embodiment: Embodiment, seed: int = 0, noise: float = 0.0, gui: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Faults that can be planted in a world to test that verification detects them: pass one to `sim.verify.verify` as `prepare`.
+"""Faults to plant in a world, so that tests see verification detect them: pass one to `confab.sim.verify.verify` as `prepare`.
 
 Each function of the table below returns a `PlantedFault`, which can be sent to another process. A fault that may occur during a
 task takes `step`, the number of a primitive, and `seconds` after the beginning of that primitive.
@@ -26,12 +26,12 @@ from typing import Any, Concatenate, ParamSpec
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Shape
-from sim.bodies import KINDS, center_height
-from sim.engine import Engine, Thing
-from sim.kinematics import inverse
-from sim.motion import SWIVELS, poses_at, rotations
-from sim.urdf import Array
+from confab.reasoner.embodiment.values import Shape
+from confab.sim.bodies import KINDS, center_height
+from confab.sim.engine import Engine, Thing
+from confab.sim.kinematics import inverse
+from confab.sim.motion import SWIVELS, poses_at, rotations
+from confab.sim.urdf import Array
 
 P = ParamSpec("P")
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reasoner.embodiment.values import Feature
-from sim.bodies import height_of
-from sim.engine import Engine
-from sim.linkage import feature_frame
-from sim.motion import SWIVELS, YAWS
-from sim.urdf import Array
-from sim.verdict import SkillError
+from confab.reasoner.embodiment.values import Feature
+from confab.sim.bodies import height_of
+from confab.sim.engine import Engine
+from confab.sim.linkage import feature_frame
+from confab.sim.motion import SWIVELS, YAWS
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError
 
 AROUND = 2 * np.pi - 0.01
 """Range in radians from which on a hand may turn all the way round."""

@@ -15,15 +15,15 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from PIL.PngImagePlugin import PngInfo
 
-from reasoner.files import write_whole, written_whole
-from reasoner.kinds import MAKER
-from sim.bodies import outline
-from sim.engine import Engine
-from sim.picture import Camera, hide_vessels, picture, view_of
-from sim.urdf import Array
+from confab.reasoner.files import write_whole, written_whole
+from confab.reasoner.kinds import MAKER
+from confab.sim.bodies import outline
+from confab.sim.engine import Engine
+from confab.sim.picture import Camera, hide_vessels, picture, view_of
+from confab.sim.urdf import Array
 
 if TYPE_CHECKING:
-    from sim.world import PrimitiveStep
+    from confab.sim.world import PrimitiveStep
 
 SIZES = (17, 15, 13, 11)
 """Font sizes of the caption, of which the first that fits is used."""

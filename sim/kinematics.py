@@ -5,8 +5,8 @@ one degree of freedom, the *swivel*. There are two kinds. If all three axes of t
 elbow's angle about the line from shoulder to wrist. At 0 the elbow hangs down, or is up if the arm rises from its shoulder at the
 zero posture, as on a table. If the last axis misses the point where the two before it meet (Franka's Panda), the swivel is the
 angle of the last joint from the middle of its limits, less the hand's roll, which that joint makes; given it, the other six joints
-have a closed form. `sim.numeric` solves all other arms. With seven joints the swivel is the angle of the third; with six it is
-always 0.
+have a closed form. `confab.sim.numeric` solves all other arms. With seven joints the swivel is the angle of the third; with six
+it is always 0.
 
 ``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
 shoulder, elbow, wrist.
@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn
-from sim.numeric import REDUNDANT, solved
-from sim.urdf import Array
+from confab.sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn
+from confab.sim.numeric import REDUNDANT, solved
+from confab.sim.urdf import Array
 
 STRETCHED = 0.9999
 """Largest cosine of the angle between a joint and the point where its two solutions meet, at which they still differ."""

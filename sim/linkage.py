@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, Place
-from sim.arms import turn
-from sim.collision import Solid
-from sim.urdf import Array, UrdfModel, read_model, rotation
+from confab.reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, Place
+from confab.sim.arms import turn
+from confab.sim.collision import Solid
+from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 
 WIDER = 0.25
 """Share of the range from `opened` to a joint's upper limit by which the joint is opened further."""

@@ -1,4 +1,4 @@
-"""A physical world with interventions, in which the executive acts (`planner.acting.executive`).
+"""A physical world with interventions, in which the executive acts (`confab.planner.acting.executive`).
 
 Rule 1: an intervention acts on bodies: a cup that is moved leaves the hand and keeps its contents.
 Rule 2: an intervention that changes an object of the running primitive stops the primitive.
@@ -13,21 +13,21 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
-from planner.acting.episode import Change, Intervention
-from planner.acting.symbolic_world import disturbed, with_individual
-from planner.plan import Step
-from reasoner.embodiment.values import Body, PerceiverUse
-from reasoner.possible import refuse_impossible
-from reasoner.symbols import Fact, Problem, State, Symbol
-from sim.bodies import KINDS, center_height
-from sim.engine import Engine, Thing
-from sim.linkage import wide
-from sim.perception import tilt_of
-from sim.skills import perform
-from sim.staging import pour_in
-from sim.urdf import Array
-from sim.verdict import SkillError, Verdict
-from sim.world import World
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.symbolic_world import disturbed, with_individual
+from confab.planner.plan import Step
+from confab.reasoner.embodiment.values import Body, PerceiverUse
+from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.sim.bodies import KINDS, center_height
+from confab.sim.engine import Engine, Thing
+from confab.sim.linkage import wide
+from confab.sim.perception import tilt_of
+from confab.sim.skills import perform
+from confab.sim.staging import pour_in
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError, Verdict
+from confab.sim.world import World
 
 STOPPED = 0.02
 """Lag in radians of a joint behind its command from which on its arm counts as stopped."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reasoner.embodiment.values import Guard, Phase
-from sim.base import offset_from_stand
-from sim.perception import tilt_of
-from sim.running import Run
-from sim.verdict import SkillError
+from confab.reasoner.embodiment.values import Guard, Phase
+from confab.sim.base import offset_from_stand
+from confab.sim.perception import tilt_of
+from confab.sim.running import Run
+from confab.sim.verdict import SkillError
 
 
 def finger_force(run: Run, name: str) -> float:

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import pybullet
 
-from reasoner.embodiment.values import Link, Mechanism
-from sim.bodies import load_written
-from sim.collision import Solid
-from sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, wide, written
-from sim.urdf import Array, UrdfModel
+from confab.reasoner.embodiment.values import Link, Mechanism
+from confab.sim.bodies import load_written
+from confab.sim.collision import Solid
+from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, wide, written
+from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
 """Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which it is then held."""

@@ -1,7 +1,8 @@
 """Collision-free motion of a hand, planned in the hand's coordinates and timed within the joints' limits.
 
 A *pose* is (x, y, z, yaw, roll, swivel): the hand's point in metres; in radians the heading of its level pointing direction, the
-roll about it (0 is upright; pouring changes it), and the elbow's swivel. `sim.kinematics` maps a pose to a posture. A path with
+roll about it (0 is upright; pouring changes it), and the elbow's swivel. `confab.sim.kinematics` maps a pose to a posture. A
+path with
 roll 0 keeps a cup upright: a straight line where that is free, else the path of a short RRT-Connect in the same six coordinates.
 
 ``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints.
@@ -16,10 +17,10 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.arms import Arm, Flags, hand_frames, turn
-from sim.collision import Mover, Surroundings, free
-from sim.kinematics import inverse, swivel_of
-from sim.urdf import Array
+from confab.sim.arms import Arm, Flags, hand_frames, turn
+from confab.sim.collision import Mover, Surroundings, free
+from confab.sim.kinematics import inverse, swivel_of
+from confab.sim.urdf import Array
 
 STEP = np.array([0.015, 0.015, 0.015, 0.08, 0.08, 0.08])
 """Maximum distance between checked poses of a path (metres, radians)."""
@@ -45,7 +46,7 @@ X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Blocked:
-    """Why a path is impossible: a code of `sim.verdict`, the obstacles, and the smallest clearance in metres."""
+    """Why a path is impossible: a code of `confab.sim.verdict`, the obstacles, and the smallest clearance in metres."""
 
     code: str
     objects: tuple[str, ...] = ()

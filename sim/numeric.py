@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn_about
-from sim.urdf import Array
+from confab.sim.arms import Arm, Flags, cross, hand_frames, link_transforms, turn_about
+from confab.sim.urdf import Array
 
 REDUNDANT = 2
 """Index of the joint of a seven-joint arm whose angle, from the middle of its limits, is the swivel."""
@@ -35,7 +35,7 @@ SINGULAR = 0.45
 
 
 def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: float) -> tuple[Array, Flags]:
-    """Return postures (n, k) with the hand at rotations `r` and points `p`, and which are valid; see `sim.kinematics.inverse`."""
+    """Return postures (n, k) with the hand at rotations `r` and points `p`, and which are valid; see `kinematics.inverse`."""
     low, high = arm.lower + margin, arm.upper - margin
     found, valid = np.tile(np.clip(arm.home, low, high), (len(p), 1)), np.zeros(len(p), dtype=bool)
     if arm.swivels:

@@ -15,13 +15,13 @@ from importlib.metadata import entry_points
 
 import numpy as np
 
-from reasoner.amounts import written
-from reasoner.embodiment.values import PerceiverUse
-from reasoner.symbols import FALSE, TRUE
-from sim.base import offset_from_stand
-from sim.bodies import height_of
-from sim.engine import Engine
-from sim.urdf import Array
+from confab.reasoner.amounts import written
+from confab.reasoner.embodiment.values import PerceiverUse
+from confab.reasoner.symbols import FALSE, TRUE
+from confab.sim.base import offset_from_stand
+from confab.sim.bodies import height_of
+from confab.sim.engine import Engine
+from confab.sim.urdf import Array
 
 
 @dataclass

@@ -14,7 +14,7 @@ joint        along the joint's path, with corrections by touch
 rise         straight up to `above` the place below, with the elbow free to turn
 home         to the posture at rest
 drive        the whole robot to a stand, with the arms at rest
-over         with a vessel to a pose above another one, from which it can be tilted (`sim.pouring`)
+over         with a vessel to a pose above another one, from which it can be tilted (`confab.sim.pouring`)
 ============ ======================================================================================================
 """
 
@@ -27,21 +27,21 @@ from itertools import product
 
 import numpy as np
 
-from reasoner.embodiment.skill_checks import endless, unplayed, unset
-from reasoner.embodiment.values import Phase, SkillUse
-from sim.attempt import Attempt
-from sim.driving import drive
-from sim.engine import Engine
-from sim.features import Ways, ways
-from sim.measuring import check, finger_force, until
-from sim.motion import pose_of, rotations, turned_near
-from sim.pouring import FOLD, reach_over
-from sim.running import Run
-from sim.stages import Stage
-from sim.swings import SAMPLES, check_swing
-from sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
-from sim.urdf import Array
-from sim.verdict import REFUTED, SkillError
+from confab.reasoner.embodiment.skill_checks import endless, unplayed, unset
+from confab.reasoner.embodiment.values import Phase, SkillUse
+from confab.sim.attempt import Attempt
+from confab.sim.driving import drive
+from confab.sim.engine import Engine
+from confab.sim.features import Ways, ways
+from confab.sim.measuring import check, finger_force, until
+from confab.sim.motion import pose_of, rotations, turned_near
+from confab.sim.pouring import FOLD, reach_over
+from confab.sim.running import Run
+from confab.sim.stages import Stage
+from confab.sim.swings import SAMPLES, check_swing
+from confab.sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
+from confab.sim.urdf import Array
+from confab.sim.verdict import REFUTED, SkillError
 
 LOOKS = 3
 """Number of attempts at a motion with noisy perception, each after a new look, before its failure counts."""

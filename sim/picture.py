@@ -17,15 +17,15 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from reasoner.embodiment.values import Embodiment, Shape
-from sim.arms import read_arm
-from sim.assembly import read_robot
-from sim.bodies import outline, wall
-from sim.collision import fixed_spheres, read_mover
-from sim.engine import Engine
-from sim.linkage import with_open_mechanisms
-from sim.urdf import Array, Spheres
-from sim.urdf import rotation as rotated
+from confab.reasoner.embodiment.values import Embodiment, Shape
+from confab.sim.arms import read_arm
+from confab.sim.assembly import read_robot
+from confab.sim.bodies import outline, wall
+from confab.sim.collision import fixed_spheres, read_mover
+from confab.sim.engine import Engine
+from confab.sim.linkage import with_open_mechanisms
+from confab.sim.urdf import Array, Spheres
+from confab.sim.urdf import rotation as rotated
 
 NEAR, FAR = 0.1, 8.0
 SUN = np.array([0.45, 0.35, 0.82])

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.attempt import CLOSE, Attempt
-from sim.bodies import height_of
-from sim.engine import Engine
-from sim.motion import poses_at, rotations
-from sim.perception import tilt_of
-from sim.robot import Manipulator
-from sim.stages import Numbers, Stage, fan
-from sim.urdf import Array
-from sim.verdict import SkillError, named
+from confab.sim.attempt import CLOSE, Attempt
+from confab.sim.bodies import height_of
+from confab.sim.engine import Engine
+from confab.sim.motion import poses_at, rotations
+from confab.sim.perception import tilt_of
+from confab.sim.robot import Manipulator
+from confab.sim.stages import Numbers, Stage, fan
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError, named
 
 SIDES = (1.0, -1.0)
 """Directions of roll: to the hand's right, to its left."""

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from reasoner.embodiment.values import Embodiment, Hand, Place, Robot
-from sim.arms import read_arm
-from sim.assembly import read_robot
-from sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
-from sim.linkage import with_open_mechanisms
-from sim.motion import Reacher, beyond
-from sim.stages import MARGIN, Numbers, grip_stages
-from sim.urdf import UrdfModel
+from confab.reasoner.embodiment.values import Embodiment, Hand, Place, Robot
+from confab.sim.arms import read_arm
+from confab.sim.assembly import read_robot
+from confab.sim.collision import Solid, Surroundings, box, fixed_spheres, read_mover
+from confab.sim.linkage import with_open_mechanisms
+from confab.sim.motion import Reacher, beyond
+from confab.sim.stages import MARGIN, Numbers, grip_stages
+from confab.sim.urdf import UrdfModel
 
 VERSION = "1"
 """Version of the method, part of the fingerprint, so that stored results of an older one count as outdated."""

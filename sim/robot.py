@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Hand, Robot
-from sim.arms import Arm, hand_frames, read_arm
-from sim.assembly import assembled, plain, read_robot
-from sim.collision import Mover, fixed_spheres, read_mover
-from sim.motion import MotionLimits, pose_of
-from sim.urdf import Array, Spheres, UrdfModel
+from confab.reasoner.embodiment.values import Hand, Robot
+from confab.sim.arms import Arm, hand_frames, read_arm
+from confab.sim.assembly import assembled, plain, read_robot
+from confab.sim.collision import Mover, fixed_spheres, read_mover
+from confab.sim.motion import MotionLimits, pose_of
+from confab.sim.urdf import Array, Spheres, UrdfModel
 
 CENTERING = 400.0
 """Newtons per metre by which a finger ahead of the other one yields, which simulates the gear of a parallel gripper."""

@@ -18,14 +18,14 @@ from multiprocessing.connection import Connection, Pipe, wait
 from subprocess import DEVNULL, Popen
 from typing import Any
 
-from reasoner.embodiment.values import Embodiment
-from reasoner.limits import LimitError, check, current
-from reasoner.symbols import State
-from reasoner.workers import CPU_SECONDS, end, limit_cpu, start
-from sim.engine import Engine
-from sim.staging import Perturbation
-from sim.verify import Rollout, verify
-from sim.world import PrimitiveStep, World
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.limits import LimitError, check, current
+from confab.reasoner.symbols import State
+from confab.reasoner.workers import CPU_SECONDS, end, limit_cpu, start
+from confab.sim.engine import Engine
+from confab.sim.staging import Perturbation
+from confab.sim.verify import Rollout, verify
+from confab.sim.world import PrimitiveStep, World
 
 TRIES = 3
 """Number of processes that die at the same rollout before it is given up."""
@@ -38,7 +38,7 @@ Done = Callable[[Rollout], None]
 
 @dataclass(frozen=True)
 class Trial:
-    """The arguments of `sim.verify.verify` without the seed."""
+    """The arguments of `confab.sim.verify.verify` without the seed."""
 
     embodiment: Embodiment
     initial: State
@@ -184,7 +184,7 @@ class _Pool:
     def _start(self) -> None:
         """Start a process with the next seed."""
         here, there = Pipe()
-        code = "import sys; sys.path[:] = sys.argv[2:]; from sim.rollouts import work; work(int(sys.argv[1]))"
+        code = "import sys; sys.path[:] = sys.argv[2:]; from confab.sim.rollouts import work; work(int(sys.argv[1]))"
         command = [sys.executable, "-c", code, str(there.fileno()), *sys.path]
         process = start(command, math.inf, pass_fds=(there.fileno(),), stdin=DEVNULL)  # it limits each rollout
         self.started.append(process)

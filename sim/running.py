@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from reasoner.embodiment.skills import TERM
-from reasoner.embodiment.values import Phase
-from sim.attempt import Attempt
-from sim.engine import Engine
-from sim.features import FeatureFrame, Ways, locate, touched
-from sim.linkage import wide
-from sim.mechanisms import Mechanic
-from sim.stages import Numbers
-from sim.urdf import Array
-from sim.verdict import SkillError, named
+from confab.reasoner.embodiment.skills import TERM
+from confab.reasoner.embodiment.values import Phase
+from confab.sim.attempt import Attempt
+from confab.sim.engine import Engine
+from confab.sim.features import FeatureFrame, Ways, locate, touched
+from confab.sim.linkage import wide
+from confab.sim.mechanisms import Mechanic
+from confab.sim.stages import Numbers
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError, named
 
 TOLD = ("object", "source", "target", "place")
 """The order in which a failure names the participants' roles."""

@@ -14,8 +14,8 @@ import time
 import numpy as np
 import pybullet
 
-from sim.engine import Engine
-from sim.picture import view_of
+from confab.sim.engine import Engine
+from confab.sim.picture import view_of
 
 PACE_CHECK = 4
 """Simulation steps between comparisons with the clock."""
@@ -48,7 +48,7 @@ def require_screen() -> None:
 
 
 class Screen:
-    """A window's camera, caption and pace: pass it to `sim.verify.verify` as `watch`, with ``gui=True``.
+    """A window's camera, caption and pace: pass it to `confab.sim.verify.verify` as `watch`, with ``gui=True``.
 
     Parameters
     ----------

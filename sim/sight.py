@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Shape
-from sim.bodies import outline
-from sim.urdf import Array
+from confab.reasoner.embodiment.values import Shape
+from confab.sim.bodies import outline
+from confab.sim.urdf import Array
 
 SHARE = 0.1
 """Minimum share of a body's points that a camera has to see for the body to count as seen."""

@@ -1,6 +1,7 @@
 """The skills that execute primitives: phases described in the ontology, or Python functions.
 
-`sim.phases` interprets skills in phases. A Python skill is a function of (engine, roles, numbers): `roles` maps role names (`hand`,
+`confab.sim.phases` interprets skills in phases. A Python skill is a function of (engine, roles, numbers): `roles` maps role
+names (`hand`,
 `target`, `object`, `place`, `source`) to individuals, `numbers` has its settings from the ontology in metres, radians, seconds and
 newtons. It returns its measured numbers, or raises `SkillError`. Two are built in, since phases can express neither the path of a
 lip nor the control of a flow. Skills of other packages register as entry points of the group `confab.skills`.
@@ -18,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 
-from reasoner.embodiment.values import SkillUse
-from sim.engine import Engine
-from sim.phases import carry_out
-from sim.pouring import stand_upright, tilt
-from sim.stages import Numbers
+from confab.reasoner.embodiment.values import SkillUse
+from confab.sim.engine import Engine
+from confab.sim.phases import carry_out
+from confab.sim.pouring import stand_upright, tilt
+from confab.sim.stages import Numbers
 
 Roles = Mapping[str, str]
 Skill = Callable[[Engine, Roles, Numbers], Mapping[str, float]]

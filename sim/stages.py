@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.collision import Surroundings
-from sim.motion import SWIVELS, YAWS, poses_at
-from sim.urdf import Array
+from confab.sim.collision import Surroundings
+from confab.sim.motion import SWIVELS, YAWS, poses_at
+from confab.sim.urdf import Array
 
 Numbers = Mapping[str, float]
 

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from reasoner.embodiment.values import Fixture, Mechanism, Shape
-from sim.base import read_base
-from sim.bodies import KINDS, packed
-from sim.driving import update_kinematics
-from sim.engine import Bead, Engine, Thing
-from sim.mechanisms import load_mechanism
-from sim.perception import Draft
-from sim.robot import load_robot
-from sim.urdf import Array
+from confab.reasoner.embodiment.values import Fixture, Mechanism, Shape
+from confab.sim.base import read_base
+from confab.sim.bodies import KINDS, packed
+from confab.sim.driving import update_kinematics
+from confab.sim.engine import Bead, Engine, Thing
+from confab.sim.mechanisms import load_mechanism
+from confab.sim.perception import Draft
+from confab.sim.robot import load_robot
+from confab.sim.urdf import Array
 
 SETTLING = 120
 """Simulation steps in which bodies and beads come to rest before the first primitive."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
-"""An invisibly small triangle, the visual shape of beads: `sim.picture` draws them, since PyBullet would be slow."""
+"""An invisibly small triangle, the visual shape of beads: `confab.sim.picture` draws them, since PyBullet would be slow."""
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from reasoner.embodiment.values import PerceiverUse, SkillUse
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, Symbol
-from sim.bodies import height_of, outline
-from sim.collision import column
-from sim.engine import Engine
-from sim.linkage import wide
-from sim.running import evaluate
-from sim.urdf import Array
-from sim.verdict import SkillError
+from confab.reasoner.embodiment.values import PerceiverUse, SkillUse
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact, Symbol
+from confab.sim.bodies import height_of, outline
+from confab.sim.collision import column
+from confab.sim.engine import Engine
+from confab.sim.linkage import wide
+from confab.sim.running import evaluate
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError
 
 SAMPLES = 9
 """Number of values of a joint at which its link is checked."""

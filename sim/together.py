@@ -14,11 +14,11 @@ from threading import Semaphore, Thread
 import numpy as np
 import pybullet
 
-from planner.acting.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
-from planner.plan import Step
-from reasoner.symbols import Problem
-from sim.verdict import Verdict
-from sim.world import World
+from confab.planner.acting.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
+from confab.planner.plan import Step
+from confab.reasoner.symbols import Problem
+from confab.sim.verdict import Verdict
+from confab.sim.world import World
 
 ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""

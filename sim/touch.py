@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from reasoner.embodiment.values import Phase
-from sim.bodies import outline
-from sim.measuring import finger_force, finger_forces
-from sim.motion import line
-from sim.running import Run
-from sim.urdf import Array
-from sim.verdict import SkillError
+from confab.reasoner.embodiment.values import Phase
+from confab.sim.bodies import outline
+from confab.sim.measuring import finger_force, finger_forces
+from confab.sim.motion import line
+from confab.sim.running import Run
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError
 
 CLOSING = 360
 """Maximum number of steps of a grasp."""

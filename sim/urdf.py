@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reasoner.embodiment.facts import pybullet_data
-from sim.meshes import bounds, covered_mesh
+from confab.reasoner.embodiment.facts import pybullet_data
+from confab.sim.meshes import bounds, covered_mesh
 
 Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000

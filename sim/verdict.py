@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact
 
 CODES = {
     "unreachable": "no posture of the arm takes the hand there",

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from planner.validation import successor
-from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import FALSE, TRUE, Fact, Problem, State
-from sim.engine import Clock, Engine
-from sim.perception import perceiver
-from sim.staging import Perturbation
-from sim.verdict import Verdict
-from sim.world import PrimitiveStep, World
+from confab.planner.validation import successor
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State
+from confab.sim.engine import Clock, Engine
+from confab.sim.perception import perceiver
+from confab.sim.staging import Perturbation
+from confab.sim.verdict import Verdict
+from confab.sim.world import PrimitiveStep, World
 
 LOOKS = 3
 """Maximum number of looks with noisy perception before a difference from the expected state counts."""
@@ -118,9 +118,9 @@ def verify(
     seed, perturb, beads, noise
         As in `World`.
     prepare : callable, optional
-        Called with the world before the first step, for example a planted fault (`sim.faults`).
+        Called with the world before the first step, for example a planted fault (`confab.sim.faults`).
     watch : callable, optional
-        Called with the world after every simulation step, for example a `sim.film.Film`.
+        Called with the world after every simulation step, for example a `confab.sim.film.Film`.
     progress : callable, optional
         Called with the number of finished steps and the next step.
     gui : bool

@@ -10,19 +10,19 @@ from typing import Protocol
 
 import numpy as np
 
-from reasoner.embodiment.values import Embodiment
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, State, Symbol
-from sim.engine import RATE, Engine
-from sim.perception import Draft, perceiver
-from sim.skills import perform
-from sim.staging import Perturbation, furnish, stage
-from sim.swings import refuted
-from sim.verdict import REFUTED, SkillError, Verdict
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact, State, Symbol
+from confab.sim.engine import RATE, Engine
+from confab.sim.perception import Draft, perceiver
+from confab.sim.skills import perform
+from confab.sim.staging import Perturbation, furnish, stage
+from confab.sim.swings import refuted
+from confab.sim.verdict import REFUTED, SkillError, Verdict
 
 
 class PrimitiveStep(Protocol):
-    """A primitive of a plan, as `planner.plan.Step` is one."""
+    """A primitive of a plan, as `confab.planner.plan.Step` is one."""
 
     @property
     def path(self) -> tuple[int, ...]:
@@ -63,9 +63,9 @@ class World(Engine):
     noise : float
         Standard deviation in metres of perceived positions.
     watch : callable, optional
-        Called with the world after every simulation step, for example a `sim.film.Film`.
+        Called with the world after every simulation step, for example a `confab.sim.film.Film`.
     gui : bool
-        Open PyBullet's window. Call `sim.screen.require_screen` first: without a screen PyBullet ends the process.
+        Open PyBullet's window. Call `confab.sim.screen.require_screen` first: without a screen PyBullet ends the process.
     """
 
     def __init__(

@@ -10,7 +10,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ["ontology", "reasoner", "planner", "sim", "confab"]  # left to right
+ROOMS = [
+    "ontology",
+    "reasoner",
+    "planner",
+    "sim",
+    "confab",
+]  # left to right; all but the last are links inside of `confab`
 SUBROOMS = {  # of the planner: what each may import beside itself; plan, validation, language, levels and transitions all may
     "paper": set[str](),
     "grounded": set[str](),
@@ -21,25 +27,34 @@ SUBROOMS = {  # of the planner: what each may import beside itself; plan, valida
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}
 
 
+def package_of(module: str) -> str:
+    """Return the room or package of a module's full name."""
+    first, second = [*module.split("."), ""][:2]
+    if first in ROOMS[:-1]:
+        return f"{first} outside of confab"
+    return second if first == "confab" and second in ROOMS else first
+
+
 def imported_packages(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Yield line and top-level name of every absolute import, also one inside a function."""
+    """Yield line and room or top-level name of every absolute import, also one inside a function."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
-                yield node.lineno, alias.name.split(".")[0]
+                yield node.lineno, package_of(alias.name)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.lineno, node.module.split(".")[0]
+            for alias in node.names:
+                yield node.lineno, package_of(f"{node.module}.{alias.name}")
         elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in {"import_module", "__import__"}:
             for argument in node.args[:1]:
                 if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
-                    yield node.lineno, argument.value.split(".")[0]
+                    yield node.lineno, package_of(argument.value)
 
 
 def violations(root: Path) -> list[str]:
     """Return each import below `root` that points to the right, or brings RDF or physics into the planner."""
     found = []
     for position, room in enumerate(ROOMS):
-        barred = {"tests", "benchmarks", *ROOMS[position + 1 :]}
+        barred = {"tests", "benchmarks", *ROOMS[position + 1 :], *(f"{name} outside of confab" for name in ROOMS)}
         if room == "planner":
             barred |= BARRED_FROM_PLANNER
         for path in sorted((root / room).rglob("*.py")):
@@ -56,10 +71,12 @@ def test_rooms_import_only_rooms_to_their_left() -> None:
 @pytest.mark.parametrize(
     ("path", "source", "package"),
     [
-        ("ontology/seeded.py", "import reasoner.graph.knowledge\n", "reasoner"),
-        ("reasoner/seeded.py", "from planner import search\n", "planner"),
-        ("reasoner/deep/seeded.py", "import os, sim as body\n", "sim"),
-        ("planner/seeded.py", "def f():\n    from sim.world import World\n", "sim"),
+        ("ontology/seeded.py", "import confab.reasoner.graph.knowledge\n", "reasoner"),
+        ("reasoner/seeded.py", "from confab.planner import search\n", "planner"),
+        ("reasoner/deep/seeded.py", "import os, confab.sim as body\n", "sim"),
+        ("planner/seeded.py", "def f():\n    from confab.sim.world import World\n", "sim"),
+        ("planner/seeded.py", "from confab import sim\n", "sim"),
+        ("planner/seeded.py", "from planner.plan import Plan\n", "planner outside of confab"),
         ("planner/seeded.py", "import rdflib\n", "rdflib"),
         ("planner/seeded.py", "import pybullet as p\n", "pybullet"),
         ("sim/seeded.py", "import importlib\nimportlib.import_module('confab.cli')\n", "confab"),
@@ -81,15 +98,21 @@ def test_a_seeded_violation_is_caught(tmp_path: Path, path: str, source: str, pa
 
 def test_imports_to_the_left_and_within_a_room_are_allowed(tmp_path: Path) -> None:
     (tmp_path / "planner").mkdir()
-    source = "import ontology\nfrom reasoner.symbols import Symbol\nfrom . import sim\nfrom planner.grounded.task import Task\n"
+    source = "from confab import ontology\nfrom confab.reasoner import names\nfrom confab.planner.grounded.task import Task\n"
     (tmp_path / "planner" / "fine.py").write_text(source)
     assert violations(tmp_path) == []
+
+
+def module_name(path: Path) -> str:
+    """Return the full name of the module in a file, whose path begins with a room."""
+    names = [name for name in path.with_suffix("").parts if name != "__init__"]
+    return ".".join(["confab"] * (names[0] in ROOMS[:-1]) + names)
 
 
 def imports(root: Path, folders: Sequence[str]) -> dict[str, set[str]]:
     """Return for each module below some folders those that it imports, inside functions and for type checking included."""
     paths = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
-    modules = {".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
+    modules = {module_name(path.relative_to(root)): path for path in paths}
     found: dict[str, set[str]] = {}
     for module, path in modules.items():
         names: set[str] = set()
@@ -123,25 +146,31 @@ def test_no_modules_import_each_other() -> None:
 
 @pytest.mark.parametrize(
     "back",
-    ["from planner import one", "def f():\n    import planner.one", "if TYPE_CHECKING:\n    from planner.one import X"],
+    [
+        "from confab.planner import one",
+        "def f():\n    import confab.planner.one",
+        "if TYPE_CHECKING:\n    from confab.planner.one import X",
+    ],
 )
 def test_a_seeded_cycle_is_found(tmp_path: Path, back: str) -> None:
     (tmp_path / "planner").mkdir()
-    (tmp_path / "planner" / "one.py").write_text("from planner.two import f\n")
-    (tmp_path / "planner" / "two.py").write_text("import planner.three\n")
+    (tmp_path / "planner" / "one.py").write_text("from confab.planner.two import f\n")
+    (tmp_path / "planner" / "two.py").write_text("import confab.planner.three\n")
     (tmp_path / "planner" / "three.py").write_text("")
     assert cycles(imports(tmp_path, ["planner"])) == []
     (tmp_path / "planner" / "three.py").write_text(back + "\n")
-    assert cycles(imports(tmp_path, ["planner"])) == [{"planner.one", "planner.two", "planner.three"}]
+    assert cycles(imports(tmp_path, ["planner"])) == [
+        {"confab.planner.one", "confab.planner.two", "confab.planner.three"}
+    ]
 
 
 def astray(graph: Mapping[str, set[str]]) -> list[str]:
     """Return the imports from one sub-room of the planner to another that it doesn't build on, or to what is above all."""
     found = []
     for module, others in sorted(graph.items()):
-        room = module.split(".")[1] if module.count(".") == 2 else ""
+        room = module.split(".")[2] if module.count(".") == 3 else ""
         for other in sorted(others):
-            to = other.split(".")[1] if "." in other else ""
+            to = other.split(".")[2] if other.count(".") > 1 else ""
             if room in SUBROOMS and to not in {
                 room,
                 "plan",
@@ -172,12 +201,12 @@ def test_sub_rooms_of_the_planner_import_only_what_they_build_on() -> None:
 
 def test_a_seeded_import_astray_is_found() -> None:
     graph = imports(ROOT, ["planner"])
-    graph["planner.paper.astar"] = {"planner.hierarchical.symmetry", "planner.plan"}
-    graph["planner.grounded.joins"] = {"planner.hierarchical.symmetry", "planner.solve"}
+    graph["confab.planner.paper.astar"] = {"confab.planner.hierarchical.symmetry", "confab.planner.plan"}
+    graph["confab.planner.grounded.joins"] = {"confab.planner.hierarchical.symmetry", "confab.planner.solve"}
     assert astray(graph) == [
-        "planner.grounded.joins imports planner.hierarchical.symmetry",
-        "planner.grounded.joins imports planner.solve",
-        "planner.paper.astar imports planner.hierarchical.symmetry",
+        "confab.planner.grounded.joins imports confab.planner.hierarchical.symmetry",
+        "confab.planner.grounded.joins imports confab.planner.solve",
+        "confab.planner.paper.astar imports confab.planner.hierarchical.symmetry",
     ]
 
 
@@ -200,17 +229,18 @@ def run_elsewhere(code: str, directory: Path) -> object:
 
 
 def test_every_room_is_the_one_in_this_repository(tmp_path: Path) -> None:
-    code = f"import importlib, json; print(json.dumps([importlib.import_module(room).__file__ for room in {ROOMS}]))"
-    assert run_elsewhere(code, tmp_path) == [str(ROOT / room / "__init__.py") for room in ROOMS]
+    names = [module_name(Path(room)) for room in ROOMS]
+    code = f"import importlib, json; print(json.dumps([importlib.import_module(room).__file__ for room in {names}]))"
+    assert run_elsewhere(code, tmp_path) == [str(ROOT.joinpath(*name.split("."), "__init__.py")) for name in names]
 
 
 def test_planner_loads_no_rdf_and_no_physics(tmp_path: Path) -> None:
     modules = [
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        module_name(path.relative_to(ROOT))
         for path in sorted((ROOT / "planner").rglob("*.py"))
         if path.name != "__main__.py"
     ]
-    assert "planner" in modules
+    assert "confab.planner" in modules
     code = (
         f"import importlib, json, sys\nfor module in {modules}: importlib.import_module(module)\n"
         f"print(json.dumps(sorted({BARRED_FROM_PLANNER} & set(sys.modules))))"

@@ -11,10 +11,10 @@ from shutil import copy, copytree, ignore_patterns
 
 import pytest
 
-import ontology
+from confab import ontology
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("confab", "ontology", "planner", "reasoner", "sim")
+ROOMS = ("ontology", "planner", "reasoner", "sim")
 BUILD = "import sys; from setuptools.build_meta import build_wheel; print(build_wheel(sys.argv[1]))"
 COMMAND = "from importlib.metadata import distribution as d; d('confab-planner').entry_points['confab'].load()()"
 
@@ -25,8 +25,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         copy(ROOT / name, source)
-    for name in PACKAGES:
-        copytree(ROOT / name, source / name, ignore=ignore_patterns("__pycache__"))
+    for name in ("confab", *ROOMS):
+        copytree(ROOT / name, source / name, ignore=ignore_patterns("__pycache__"), symlinks=True)
     done = subprocess.run([sys.executable, "-c", BUILD, str(dist)], cwd=source, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     (built,) = dist.glob("*.whl")
@@ -36,12 +36,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     there = set(zipfile.ZipFile(wheel).namelist())
     wanted = {
-        path.relative_to(ROOT).as_posix()
-        for name in PACKAGES
-        for path in (ROOT / name).rglob("*")
+        f"confab/{path.relative_to(base).as_posix()}"
+        for folder, base in ((ROOT / "confab", ROOT / "confab"), *((ROOT / room, ROOT) for room in ROOMS))
+        for path in folder.rglob("*")
         if path.is_file() and "__pycache__" not in path.parts and not path.name.startswith(".")
     }
     assert wanted - there == set()
+    assert {name.split("/")[0] for name in there if ".dist-info/" not in name} == {"confab"}
     assert {Path(name).suffix for name in wanted} >= {".py", ".ttl", ".rq", ".html", ".css", ".js", ".urdf"}
 
 
@@ -56,7 +57,15 @@ def test_installed_outside_of_the_repository_it_does_the_main_job(wheel: Path, t
     (site / "beside.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
     python = str(home / "bin" / "python")
     where = {"PATH": os.environ["PATH"], "HOME": str(tmp_path)}
-    code = "import sys, confab, ontology; print(confab.__file__, ontology.ROOT)"
+    for taken in (
+        "planner.py",
+        "ontology.py",
+        "sim/__init__.py",
+        "reasoner/__init__.py",
+    ):  # names that a user may have, too
+        (tmp_path / taken).parent.mkdir(exist_ok=True)
+        (tmp_path / taken).write_text("raise AssertionError\n")
+    code = "import sys, confab.ontology; print(confab.__file__, confab.ontology.ROOT)"
     found = subprocess.run([python, "-c", code], cwd=tmp_path, env=where, capture_output=True, text=True, check=True)
     assert all(Path(path).is_relative_to(site) for path in found.stdout.split())
     line = [python, "-c", COMMAND, "run", "beverage-serving-moved", "--no-video", "--memory", "memory.ttl"]

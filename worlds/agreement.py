@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterable, Mapping
 from heapq import heappop, heappush
 from itertools import count
 
-from planner.levels import levels_left
-from planner.plan import Outcome, Status
-from planner.validation import Facts, Rules, validate
-from reasoner.amounts import meets
-from reasoner.symbols import FALSE, Problem, Symbol
+from confab.planner.levels import levels_left
+from confab.planner.plan import Outcome, Status
+from confab.planner.validation import Facts, Rules, validate
+from confab.reasoner.amounts import meets
+from confab.reasoner.symbols import FALSE, Problem, Symbol
 from worlds.writing import quantified
 
 State = Mapping[Symbol, str]

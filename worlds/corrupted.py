@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
-from planner.plan import Plan, Step, renumbered
-from reasoner.symbols import Problem
+from confab.planner.plan import Plan, Step, renumbered
+from confab.reasoner.symbols import Problem
 from worlds.interpreter import Interpreter
 
 

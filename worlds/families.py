@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem, Symbol
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem, Symbol
 
 FAMILIES = ("served", "swap", "rotate", "full", "packed", "handover", "blocked")
 

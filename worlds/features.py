@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 
-from reasoner.amounts import Calculation, Expression, inside
-from reasoner.symbols import (
+from confab.reasoner.amounts import Calculation, Expression, inside
+from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
     AnyOf,

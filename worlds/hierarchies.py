@@ -14,7 +14,7 @@ from itertools import product
 from math import prod
 from random import Random
 
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -19,10 +19,10 @@ from heapq import heappop, heappush
 from itertools import product
 from typing import Any
 
-from reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
-from reasoner.derivation import strata
-from reasoner.language import situations_of, walk
-from reasoner.symbols import (
+from confab.reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
+from confab.reasoner.derivation import strata
+from confab.reasoner.language import situations_of, walk
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

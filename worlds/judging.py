@@ -19,15 +19,15 @@ from time import process_time
 from types import FrameType
 from typing import Any, TypeVar
 
+from confab.planner.acting.episode import End
+from confab.planner.plan import Outcome, Plan, Status
+from confab.planner.validation import validate
 from confab.planning import NO_ENGINE, plan
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import DomainError
+from confab.reasoner.limits import LimitError
+from confab.reasoner.symbols import Problem, Symbol
 from confab.scene import Scene, load
-from planner.acting.episode import End
-from planner.plan import Outcome, Plan, Status
-from planner.validation import validate
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.language import DomainError
-from reasoner.limits import LimitError
-from reasoner.symbols import Problem, Symbol
 from worlds.corrupted import corrupted, numbered, random_steps
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import World
@@ -295,9 +295,9 @@ class Judge:
 
     def export(self, read: Scene, level: int) -> None:
         """Export a level and import it; as a problem of its own it has to be solvable where the level is."""
-        from reasoner.pddl.exporting import to_pddl
-        from reasoner.pddl.importing import imported
-        from reasoner.pddl.syntax import PddlError, parse
+        from confab.reasoner.pddl.exporting import to_pddl
+        from confab.reasoner.pddl.importing import imported
+        from confab.reasoner.pddl.syntax import PddlError, parse
 
         mode = f"export {level}"
         exported = self.call(mode, lambda: to_pddl(read.problem, level))

@@ -11,8 +11,8 @@ from fractions import Fraction
 from itertools import product
 from random import Random
 
-from reasoner.amounts import COMPARING, OPERATIONS, Amount, Calculation, Expression, Measure, Quantity, written
-from reasoner.symbols import (
+from confab.reasoner.amounts import COMPARING, OPERATIONS, Amount, Calculation, Expression, Measure, Quantity, written
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

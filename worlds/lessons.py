@@ -8,14 +8,14 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from planner.experience.advice import Memory
-from planner.experience.lessons import teach
-from reasoner.generate import generate
-from reasoner.graph.knowledge import load
-from reasoner.memory.experience import Experience, Rule
-from reasoner.reading.problem import Reading, read
-from reasoner.reading.relevance import recognise
-from reasoner.symbols import Problem, ValueCondition
+from confab.planner.experience.advice import Memory
+from confab.planner.experience.lessons import teach
+from confab.reasoner.generate import generate
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.memory.experience import Experience, Rule
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.symbols import Problem, ValueCondition
 
 
 def as_it_is(text: str) -> str:

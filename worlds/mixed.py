@@ -17,8 +17,8 @@ from itertools import product
 from random import Random
 from typing import Any
 
-from reasoner.amounts import Quantity, written
-from reasoner.symbols import (
+from confab.reasoner.amounts import Quantity, written
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

@@ -12,8 +12,16 @@ from fractions import Fraction
 from random import Random
 from typing import Any, TypeAlias
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, written
-from reasoner.symbols import AmountEffect, Behavior, Comparison, EqualityCondition, Parameter, Problem, SituationType
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, written
+from confab.reasoner.symbols import (
+    AmountEffect,
+    Behavior,
+    Comparison,
+    EqualityCondition,
+    Parameter,
+    Problem,
+    SituationType,
+)
 from worlds.writing import becomes, has, world
 
 State: TypeAlias = Any

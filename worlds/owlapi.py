@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import ontology
+from confab import ontology
 
 
 def jars() -> list[str]:

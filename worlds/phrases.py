@@ -7,8 +7,8 @@ from dataclasses import replace
 from fractions import Fraction
 from random import Random
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
@@ -22,8 +22,8 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.updates.writing import Situations, update
-from reasoner.vocabulary import ARGUMENTS
+from confab.reasoner.updates.writing import Situations, update
+from confab.reasoner.vocabulary import ARGUMENTS
 from worlds.mixed import World
 from worlds.phrases import ANYONE, EACH
 

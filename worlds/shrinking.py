@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from time import process_time
 from typing import Any
 
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
     Behavior,

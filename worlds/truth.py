@@ -1,6 +1,7 @@
 """What can be reached, counted by a program that shares no code with the planner: the truth that random tables are held against.
 
-It reads behaviours by way of the checker's interpreter alone (`planner.validation.Rules`), and asks that one only once for every
+It reads behaviours by way of the checker's interpreter alone (`confab.planner.validation.Rules`), and asks that one only once
+for every
 combination of the symbols that it looks at: the answers grow into a decision tree per quantified behaviour, along which arrays
 of states descend.
 
@@ -18,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.validation import Facts, Rules
-from reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
 
 Codes = NDArray[np.uint64]
 UNSEEN, DEAD, ALIVE = 0, 1, 2

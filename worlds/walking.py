@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from planner.plan import Plan, Step
+from confab.planner.plan import Plan, Step
 from worlds.interpreter import NOTHING, Interpreter, State
 
 

@@ -24,8 +24,8 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.terminal import NO, YES, limited, show_result
-from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     from confab.table import Table
@@ -43,8 +43,8 @@ def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
     """Serve a scene as a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
     from threading import Event
 
+    from confab.reasoner.graph.apart import QueryLimits
     from confab.serving import serving
-    from reasoner.graph.apart import QueryLimits
 
     with serving(load_scene(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
         show_result(f"{server.url}sparql answers SPARQL 1.1, {server.url} shows the scene; Ctrl-C ends it")
@@ -109,7 +109,7 @@ def query(
     as_json: bool,
 ) -> None:
     """Ask a scene in SPARQL, or what its objects afford."""
-    from reasoner.graph.apart import QueryLimits
+    from confab.reasoner.graph.apart import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
     asked = {"QUERY": sparql, "--show": show, "--affords": affords}
@@ -166,8 +166,8 @@ def _rows(table: Table, form: str, out: Path | None, prefixes: dict[str, str]) -
     if out is None:
         print(text, end="")
         return
-    from reasoner.files import write_whole
-    from reasoner.kinds import TRIPLES, stamped
+    from confab.reasoner.files import write_whole
+    from confab.reasoner.kinds import TRIPLES, stamped
 
     write_whole(out, stamped(TRIPLES, [text]) if form == "turtle" else text)
     print(f"{out}: {len(table)} rows")

@@ -21,8 +21,8 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
+from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE
 from confab.terminal import NO, YES, limited, remark, show_result
-from reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE
 
 
 @command(epilog=examples("new"))
@@ -63,7 +63,7 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
 )
 def fetch(url: str, folder: Path) -> None:
     """Fetch an ontology that is imported by URL."""
-    from reasoner.graph.fetching import fetch as fetch_ontology
+    from confab.reasoner.graph.fetching import fetch as fetch_ontology
 
     fetched = fetch_ontology(url, folder)
     show_result(
@@ -115,9 +115,9 @@ def validate(
 
 def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: float | None, as_json: bool) -> int:
     """Check some files, print what was found, and return the exit code."""
-    from reasoner.validation.findings import ERROR, WARNING, listing
-    from reasoner.validation.validate import STAGES
-    from reasoner.validation.validate import validate as check
+    from confab.reasoner.validation.findings import ERROR, WARNING, listing
+    from confab.reasoner.validation.validate import STAGES
+    from confab.reasoner.validation.validate import validate as check
 
     with limited(time_limit), progress("validating", len(files) * STAGES) as advance:
         findings = check(files, deep=deep, done=lambda what: advance(what, 1))
@@ -147,7 +147,7 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: flo
 def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
     """Write a scene for trials as an ordinary ontology file."""
     from confab.authoring import turtle_path
-    from reasoner.generate import write_scene
+    from confab.reasoner.generate import write_scene
 
     write_scene(turtle_path(out), family, objects, hands, clutter, seed)
     print(f"{out}: a scene of the family {family}; plan in it with: confab plan {out}")
@@ -173,14 +173,14 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
 def convert(file: Path, form: str, out: Path | None) -> None:
     """Write the behaviours of a file in another form."""
     from confab.authoring import turtle_path
-    from reasoner.updates.converting import convert as converted
+    from confab.reasoner.updates.converting import convert as converted
 
     found = converted(file, "sparql" if form == "sparql" else "individuals")
     if out is None:
         show_result(found.text.rstrip())
     else:
-        from reasoner.files import write_whole
-        from reasoner.kinds import stamped
+        from confab.reasoner.files import write_whole
+        from confab.reasoner.kinds import stamped
 
         write_whole(turtle_path(out), stamped(CONVERTED, [found.text]))
         print(f"{out}: {len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")

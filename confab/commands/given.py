@@ -6,16 +6,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import ontology
+from confab import ontology
 from confab.progress import progress
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.terminal import remark
-from reasoner.graph.knowledge import KnowledgeError
 
 if TYPE_CHECKING:
     from confab.memory import Memory
+    from confab.planner.plan import Outcome, Plan
+    from confab.reasoner.limits import Deadline
     from confab.scene import Scene
-    from planner.plan import Outcome, Plan
-    from reasoner.limits import Deadline
 
 
 def load_scene(source: str, iri: str | None = None) -> Scene:
@@ -33,8 +33,8 @@ def doubt(scene: Scene, deadline: Deadline) -> None:
     path = scene.knowledge.path
     if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
         return
-    from reasoner.limits import LimitError, within
-    from reasoner.validation.validate import quick_errors
+    from confab.reasoner.limits import LimitError, within
+    from confab.reasoner.validation.validate import quick_errors
 
     errors = []
     with suppress(LimitError), within(deadline):
@@ -48,7 +48,7 @@ def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
     """Say which places no hand reaches and what is in the way, a line each: where there is no plan, and time is left."""
     if outcome.plan is None and deadline.left != 0:
         from confab.reaching import unreached
-        from reasoner.limits import LimitError, within
+        from confab.reasoner.limits import LimitError, within
 
         with suppress(LimitError), within(deadline):
             for line in unreached(scene):
@@ -71,7 +71,7 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
         lines = None
         if path.is_file():
             from confab.authoring import unknown_terms
-            from reasoner.memory.links_file import memory_lines
+            from confab.reasoner.memory.links_file import memory_lines
 
             lines = memory_lines(path)
             if unknown := unknown_terms(lines, scene.knowledge):

@@ -21,8 +21,8 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
+from confab.reasoner.kinds import MEMORY, PICTURE
 from confab.terminal import EXIT, YES, limited, remark, show_result
-from reasoner.kinds import MEMORY, PICTURE
 
 if TYPE_CHECKING:
     from confab.memory import Memory
@@ -66,7 +66,7 @@ def learn(
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
-    from reasoner.files import has_content
+    from confab.reasoner.files import has_content
 
     remembered: Memory | None = None
     status, curve = YES, Curve()

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-import ontology
+from confab import ontology
 
 PATH = click.Path(path_type=Path)
 
@@ -22,7 +22,7 @@ class Output(click.Path):
     Parameters
     ----------
     kind : str
-        What will be written, as `reasoner.kinds` calls it; empty if only the command knows.
+        What will be written, as `confab.reasoner.kinds` calls it; empty if only the command knows.
     may_be : str
         The parameter whose files it may replace.
     """
@@ -35,7 +35,7 @@ class Output(click.Path):
         """Return the path, if content of this kind may be written there."""
         path = Path(str(super().convert(value, param, ctx)))
         if self.kind and ctx is not None and not ctx.resilient_parsing:
-            from reasoner.files import check_replaceable
+            from confab.reasoner.files import check_replaceable
 
             check_replaceable(path, self.kind)
         return path

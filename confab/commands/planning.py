@@ -31,9 +31,9 @@ from confab.commands.options import (
 )
 from confab.examples import examples
 from confab.progress import progress
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
 
 if TYPE_CHECKING:
     from confab.explaining import Explanation
@@ -198,7 +198,7 @@ def verify(
         )
     keep(loaded, refuted_in(loaded, report))
     if out is not None:
-        from reasoner.files import write_whole
+        from confab.reasoner.files import write_whole
 
         write_whole(out, json.dumps(report.json(), indent=1) + "\n")
         show_result(f"{out}: {report.summary()}")

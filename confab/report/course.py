@@ -9,14 +9,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from planner.acting.schedule import worker_of, workers_of
-from planner.plan import Plan, Step
-from planner.validation import successor
-from reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.planner.acting.schedule import worker_of, workers_of
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import successor
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 if TYPE_CHECKING:
-    from planner.acting.episode import Episode
-    from sim.verify import Rollout
+    from confab.planner.acting.episode import Episode
+    from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
 """Maximum number of lanes by first argument; with more, all primitives share a lane."""
@@ -88,7 +88,7 @@ class Timeline:
         return found
 
     def lanes(self) -> dict[str, list[Bar]]:
-        """Return the bars of primitives by worker (`planner.acting.schedule.worker_of`), or by first argument if there are none."""
+        """Return the bars of primitives by worker (`schedule.worker_of`), or by first argument if there are none."""
         workers = workers_of(self.problem)
         found: dict[str, list[Bar]] = {}
         for bar in self.bars:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.symbols import Problem
 from confab.report.course import Timeline
 from confab.report.markup import Markup, tag
-from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import Problem
 
 if TYPE_CHECKING:
     from confab.labels import Labels
@@ -53,7 +53,7 @@ def _table(embodiment: Embodiment) -> Ground | None:
     def seen(x: float, y: float) -> tuple[float, float]:
         return -y, -x
 
-    from sim.linkage import with_open_mechanisms
+    from confab.sim.linkage import with_open_mechanisms
 
     places, solids = with_open_mechanisms(embodiment)
     boxes = []

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from confab.planner.plan import Outcome, Plan, Step
 from confab.report import pieces
 from confab.report.markup import styled, tag
 from confab.show import summary
-from planner.plan import Outcome, Plan, Step
 
 
 def _of_outcome(outcome: Outcome) -> str:
@@ -26,10 +26,10 @@ def _of_step(step: Step) -> str:
 
 
 SHOWN: dict[tuple[str, str], Callable[[Any], str]] = {
-    ("planner.plan", "Outcome"): _of_outcome,
-    ("planner.plan", "Plan"): _of_plan,
-    ("planner.plan", "Step"): _of_step,
-    ("sim.verdict", "Verdict"): pieces.verdict,
+    ("confab.planner.plan", "Outcome"): _of_outcome,
+    ("confab.planner.plan", "Plan"): _of_plan,
+    ("confab.planner.plan", "Step"): _of_step,
+    ("confab.sim.verdict", "Verdict"): pieces.verdict,
 }
 """By module and class: the function that returns the HTML of a value."""
 

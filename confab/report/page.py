@@ -8,27 +8,27 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Protocol
 
-import ontology
+from confab import ontology
+from confab.planner.causal_links import purposes
+from confab.planner.plan import Outcome, Status
+from confab.planner.plan_costs import cost_of
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import local_name
+from confab.reasoner.symbols import Fact, Problem
 from confab.report.course import Timeline, of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of, place_map
 from confab.report.markup import Markup, asset, joined, tag
 from confab.report.pieces import Tile, anchor, number, table, tiles, timeline, tree
 from confab.show import lengths
-from planner.causal_links import purposes
-from planner.plan import Outcome, Status
-from planner.plan_costs import cost_of
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import local_name
-from reasoner.symbols import Fact, Problem
-from sim.verdict import CODES
+from confab.sim.verdict import CODES
 
 if TYPE_CHECKING:
     from confab.known import Known
     from confab.labels import Labels
     from confab.memory import Memory
     from confab.physics import Report
-    from planner.acting.episode import Episode
-    from reasoner.embodiment.values import Embodiment
+    from confab.planner.acting.episode import Episode
+    from confab.reasoner.embodiment.values import Embodiment
 
 
 class Planned(Protocol):
@@ -127,7 +127,7 @@ def _course(
 
 def embodiment_of(scene: Known) -> Embodiment | None:
     """Return the scene's embodiment, or None if it is missing or incomplete."""
-    from reasoner.embodiment.facts import EmbodimentError
+    from confab.reasoner.embodiment.facts import EmbodimentError
 
     try:
         return scene.embodiment
@@ -335,7 +335,7 @@ def _small_print(outcome: Outcome | None) -> list[Markup]:
 
 def write_report(path: str | Path, page: str) -> Path:
     """Write a page atomically; return its path."""
-    from reasoner.files import write_whole
+    from confab.reasoner.files import write_whole
 
     write_whole(Path(path), page)
     return Path(path)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from confab.planner.plan import Plan, Step
+from confab.reasoner.symbols import FALSE, TRUE
 from confab.report.course import Bar, Timeline
 from confab.report.markup import Markup, joined, styled, tag
-from planner.plan import Plan, Step
-from reasoner.symbols import FALSE, TRUE
 
 if TYPE_CHECKING:
     from confab.labels import Labels
-    from planner.causal_links import Purpose
+    from confab.planner.causal_links import Purpose
 
 Notes = Mapping[tuple[int, ...], str]
 Tile = tuple[str, str, str]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-from planner.plan import Plan, Reason, Step
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, State, Symbol
+from confab.planner.plan import Plan, Reason, Step
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact, State, Symbol
 
 
 class Change(Enum):

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from planner.acting.episode import (
+from confab.planner.acting.episode import (
     Change,
     End,
     Episode,
@@ -32,17 +32,17 @@ from planner.acting.episode import (
     World,
     WorldError,
 )
-from planner.acting.failure_memory import Caution, Static, refuted_by, without_relations
-from planner.acting.repair import difference, mend, replan, vanished
-from planner.acting.symbolic_world import with_individual
-from planner.hierarchical.planner import compiled
-from planner.hierarchical.planner import plan as fast_plan
-from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
-from planner.validation import open_goals, successor
-from reasoner.limits import LimitError, check
-from reasoner.possible import ImpossibleStateError
-from reasoner.refutations import Refutation, with_refuted
-from reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
+from confab.planner.acting.failure_memory import Caution, Static, refuted_by, without_relations
+from confab.planner.acting.repair import difference, mend, replan, vanished
+from confab.planner.acting.symbolic_world import with_individual
+from confab.planner.hierarchical.planner import compiled
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
+from confab.planner.validation import open_goals, successor
+from confab.reasoner.limits import LimitError, check
+from confab.reasoner.possible import ImpossibleStateError
+from confab.reasoner.refutations import Refutation, with_refuted
+from confab.reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
 
 logger = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ class Patience:
 
     `rounds` is how often everything that failed is tried anew once no other way is left: the situation has changed by then, and
     a hand grasps differently. The agenda is also looked at again at most that often while nothing changes. `planning` limits each
-    planning call; the whole episode ends by the deadline that holds (`reasoner.limits.within`).
+    planning call; the whole episode ends by the deadline that holds (`confab.reasoner.limits.within`).
     """
 
     attempts: int = 2
@@ -94,7 +94,7 @@ def act(
     problem : Problem
         The situation in the beginning, and the goal.
     world : World
-        Anything with `observe` and `execute`: `planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
+        Anything with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
     plan : Plan, optional
         What to begin with; planned here if left out.
     interventions : sequence of Intervention

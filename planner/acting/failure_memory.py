@@ -14,10 +14,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from planner.acting.episode import Episode
-from planner.plan import Limits, Plan, Planner, Status, Step
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, Problem, ValueEffect
+from confab.planner.acting.episode import Episode
+from confab.planner.plan import Limits, Plan, Planner, Status, Step
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact, Problem, ValueEffect
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""

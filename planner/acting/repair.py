@@ -9,7 +9,7 @@ put off     if it can't be done yet; then so is what concerns the same individua
 What was put off is tried again as long as anything else succeeds. The goals that are open in the end are left to the fast
 planner, on the same table. A hand that stands in the middle of something first finishes it, or is brought to rest.
 
-Nothing leaves here to be followed that `planner.validation` doesn't accept.
+Nothing leaves here to be followed that `confab.planner.validation` doesn't accept.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
-from planner.certified import certified
-from planner.hierarchical.planner import plan as fast_plan
-from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.serialization import EASY, Call, Compiled, compiled
-from planner.hierarchical.settling import settle
-from planner.hierarchical.unsolvability import impossible
-from planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
-from planner.plan_costs import cost_of, costs_of_steps
-from planner.transitions import Cell, arguments_of, key_of
-from planner.validation import validate
-from reasoner.amounts import meets
-from reasoner.limits import LimitError, within
-from reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.planner.certified import certified
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.recovery import Recovery
+from confab.planner.hierarchical.refinement_cache import RefinedStep
+from confab.planner.hierarchical.serialization import EASY, Call, Compiled, compiled
+from confab.planner.hierarchical.settling import settle
+from confab.planner.hierarchical.unsolvability import impossible
+from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
+from confab.planner.plan_costs import cost_of, costs_of_steps
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.planner.validation import validate
+from confab.reasoner.amounts import meets
+from confab.reasoner.limits import LimitError, within
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1
 """A repair that costs more than replanning by more than this factor gives way to it."""
@@ -84,7 +84,7 @@ def mend(
     planner : callable, optional
         Plans from scratch, from a situation of rest; the fast planner if left out.
     using : Compiled, optional
-        From `planner.hierarchical.planner.compiled`, for the same domain, individuals and static facts.
+        From `confab.planner.hierarchical.planner.compiled`, for the same domain, individuals and static facts.
     in_progress : bool
         Whether the first step of `rest` may be finished as it was planned.
     limits : Limits

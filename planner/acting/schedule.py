@@ -12,9 +12,9 @@ from typing import TypeAlias
 
 import networkx
 
-from planner.plan import Step
-from planner.validation import successor
-from reasoner.symbols import Problem, State, Symbol
+from confab.planner.plan import Step
+from confab.planner.validation import successor
+from confab.reasoner.symbols import Problem, State, Symbol
 
 Order: TypeAlias = "networkx.DiGraph[int]"
 Apart = Callable[[Step, Step], bool]

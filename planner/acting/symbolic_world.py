@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from planner.acting.episode import Change, Intervention
-from planner.plan import Step
-from planner.validation import successor
-from reasoner.possible import refuse_impossible
-from reasoner.symbols import Fact, Problem, State, Symbol
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.plan import Step
+from confab.planner.validation import successor
+from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ leading    rules lead whatever their record is
 strict     rules don't lead; their record is kept all the same, wherever an episode is learned
 =========  ====================================================================================================
 
-Rules act inside of goals in series and of refinements, on every level, before either is searched (`planner.experience.leading`).
+Rules act inside of goals in series and of refinements, on every level, before either is searched
+(`confab.planner.experience.leading`).
 That there is no plan is for search to prove. Where rules don't lead, planning is as without memory: memory that isn't trusted, has
 reached no such goals yet, or knows none of them.
 """
@@ -17,17 +18,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
-from planner.experience.chaining import Candidate
-from planner.experience.evidence import Judge, View, fillers
-from planner.experience.leading import Guide, rules_in, usable
-from planner.experience.matching import Bind
-from planner.hierarchical import planner as fast
-from planner.hierarchical.refinement_cache import Roles, Template
-from planner.hierarchical.serialization import Call, Compiled
-from planner.plan import Limits, Outcome, paused_collection
-from reasoner.amounts import meets
-from reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
-from reasoner.symbols import Problem
+from confab.planner.experience.chaining import Candidate
+from confab.planner.experience.evidence import Judge, View, fillers
+from confab.planner.experience.leading import Guide, rules_in, usable
+from confab.planner.experience.matching import Bind
+from confab.planner.hierarchical import planner as fast
+from confab.planner.hierarchical.refinement_cache import Roles, Template
+from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.plan import Limits, Outcome, paused_collection
+from confab.reasoner.amounts import meets
+from confab.reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
+from confab.reasoner.symbols import Problem
 
 
 @dataclass
@@ -159,7 +160,7 @@ def plan(
     mode : str
         ``strict``, ``guarded`` or ``leading``: how far experience may lead.
     limits, using, improve, leave_levels
-        As for `planner.hierarchical.planner.plan`.
+        As for `confab.planner.hierarchical.planner.plan`.
 
     Returns
     -------

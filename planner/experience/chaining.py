@@ -2,7 +2,7 @@
 
 way        a rule with individuals in its roles, and which of its conditions are unmet
 distance   how many rules must follow each other at least, each condition taken by itself; beyond a chain's end nothing is promised
-lacks      the wants, one of which would do, for an unmet condition (`planner.hierarchical.subgoals`)
+lacks      the wants, one of which would do, for an unmet condition (`confab.planner.hierarchical.subgoals`)
 attain     the nearest way is gone: its conditions are brought about in the order in which plans did, the farthest first where
            none is known, then its step is done; what was reached on the way may be lost and brought about again, a few times
 together   several goals, where one alone would put the others out of reach: what all of them lack comes before their last steps
@@ -18,15 +18,15 @@ from itertools import islice
 from math import inf
 from typing import NamedTuple, TypeAlias
 
-from planner.experience.matching import Bind, Find, finder, soft
-from planner.hierarchical.operators import FEW, Achiever
-from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.serialization import Call
-from planner.hierarchical.symmetry import representatives
-from planner.transitions import Cell, Key, arguments_of, key_of
-from reasoner.amounts import meets, number, towards
-from reasoner.memory.experience import Ground, Rule
-from reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, Witness
+from confab.planner.experience.matching import Bind, Find, finder, soft
+from confab.planner.hierarchical.operators import FEW, Achiever
+from confab.planner.hierarchical.refinement_cache import RefinedStep
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.symmetry import representatives
+from confab.planner.transitions import Cell, Key, arguments_of, key_of
+from confab.reasoner.amounts import meets, number, towards
+from confab.reasoner.memory.experience import Ground, Rule
+from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, Witness
 
 WAYS, TRIES = 40, 3
 """So many ways to follow a rule are compared, and so many of the best of all rules tried."""

@@ -17,11 +17,11 @@ from functools import partial
 from math import log
 from typing import TypeAlias
 
-from planner.hierarchical.operators import Program
-from planner.transitions import Cell, Table
-from reasoner.language import walk
-from reasoner.memory.experience import ITSELF, Experience, Fact, Method, Rule, Tally
-from reasoner.symbols import FALSE, ClassCondition, Problem, Witness
+from confab.planner.hierarchical.operators import Program
+from confab.planner.transitions import Cell, Table
+from confab.reasoner.language import walk
+from confab.reasoner.memory.experience import ITSELF, Experience, Fact, Method, Rule, Tally
+from confab.reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
 """What a case counts for when the next one came."""

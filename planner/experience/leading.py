@@ -1,7 +1,7 @@
 """Rules that act, on every level: chains of them are done for real, refined, until what was wanted is so.
 
 off       what isn't yet as it must be in the end: what is wanted, and what was touched on the way and is to be kept
-rank      how many rules must follow each other (`planner.experience.chaining`); what is nearest is brought about first
+rank      how many rules must follow each other (`confab.planner.experience.chaining`); what is nearest is brought about first
 promise   what came to be right must not go wrong again, but once
 wasted    what was undone because a promise of the most abstract level was broken; nothing is tried there while that is more than a
           tenth of all expansions
@@ -17,16 +17,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import inf
 from typing import TypeAlias, TypeVar
 
-from planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
-from planner.experience.matching import Bind, known
-from planner.hierarchical.operators import Program
-from planner.hierarchical.refinement_cache import RefinedStep, Roles, Template
-from planner.hierarchical.serialization import Call
-from planner.hierarchical.subplans import Keep
-from planner.transitions import Cell, arguments_of
-from reasoner.amounts import meets
-from reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
-from reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol
+from confab.planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
+from confab.planner.experience.matching import Bind, known
+from confab.planner.hierarchical.operators import Program
+from confab.planner.hierarchical.refinement_cache import RefinedStep, Roles, Template
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.subplans import Keep
+from confab.planner.transitions import Cell, arguments_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
+from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol
 
 CASES, NEARLY = 3, 0.95
 """An order counts if it held in so many cases, and in this share of all."""

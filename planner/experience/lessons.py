@@ -2,7 +2,7 @@
 
 steps      of a plan, each with its refinement
 before     what is known already is tried first: which goals it reaches by itself is its record, for each kind of goal
-regress    the plan becomes rules (`planner.experience.regression`)
+regress    the plan becomes rules (`confab.planner.experience.regression`)
 replay     where rules apply, that which the plan did was chosen and the others passed over, with the facts of each
 orders     a teacher plans for the same goals in other orders, too: only what is the same in all of them must be so
 """
@@ -13,21 +13,21 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from planner.experience.advice import Memory
-from planner.experience.chaining import Candidate
-from planner.experience.evidence import View, fillers
-from planner.experience.leading import by_rules, rules_in
-from planner.experience.regression import Course
-from planner.hierarchical import planner as fast
-from planner.hierarchical.refinement_cache import Refiner, Roles, Template
-from planner.hierarchical.serialization import Call, Compiled, compiled
-from planner.hierarchical.subplans import Keep
-from planner.paper.learning import LearningError
-from planner.plan import Limits, Plan, Step
-from planner.transitions import Cell, Change, arguments_of
-from reasoner.limits import LimitError, check
-from reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
-from reasoner.symbols import Problem, Symbol
+from confab.planner.experience.advice import Memory
+from confab.planner.experience.chaining import Candidate
+from confab.planner.experience.evidence import View, fillers
+from confab.planner.experience.leading import by_rules, rules_in
+from confab.planner.experience.regression import Course
+from confab.planner.hierarchical import planner as fast
+from confab.planner.hierarchical.refinement_cache import Refiner, Roles, Template
+from confab.planner.hierarchical.serialization import Call, Compiled, compiled
+from confab.planner.hierarchical.subplans import Keep
+from confab.planner.paper.learning import LearningError
+from confab.planner.plan import Limits, Plan, Step
+from confab.planner.transitions import Cell, Change, arguments_of
+from confab.reasoner.limits import LimitError, check
+from confab.reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind, Ground, Lesson, Method, Rule, Tally
+from confab.reasoner.symbols import Problem, Symbol
 
 SINGLE, OTHERS = 6, 2
 """So many goals are taught one by one, and so many other orders of all."""

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
-from planner.generated import identifier, tuple_written, written
-from planner.transitions import Table, Writer
-from reasoner.language import is_variable, mentions, walk
-from reasoner.memory.experience import Rule
-from reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
+from confab.planner.generated import identifier, tuple_written, written
+from confab.planner.transitions import Table, Writer
+from confab.reasoner.language import is_variable, mentions, walk
+from confab.reasoner.memory.experience import Rule
+from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
 """Given a goal's arguments and value, and whether everybody is asked for, yields individuals for the roles, and what is unmet."""

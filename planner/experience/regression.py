@@ -17,15 +17,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
-from planner.hierarchical.operators import named
-from planner.paper.learning import LearningError
-from planner.validation import Facts, Rules
-from reasoner.amounts import Amount, inside, meets, towards
-from reasoner.derivation import strata
-from reasoner.language import terms, walk
-from reasoner.limits import check
-from reasoner.memory.experience import Ground, Order, Rule
-from reasoner.symbols import (
+from confab.planner.hierarchical.operators import named
+from confab.planner.paper.learning import LearningError
+from confab.planner.validation import Facts, Rules
+from confab.reasoner.amounts import Amount, inside, meets, towards
+from confab.reasoner.derivation import strata
+from confab.reasoner.language import terms, walk
+from confab.reasoner.limits import check
+from confab.reasoner.memory.experience import Ground, Order, Rule
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import groupby
 
-from reasoner.language import is_variable
-from reasoner.symbols import Parameter, Problem, RelationCondition, SituationType, ValueCondition, ValueEffect
+from confab.reasoner.language import is_variable
+from confab.reasoner.symbols import Parameter, Problem, RelationCondition, SituationType, ValueCondition, ValueEffect
 
 
 def lifted(problem: Problem, level: int) -> Problem:

@@ -17,9 +17,18 @@ from functools import cached_property
 from math import inf
 from typing import TypeAlias
 
-from reasoner.amounts import COMPARING, Amount, Calculation, Expression, Measure, Quantity, situations_in, written
-from reasoner.language import DomainError
-from reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.amounts import (
+    COMPARING,
+    Amount,
+    Calculation,
+    Expression,
+    Measure,
+    Quantity,
+    situations_in,
+    written,
+)
+from confab.reasoner.language import DomainError
+from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"
 Vector: TypeAlias = "tuple[Exact, ...]"

@@ -3,14 +3,14 @@
 It plans imported domains that have one level only, and is the last resort where refinement fails.
 
 state       a Python integer, a bit per fact
-h           relaxed-plan heuristic of a state (`planner.grounded.hff`)
+h           relaxed-plan heuristic of a state (`confab.planner.grounded.hff`)
 least       least h so far; a lower one boosts the preferred operators and is followed by a lookahead
 open        two queues of expanded nodes, by h: with all of a node's operators, with its preferred ones; two more by landmarks
 
 Lazy greedy best-first search with preferred operators: Richter and Helmert, "Preferred operators and deferred
 evaluation in satisficing planning", ICAPS 2009. Lookahead, with what is stuck replaced: Vidal, "A lookahead strategy
 for heuristic search planning", ICAPS 2004. Landmarks to come: Richter and Westphal, "The LAMA planner", JAIR 39 (2010).
-What is found is made shorter by `planner.grounded.plan_windows`.
+What is found is made shorter by `confab.planner.grounded.plan_windows`.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from operator import or_
 from time import perf_counter
 from typing import NamedTuple, TypeAlias
 
-from planner.grounded.grounding import MOST_ROWS, ground
-from planner.grounded.hff import Evaluate, EvaluateFor, Evaluation
-from planner.grounded.hff import heuristic as relaxed
-from planner.grounded.hff_amounts import heuristic as with_amounts
-from planner.grounded.hff_amounts import repeats
-from planner.grounded.hff_dense import Effort, EvaluateMany, effort
-from planner.grounded.hff_dense import heuristic as dense
-from planner.grounded.landmarks import in_series, landmarks
-from planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, path_to
-from planner.grounded.plan_windows import shorter
-from planner.grounded.task import Task, bits_of
-from planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, TooLargeError
-from reasoner.limits import OutOfTimeError
-from reasoner.symbols import Problem, State
+from confab.planner.grounded.grounding import MOST_ROWS, ground
+from confab.planner.grounded.hff import Evaluate, EvaluateFor, Evaluation
+from confab.planner.grounded.hff import heuristic as relaxed
+from confab.planner.grounded.hff_amounts import heuristic as with_amounts
+from confab.planner.grounded.hff_amounts import repeats
+from confab.planner.grounded.hff_dense import Effort, EvaluateMany, effort
+from confab.planner.grounded.hff_dense import heuristic as dense
+from confab.planner.grounded.landmarks import in_series, landmarks
+from confab.planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, path_to
+from confab.planner.grounded.plan_windows import shorter
+from confab.planner.grounded.task import Task, bits_of
+from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, TooLargeError
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.symbols import Problem, State
 
 BOOST = 1000
 """Turns that the preferred operators get on a new best h."""

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
-from planner.grounded.derived_arrays import Bit, by_arrays
+from confab.planner.grounded.derived_arrays import Bit, by_arrays
 
 AT_ONCE, CALLS = 50, 60
 """In the time in which Python looks at one alternative, arrays look at so many; the calls of one layer, in alternatives."""

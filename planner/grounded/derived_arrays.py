@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.joins import Ints
+from confab.planner.grounded.joins import Ints
 
 Flags: TypeAlias = NDArray[np.bool_]
 

@@ -13,13 +13,13 @@ from functools import cached_property
 from itertools import count
 from typing import Protocol
 
-from planner.grounded.amounts import AmountTable
-from planner.grounded.joins import Table
-from planner.grounded.schemas import plain_variables
-from planner.plan import TooLargeError
-from reasoner.amounts import Amount, bounds
-from reasoner.language import mentions
-from reasoner.symbols import (
+from confab.planner.grounded.amounts import AmountTable
+from confab.planner.grounded.joins import Table
+from confab.planner.grounded.schemas import plain_variables
+from confab.planner.plan import TooLargeError
+from confab.reasoner.amounts import Amount, bounds
+from confab.reasoner.language import mentions
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
@@ -44,7 +44,7 @@ Literals = tuple[int, ...] | None
 
 
 class Known(Protocol):
-    """What is reached, as far as conditions ask for it (`planner.grounded.reachability.Reached`)."""
+    """What is reached, as far as conditions ask for it (`confab.planner.grounded.reachability.Reached`)."""
 
     problem: Problem
     most: int

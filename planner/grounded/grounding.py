@@ -1,12 +1,12 @@
 """Grounding: one level of a problem becomes a `Task`, by joins in rounds of relaxed reachability.
 
-reach      what can become true if nothing ever becomes false (`planner.grounded.reachability`)
+reach      what can become true if nothing ever becomes false (`confab.planner.grounded.reachability`)
 assemble   bits for the facts that can change, operators for the rows that were joined
 goal       a wanted fact that isn't reachable even so proves that there is no plan
 
 Conditions that only a state can decide are left out of the joins, which keeps reachability on the safe side; they are
 worked out once per combination of individuals when operators are assembled, as conjunctions of literals
-(`planner.grounded.reachability`).
+(`confab.planner.grounded.reachability`).
 
 Semi-naive grounding as a database does it: Helmert, "Concise finite-domain representations for PDDL planning tasks",
 Artificial Intelligence 173 (2009), section 6. We join arrays and not tuples, and keep one value per symbol from the
@@ -23,20 +23,20 @@ from fractions import Fraction
 
 import numpy as np
 
-from planner.grounded.amounts import Amounts, Linear, Move, pushes, settled
-from planner.grounded.derived import Derived, in_parts
-from planner.grounded.derived_arrays import Bit
-from planner.grounded.formulas import Formulas, Literals
-from planner.grounded.joins import Ints, Table, ranges
-from planner.grounded.reachability import Flags, Reached
-from planner.grounded.schemas import Schema
-from planner.grounded.shortage import shortage
-from planner.grounded.task import Change, Grouped, Task
-from planner.plan import Reason
-from reasoner.amounts import COMPARING, written
-from reasoner.derivation import circular
-from reasoner.language import mentions
-from reasoner.symbols import (
+from confab.planner.grounded.amounts import Amounts, Linear, Move, pushes, settled
+from confab.planner.grounded.derived import Derived, in_parts
+from confab.planner.grounded.derived_arrays import Bit
+from confab.planner.grounded.formulas import Formulas, Literals
+from confab.planner.grounded.joins import Ints, Table, ranges
+from confab.planner.grounded.reachability import Flags, Reached
+from confab.planner.grounded.schemas import Schema
+from confab.planner.grounded.shortage import shortage
+from confab.planner.grounded.task import Change, Grouped, Task
+from confab.planner.plan import Reason
+from confab.reasoner.amounts import COMPARING, written
+from confab.reasoner.derivation import circular
+from confab.reasoner.language import mentions
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Fact,

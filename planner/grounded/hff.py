@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeAlias
 
-from planner.grounded.task import Task
+from confab.planner.grounded.task import Task
 
 Evaluation: TypeAlias = "tuple[int, list[int], list[int]] | None"
 """h, the relaxed plan in the order of its layers, the applicable operators; None if the goal isn't reachable even so."""

@@ -1,6 +1,7 @@
 """The relaxed-plan heuristic where there are amounts: an operator that moves an amount is counted as often as it takes.
 
-As `planner.grounded.hff`, but that a comparison costs so many times its operator as the amount is away, divided by how far the
+As `confab.planner.grounded.hff`, but that a comparison costs so many times its operator as the amount is away, divided by how
+far the
 operator moves it; once where that depends on the state. A comparison that nothing moves towards what is wanted is never reached,
 so that the relaxed plan that isn't there proves that there is no plan.
 
@@ -13,9 +14,9 @@ import heapq
 from fractions import Fraction
 from math import ceil
 
-from planner.grounded.amounts import Exact, Linear, Move, pushes
-from planner.grounded.hff import Evaluate, Evaluation
-from planner.grounded.task import Task, bits_of
+from confab.planner.grounded.amounts import Exact, Linear, Move, pushes
+from confab.planner.grounded.hff import Evaluate, Evaluation
+from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
 """An operator is counted so often at most: a distance has to be told from a longer one, and no more."""

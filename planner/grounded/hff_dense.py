@@ -1,6 +1,7 @@
 """The relaxed-plan heuristic of many states at once, by whole arrays.
 
-`planner.grounded.hff` follows what is reached, bit by bit and state by state. Here each layer looks at all that every operator
+`confab.planner.grounded.hff` follows what is reached, bit by bit and state by state. Here each layer looks at all that every
+operator
 needs and sets, of all states in a few calls of NumPy, until no cost falls: ten states take hardly longer than one. For tasks
 of which little is reached in many layers that is more work: `effort` counts both at the initial state.
 
@@ -17,9 +18,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.hff import Evaluation
-from planner.grounded.joins import Ints, ranges
-from planner.grounded.task import Grouped, Task
+from confab.planner.grounded.hff import Evaluation
+from confab.planner.grounded.joins import Ints, ranges
+from confab.planner.grounded.task import Grouped, Task
 
 NEVER, MOST = 1 << 24, 1 << 18
 """The cost of a bit that isn't reached, and the highest of one that is: eight of them, added up, are still told apart."""

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.plan import TooLargeError
-from reasoner.limits import check
+from confab.planner.plan import TooLargeError
+from confab.reasoner.limits import check
 
 Ints = NDArray[np.int64]
 PAIR = 1e-7

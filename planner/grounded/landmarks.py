@@ -13,9 +13,9 @@ from operator import or_
 from time import perf_counter
 from typing import TypeAlias
 
-from planner.grounded.hff import Evaluate, EvaluateFor
-from planner.grounded.novelty import Seen, path_to
-from planner.grounded.task import Task, bits_of
+from confab.planner.grounded.hff import Evaluate, EvaluateFor
+from confab.planner.grounded.novelty import Seen, path_to
+from confab.planner.grounded.task import Task, bits_of
 
 LOOK = 1_000
 """Operators between two looks at the clock."""

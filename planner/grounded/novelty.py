@@ -18,10 +18,10 @@ import heapq
 from collections import defaultdict
 from collections.abc import Callable, Generator
 
-from planner.grounded.hff import Evaluate
-from planner.grounded.task import Task
-from planner.plan import Counts
-from reasoner.limits import check
+from confab.planner.grounded.hff import Evaluate
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Counts
+from confab.reasoner.limits import check
 
 MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
 """What the states kept by one search may take, about, and what one of them takes besides its bits."""

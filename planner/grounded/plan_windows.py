@@ -26,11 +26,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.amounts import Amounts
-from planner.grounded.hff import heuristic
-from planner.grounded.joins import Ints
-from planner.grounded.shortest import shortest, ways
-from planner.grounded.task import Change, Grouped, Task, bits_of
+from confab.planner.grounded.amounts import Amounts
+from confab.planner.grounded.hff import heuristic
+from confab.planner.grounded.joins import Ints
+from confab.planner.grounded.shortest import shortest, ways
+from confab.planner.grounded.task import Change, Grouped, Task, bits_of
 
 STATES, STEPS = 400, 12
 """States looked at for a cheapest plan, where the plan has no more steps."""

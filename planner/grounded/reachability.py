@@ -12,15 +12,15 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.alike import lifted
-from planner.grounded.amounts import AmountTable
-from planner.grounded.formulas import Formulas
-from planner.grounded.joins import Ints, Table, pack
-from planner.grounded.schemas import Atom, Schema, rules_apart, schemas
-from planner.grounded.separation import in_parts
-from reasoner.language import mentions
-from reasoner.limits import OutOfTimeError, check
-from reasoner.symbols import (
+from confab.planner.grounded.alike import lifted
+from confab.planner.grounded.amounts import AmountTable
+from confab.planner.grounded.formulas import Formulas
+from confab.planner.grounded.joins import Ints, Table, pack
+from confab.planner.grounded.schemas import Atom, Schema, rules_apart, schemas
+from confab.planner.grounded.separation import in_parts
+from confab.reasoner.language import mentions
+from confab.reasoner.limits import OutOfTimeError, check
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from reasoner.amounts import put_in, situations_in, terms_of
-from reasoner.language import DomainError, is_variable, mentions, terms, walk
-from reasoner.symbols import (
+from confab.reasoner.amounts import put_in, situations_in, terms_of
+from confab.reasoner.language import DomainError, is_variable, mentions, terms, walk
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from planner.grounded.schemas import Atom, Schema
-from reasoner.amounts import terms_of
-from reasoner.language import is_variable, mentions, walk
-from reasoner.symbols import TRUE, Comparison, Condition, SituationType, ValueEffect
+from confab.planner.grounded.schemas import Atom, Schema
+from confab.reasoner.amounts import terms_of
+from confab.reasoner.language import is_variable, mentions, walk
+from confab.reasoner.symbols import TRUE, Comparison, Condition, SituationType, ValueEffect
 
 Members = Callable[[str], frozenset[str]]
 

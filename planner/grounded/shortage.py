@@ -16,10 +16,10 @@ from fractions import Fraction
 from functools import cached_property, reduce
 from operator import or_
 
-from planner.grounded.amounts import Amounts, Exact, Move, Vector
-from planner.grounded.task import Task, bits_of
-from planner.plan import Reason
-from reasoner.amounts import written
+from confab.planner.grounded.amounts import Amounts, Exact, Move, Vector
+from confab.planner.grounded.task import Task, bits_of
+from confab.planner.plan import Reason
+from confab.reasoner.amounts import written
 
 
 def shortage(task: Task) -> Reason | None:

@@ -2,7 +2,7 @@
 
 g        cost of the operators from the start to a state
 h        a lower bound on the cost from a state to the goal, infinite where there is no way: `nothing`, which makes this a
-         breadth-first search, `ways` of the single goals, or LM-cut (`planner.hierarchical.bounds`)
+         breadth-first search, `ways` of the single goals, or LM-cut (`confab.planner.hierarchical.bounds`)
 f        g + h, the least of which is expanded next; no plan is cheaper than the least f that is open
 upper    what a plan has to be cheaper than; what can't be is dropped
 """
@@ -19,8 +19,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.grounded.task import Task, bits_of
-from planner.plan import Counts
+from confab.planner.grounded.task import Task, bits_of
+from confab.planner.plan import Counts
 
 Bound: TypeAlias = "Callable[[int], float]"
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.grounded.joins import Ints
-from reasoner.limits import check
+from confab.planner.grounded.joins import Ints
+from confab.reasoner.limits import check
 
 Waiting = tuple[int, list[int], int]
 """An operator, the bits that it needs in the order in which they are asked for, and how many were."""

@@ -1,14 +1,14 @@
 """A grounded task: the symbols of a problem as bits, its behaviours as operators on one Python integer.
 
 ==============================  =================================================================
-in `reasoner.symbols`           here
+in `confab.reasoner.symbols`           here
 ==============================  =================================================================
 `Fact`                          a bit; one that is always true or never reachable has none
 a fact that must not hold       a bit of its own, its complement, where some condition asks for it
 `AnyOf`, a negated `Witness`    a derived bit, where static knowledge doesn't decide it
 `Behavior` with all its terms   an operator
 conditional effect              a step of an operator, and a relaxed operator of its own
-`Comparison`                    a bit that follows from the amounts (`planner.grounded.amounts`)
+`Comparison`                    a bit that follows from the amounts (`confab.planner.grounded.amounts`)
 ==============================  =================================================================
 """
 
@@ -20,12 +20,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from planner.grounded.amounts import Amounts, Linear
-from planner.grounded.derived import Derived
-from planner.grounded.joins import Ints
-from planner.grounded.successors import tree
-from planner.plan import Step
-from reasoner.symbols import FALSE, Fact, Problem, Symbol
+from confab.planner.grounded.amounts import Amounts, Linear
+from confab.planner.grounded.derived import Derived
+from confab.planner.grounded.joins import Ints
+from confab.planner.grounded.successors import tree
+from confab.planner.plan import Step
+from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
 
 Change = tuple[int, int, int]
 """Where all bits of the first are set, the bits of the second are cleared and then those of the third set."""
@@ -51,7 +51,7 @@ class Grouped:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One level of a problem, grounded; `planner.grounded.grounding.ground` makes it.
+    """One level of a problem, grounded; `confab.planner.grounded.grounding.ground` makes it.
 
     Parameters
     ----------

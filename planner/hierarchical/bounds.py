@@ -17,19 +17,19 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.grounded.grounding import ground
-from planner.grounded.shortest import Bound, shortest, ways
-from planner.grounded.task import Task
-from planner.hierarchical.flattened import shortened
-from planner.hierarchical.planner import SEARCHING, Compiled, compiled
-from planner.hierarchical.planner import plan as fast_plan
-from planner.hierarchical.regrouping import under_the_levels_above
-from planner.hierarchical.unsolvability import closed, refusal
-from planner.plan import Limits, Outcome, Plan, Reason, Status, TooLargeError
-from planner.plan_costs import cost_of
-from planner.validation import validate
-from reasoner.limits import LimitError, OutOfTimeError
-from reasoner.symbols import Problem
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.shortest import Bound, shortest, ways
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.flattened import shortened
+from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
+from confab.planner.hierarchical.planner import plan as fast_plan
+from confab.planner.hierarchical.regrouping import under_the_levels_above
+from confab.planner.hierarchical.unsolvability import closed, refusal
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, TooLargeError
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import validate
+from confab.reasoner.limits import LimitError, OutOfTimeError
+from confab.reasoner.symbols import Problem
 
 
 def plan(

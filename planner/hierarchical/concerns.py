@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from planner.hierarchical.refinement_cache import RefinedStep, Refiner
-from planner.transitions import Cell, arguments_of, key_of
-from reasoner.symbols import ValueCondition
+from confab.planner.hierarchical.refinement_cache import RefinedStep, Refiner
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.reasoner.symbols import ValueCondition
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from planner.hierarchical.refinement_cache import RefinedStep, Refiner
-from planner.transitions import Cell, Changes
+from confab.planner.hierarchical.refinement_cache import RefinedStep, Refiner
+from confab.planner.transitions import Cell, Changes
 
 AGAIN = 30
 """So many times each step is done again, on average, to see what can be done without others."""

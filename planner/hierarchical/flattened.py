@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.grounded.best_first import SHORTEN, STEP, STEPS
-from planner.grounded.grounding import ground
-from planner.grounded.plan_windows import shorter
-from planner.grounded.task import Task
-from planner.hierarchical.postoptimization import worth
-from planner.hierarchical.refinement_cache import RefinedStep
-from planner.hierarchical.regrouping import under_the_levels_above
-from planner.levels import levels_left
-from planner.plan import Plan, TooLargeError
-from planner.validation import validate
-from reasoner.symbols import Problem
+from confab.planner.grounded.best_first import SHORTEN, STEP, STEPS
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.plan_windows import shorter
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.postoptimization import worth
+from confab.planner.hierarchical.refinement_cache import RefinedStep
+from confab.planner.hierarchical.regrouping import under_the_levels_above
+from confab.planner.levels import levels_left
+from confab.planner.plan import Plan, TooLargeError
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem
 
 MOST_ROWS, OF_A_STEP = 20_000, 500
 """The largest level that is searched as a whole, in rows of a join on the way to operators: at all, and for each step of a plan."""

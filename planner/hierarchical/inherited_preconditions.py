@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from reasoner.language import mentions
-from reasoner.symbols import (
+from confab.reasoner.language import mentions
+from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,

@@ -1,7 +1,7 @@
 """Behaviours compiled to Python source, once per problem: what each does, and how each could bring a value about.
 
-Beside its function ``forward`` (`planner.transitions`) a behaviour has for every effect one ``achieve(key …, value)``. It yields
-each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
+Beside its function ``forward`` (`confab.planner.transitions`) a behaviour has for every effect one ``achieve(key …, value)``. It
+yields each binding with which the effect would give that symbol that value, with the preconditions that are unmet now.
 
 What enumerates an unbound parameter is, in this order of preference: a static
 relation to what is bound; the inverse of a situation type that nothing can change there; a class. What the state alone
@@ -17,14 +17,14 @@ from functools import cached_property
 from math import prod
 from typing import TypeAlias
 
-from planner.amount_transitions import comes_nearer
-from planner.derived_facts import Rules
-from planner.generated import identifier, tuple_written, written
-from planner.hierarchical.symmetry import Alike, representatives
-from planner.transitions import Forward, Key, Table, Writer, ready_condition
-from reasoner.amounts import Amount, inside, terms_of
-from reasoner.language import measures, mentions, terms, walk
-from reasoner.symbols import (
+from confab.planner.amount_transitions import comes_nearer
+from confab.planner.derived_facts import Rules
+from confab.planner.generated import identifier, tuple_written, written
+from confab.planner.hierarchical.symmetry import Alike, representatives
+from confab.planner.transitions import Forward, Key, Table, Writer, ready_condition
+from confab.reasoner.amounts import Amount, inside, terms_of
+from confab.reasoner.language import measures, mentions, terms, walk
+from confab.reasoner.symbols import (
     AmountEffect,
     AnyOf,
     Behavior,

@@ -6,14 +6,14 @@ never that there is no plan.
 ======================  ==============================================  ==============================
 stage                   decides                                         module
 ======================  ==============================================  ==============================
-flat search             of one level alone, a bounded while             `planner.grounded.best_first`
-goals in series         most problems, in time linear in their size     `planner.hierarchical.serialization`
-static proofs           where these get stuck: that a goal lacks a      `planner.hierarchical.unsolvability`
+flat search             of one level alone, a bounded while             `confab.planner.grounded.best_first`
+goals in series         most problems, in time linear in their size     `confab.planner.hierarchical.serialization`
+static proofs           where these get stuck: that a goal lacks a      `confab.planner.hierarchical.unsolvability`
                         static fact, or two goals want one value
-more effort             where nothing is proved                         `planner.hierarchical.recovery`
-relaxed reachability    in between, that a goal can't be reached, or    `planner.grounded.reachability`
+more effort             where nothing is proved                         `confab.planner.hierarchical.recovery`
+relaxed reachability    in between, that a goal can't be reached, or    `confab.planner.grounded.reachability`
                         that none of a few states fulfils all
-flat search             the rest, solved or unsolvable, until a limit   `planner.grounded.best_first`
+flat search             the rest, solved or unsolvable, until a limit   `confab.planner.grounded.best_first`
 ======================  ==============================================  ==============================
 """
 
@@ -26,19 +26,19 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from planner.hierarchical.concerns import Concern, concerns, put_aside
-from planner.hierarchical.detours import AGAIN, without_detours
-from planner.hierarchical.postoptimization import Improver, length, worth_it
-from planner.hierarchical.recovery import Recovery
-from planner.hierarchical.refinement_cache import MUCH, RefinedStep
-from planner.hierarchical.serialization import Call, Compiled, compiled
-from planner.hierarchical.subproblem import BITS
-from planner.levels import levels_left
-from planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
-from planner.transitions import arguments_of
-from reasoner.amounts import meets
-from reasoner.limits import LimitError, within
-from reasoner.symbols import FALSE, Problem, Symbol
+from confab.planner.hierarchical.concerns import Concern, concerns, put_aside
+from confab.planner.hierarchical.detours import AGAIN, without_detours
+from confab.planner.hierarchical.postoptimization import Improver, length, worth_it
+from confab.planner.hierarchical.recovery import Recovery
+from confab.planner.hierarchical.refinement_cache import MUCH, RefinedStep
+from confab.planner.hierarchical.serialization import Call, Compiled, compiled
+from confab.planner.hierarchical.subproblem import BITS
+from confab.planner.levels import levels_left
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
+from confab.planner.transitions import arguments_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.limits import LimitError, within
+from confab.reasoner.symbols import FALSE, Problem, Symbol
 
 __all__ = ["Call", "Compiled", "compiled", "plan"]
 
@@ -149,10 +149,10 @@ def _plan(
     except UnsolvableError as proof:
         return replace(outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
-        from planner.hierarchical.stuck import gave_up
+        from confab.planner.hierarchical.stuck import gave_up
 
         return outcome(Status.GAVE_UP, reason=gave_up(call, f"stopped at the limit: {limit}"))
-    from planner.hierarchical.stuck import gave_up
+    from confab.planner.hierarchical.stuck import gave_up
 
     upper = [level for level in call.program.levels if level != call.program.levels[-1]]
     if not leave_levels and upper:
@@ -165,7 +165,7 @@ def _plan(
     if recovery.too_large is not None:
         text = f"goals in series found no plan, and {recovery.too_large.text}"
         return outcome(Status.GAVE_UP, reason=gave_up(call, text))
-    from planner.hierarchical.flattened import regrouped
+    from confab.planner.hierarchical.flattened import regrouped
 
     flat = lowest_alone(call, limits, BITS * limits.work)
     found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
@@ -185,7 +185,7 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 
     One level has no refinements for goals in series to go by, and may be too large to be grounded, or its goals too many.
     """
-    from planner.grounded.best_first import plan_level
+    from confab.planner.grounded.best_first import plan_level
 
     left = None if deadline is None else max(deadline - perf_counter(), 0.0)
     within = Limits(limits.expansions, left)
@@ -194,8 +194,8 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
-    from planner.grounded.best_first import plan_level
-    from planner.validation import validate
+    from confab.planner.grounded.best_first import plan_level
+    from confab.planner.validation import validate
 
     problem, deadline, lowest = call.problem, call.segments.deadline, call.program.levels[-1]
     call.table.undo(0)
@@ -265,7 +265,7 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
     plan = call.tree()
     if len(levels) > 1 and not call.given_up and not idle:
         return plan
-    from planner.hierarchical import flattened
+    from confab.planner.hierarchical import flattened
 
     with suppress(LimitError):
         led = len(levels) == 1 and call.advice is not None and call.advice.expects
@@ -323,7 +323,7 @@ def beside(call: Call, problem: Problem, settled: bool = False) -> Call:
     known = call.refiner
     other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
     if settled:
-        from planner.hierarchical.settling import settle
+        from confab.planner.hierarchical.settling import settle
 
         settle(other)
         other.settled = bool(other.steps)
@@ -334,7 +334,7 @@ def fewer(call: Call) -> list[RefinedStep]:
     """Return a call's steps with fewer of the most abstract level, where that level is small and has more steps than goals."""
     if len(call.steps) <= unmet(call):
         return call.steps
-    from planner.hierarchical.flattened import shortest_known
+    from confab.planner.hierarchical.flattened import shortest_known
 
     found = shortest_known(call.problem, call.steps, call.segments.deadline)
     if len(found) == len(call.steps):

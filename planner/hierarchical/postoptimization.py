@@ -2,7 +2,8 @@
 
 Both work below the most abstract level, where a step "hands empty again" costs something, and leave a step of the upper level
 in the plan only where its own refinement is still intact. Every change is played through on the table before it is kept.
-What the levels above ask of a change is asked of steps that are planned anew, too (`planner.hierarchical.inherited_preconditions`).
+What the levels above ask of a change is asked of steps that are planned anew, too
+(`confab.planner.hierarchical.inherited_preconditions`).
 
 whole    a task so small that its states are few is planned anew as a whole, one level above the lowest
 cluster  steps close together that change the same symbols, or one of which takes the place that another leaves
@@ -13,14 +14,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from planner.hierarchical.concerns import Concern, concerns, put_aside
-from planner.hierarchical.inherited_preconditions import binding
-from planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
-from planner.hierarchical.subplans import Ground
-from planner.hierarchical.subproblem import FEW, problem_of
-from planner.plan import Reason, TooLargeError
-from planner.transitions import Cell, arguments_of, key_of
-from reasoner.symbols import Domain, Problem, Symbol
+from confab.planner.hierarchical.concerns import Concern, concerns, put_aside
+from confab.planner.hierarchical.inherited_preconditions import binding
+from confab.planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
+from confab.planner.hierarchical.subplans import Ground
+from confab.planner.hierarchical.subproblem import FEW, problem_of
+from confab.planner.plan import Reason, TooLargeError
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.reasoner.symbols import Domain, Problem, Symbol
 
 PER_PRIMITIVE = 3
 """So many steps of the most abstract level are given up for a primitive less, at most: they say what the primitives are for."""
@@ -132,8 +133,8 @@ class Improver:
 
     def _shortest(self, problem: Problem, level: int, old: Sequence[RefinedStep]) -> list[Ground] | None:
         """Return the fewest steps of a level, empty if there are no fewer than of old ones; None if that takes too much."""
-        from planner.grounded.grounding import ground
-        from planner.grounded.shortest import shortest, ways
+        from confab.planner.grounded.grounding import ground
+        from confab.planner.grounded.shortest import shortest, ways
 
         problem = replace(problem, domain=self._binding(level))
         try:

@@ -1,7 +1,7 @@
 """What is tried where goals in series get stuck: more steps, lower levels, all goals at once, going back to where it went astray.
 
 Each attempt is dearer than the one before; those that nothing has changed for aren't made again. When all are made, no plan was
-found, and what is left is the lowest level alone (`planner.hierarchical.planner`).
+found, and what is left is the lowest level alone (`confab.planner.hierarchical.planner`).
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE, WIDER
-from planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
-from planner.hierarchical.subplans import Effort
-from planner.hierarchical.subproblem import MAKING
-from planner.hierarchical.unsolvability import MOST_ROWS, PAIRS, TEST, closed, impossible, looked_at, proved
-from planner.plan import Reason, TooLargeError
-from planner.transitions import Cell
-from reasoner.symbols import State
+from confab.planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE, WIDER
+from confab.planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
+from confab.planner.hierarchical.subplans import Effort
+from confab.planner.hierarchical.subproblem import MAKING
+from confab.planner.hierarchical.unsolvability import MOST_ROWS, PAIRS, TEST, closed, impossible, looked_at, proved
+from confab.planner.plan import Reason, TooLargeError
+from confab.planner.transitions import Cell
+from confab.reasoner.symbols import State
 
 if TYPE_CHECKING:
-    from planner.grounded.task import Task
+    from confab.planner.grounded.task import Task
 
 ALL = (WHOLE,)
 """All goals at once in the whole world."""
@@ -260,8 +260,8 @@ def hopeful(call: Call) -> bool:
 
 def sufficient(call: Call, initial: State) -> bool:
     """Whether every goal could be reached from a state if nothing became false and no amount were in the way of another."""
-    from planner.grounded.grounding import ground
-    from planner.grounded.hff_amounts import heuristic
+    from confab.planner.grounded.grounding import ground
+    from confab.planner.grounded.hff_amounts import heuristic
 
     level, deadline = call.program.levels[-1], call.segments.deadline
     try:

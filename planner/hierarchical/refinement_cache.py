@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from itertools import islice, product
 from typing import NamedTuple, Protocol, TypeAlias
 
-from planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
-from planner.hierarchical.subproblem import Width, World, focus, problem_of
-from planner.transitions import Cell, Change, Changes, key_of
-from reasoner.amounts import meets
-from reasoner.memory.experience import OpenRole
-from reasoner.symbols import FALSE, Behavior, ValueCondition
+from confab.planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
+from confab.planner.hierarchical.subproblem import Width, World, focus, problem_of
+from confab.planner.transitions import Cell, Change, Changes, key_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.memory.experience import OpenRole
+from confab.reasoner.symbols import FALSE, Behavior, ValueCondition
 
 SHORT = Effort(depth=4)
 """For a refinement that a few relevant steps make; a longer one is searched in a small world."""

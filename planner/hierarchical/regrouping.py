@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.plan import Plan, Step, TooLargeError, renumbered
-from planner.validation import successor
-from reasoner.limits import OutOfTimeError
-from reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Plan, Step, TooLargeError, renumbered
+from confab.planner.validation import successor
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LONGEST = 60
 """Steps that may stand under one of the level above."""

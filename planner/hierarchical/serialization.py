@@ -5,7 +5,8 @@ asleep   goals that something stands in the way of; they wake when a symbol that
 kept     goals that are achieved: a segment may undo them, but must restore them
 before   goals after which others could no longer be achieved (a full cup isn't moved) wait for those
 
-When no goal is attainable in one step, something harder is tried (`planner.hierarchical.recovery`). Steps are refined and done
+When no goal is attainable in one step, something harder is tried (`confab.planner.hierarchical.recovery`). Steps are refined and
+done
 as soon as they are found, so that a step which can't be refined is noticed where it stands, forbidden there, and searched anew.
 """
 
@@ -16,14 +17,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
-from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.refinement_cache import MUCH, Advice, RefinedStep, Refiner, Template
-from planner.hierarchical.subplans import Effort, Segments
-from planner.hierarchical.subproblem import Width
-from planner.plan import Outcome, Plan, Reason, Status, Step
-from planner.transitions import Cell, Table, arguments_of, key_of
-from reasoner.amounts import meets
-from reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
+from confab.planner.hierarchical.operators import Achiever, Program
+from confab.planner.hierarchical.refinement_cache import MUCH, Advice, RefinedStep, Refiner, Template
+from confab.planner.hierarchical.subplans import Effort, Segments
+from confab.planner.hierarchical.subproblem import Width
+from confab.planner.plan import Outcome, Plan, Reason, Status, Step
+from confab.planner.transitions import Cell, Table, arguments_of, key_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 
 EASY, LONGER = Effort(depth=1), Effort(depth=3)
 """For a goal that one step achieves, and for one that a few relevant steps do."""

@@ -5,8 +5,8 @@ What a hand holds in the beginning is at no place that the level above knows, so
 
 from __future__ import annotations
 
-from planner.hierarchical.serialization import Call
-from planner.hierarchical.subplans import Effort
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.subplans import Effort
 
 RESTING = Effort(depth=6)
 """To bring what isn't at rest there."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 
-from planner.hierarchical.serialization import Call
-from planner.hierarchical.subplans import Asked
-from planner.plan import Limits, Reason
-from planner.transitions import Cell, arguments_of
-from reasoner.amounts import bounds_written
-from reasoner.limits import LimitError
-from reasoner.symbols import Fact, Symbol
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.subplans import Asked
+from confab.planner.plan import Limits, Reason
+from confab.planner.transitions import Cell, arguments_of
+from confab.reasoner.amounts import bounds_written
+from confab.reasoner.limits import LimitError
+from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
 """Values, and ways to achieve them, that are followed from the goal to what is in its way; and amounts that are told."""

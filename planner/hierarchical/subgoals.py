@@ -13,17 +13,17 @@ from heapq import nsmallest
 from itertools import islice
 from typing import Any, TypeAlias
 
-from planner.amount_transitions import amount
-from planner.generated import written
-from planner.hierarchical.operators import FEW, Achiever, Program
-from planner.hierarchical.symmetry import representatives
-from planner.transitions import Cell, Key, Table, arguments_of, key_of
-from reasoner.amounts import Amount, Calculation, Number, inside, number
-from reasoner.amounts import written as amount_written
-from reasoner.derivation import circular
-from reasoner.language import mentions, needs, walk
-from reasoner.limits import check
-from reasoner.symbols import (
+from confab.planner.amount_transitions import amount
+from confab.planner.generated import written
+from confab.planner.hierarchical.operators import FEW, Achiever, Program
+from confab.planner.hierarchical.symmetry import representatives
+from confab.planner.transitions import Cell, Key, Table, arguments_of, key_of
+from confab.reasoner.amounts import Amount, Calculation, Number, inside, number
+from confab.reasoner.amounts import written as amount_written
+from confab.reasoner.derivation import circular
+from confab.reasoner.language import mentions, needs, walk
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

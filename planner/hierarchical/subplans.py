@@ -9,7 +9,7 @@ changed   the symbols that differ from the start of the segment, with their valu
 Only relevant behaviours are tried: those that give a symbol that is off its value, or that give an unmet precondition of such
 a behaviour its value, and so on. A chain of k of them takes at least k steps, so that longer chains than `depth` aren't looked
 at. `find` deepens iteratively and returns a shortest segment of those that relevance admits. What relevance doesn't admit, and
-what is too long for that, is left to a search over a small world (`planner.hierarchical.subproblem`).
+what is too long for that, is left to a search over a small world (`confab.planner.hierarchical.subproblem`).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TypeAlias
 
-from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.subgoals import Env, Want, Wants
-from planner.plan import Counts, Limits
-from planner.transitions import Cell, Change, Key, Table, arguments_of
-from reasoner.amounts import meets
-from reasoner.limits import LimitError
-from reasoner.symbols import FALSE, TRUE
+from confab.planner.hierarchical.operators import Achiever, Program
+from confab.planner.hierarchical.subgoals import Env, Want, Wants
+from confab.planner.plan import Counts, Limits
+from confab.planner.transitions import Cell, Change, Key, Table, arguments_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.limits import LimitError
+from confab.reasoner.symbols import FALSE, TRUE
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""
@@ -65,7 +65,7 @@ class Segments:
     goal : mapping of cell to value
         The task's goal, which proposes values.
     deadline : float, optional
-        When `LimitError` is raised, on the clock of `perf_counter`; the deadline that holds (`reasoner.limits`) if left out.
+        When `LimitError` is raised, on the clock of `perf_counter`; the deadline that holds (`confab.reasoner.limits`) if left out.
     doubt : function, optional
         Called whenever the work of small worlds has doubled: it may be in vain.
     most : int

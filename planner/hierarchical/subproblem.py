@@ -3,7 +3,8 @@
 focus      the individuals that may act and be acted on: those of the targets, and those that chains towards the targets meet
 frozen     others that have a value of theirs, or that a condition looks for: they stand where they stand, so that whether there is
            somebody who … is judged as in the whole world
-targets    the symbols that shall get a value; what is kept besides is said by a function, as for `planner.hierarchical.subplans`
+targets    the symbols that shall get a value; what is kept besides is said by a function, as for
+`confab.planner.hierarchical.subplans`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
 proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be. The room that grounds
@@ -20,13 +21,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from planner.hierarchical.subplans import Ground, Keep, Segments
-from planner.plan import Counts, Limits, Reason, Status, TooLargeError
-from planner.transitions import Cell, arguments_of, key_of
-from reasoner.amounts import meets
-from reasoner.language import walk
-from reasoner.limits import OutOfTimeError
-from reasoner.symbols import (
+from confab.planner.hierarchical.subplans import Ground, Keep, Segments
+from confab.planner.plan import Counts, Limits, Reason, Status, TooLargeError
+from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.reasoner.amounts import meets
+from confab.reasoner.language import walk
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.symbols import (
     FALSE,
     Parameter,
     Problem,
@@ -37,7 +38,7 @@ from reasoner.symbols import (
 )
 
 if TYPE_CHECKING:
-    from planner.grounded.task import Task
+    from confab.planner.grounded.task import Task
 
 FEW = 4
 """Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
@@ -93,7 +94,7 @@ class World:
         segments.check_time()
 
     def _grounded(self, targets: Mapping[Cell, str], keep: Keep, width: Width) -> Task | Reason:
-        from planner.grounded.grounding import ground
+        from confab.planner.grounded.grounding import ground
 
         segments, level = self.segments, self.level
         inside = focus(segments, level, targets, width)
@@ -112,7 +113,7 @@ class World:
 
     def search(self) -> list[Ground] | None:
         """Return steps, or None if none were found; `forbid` takes one of them back."""
-        from planner.grounded.best_first import WORLD, search
+        from confab.planner.grounded.best_first import WORLD, search
 
         if self.task is None:
             self.segments.spend(self.level, Counts(), MAKING * LEAST)

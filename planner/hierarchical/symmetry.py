@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 
-from planner.transitions import Key
-from reasoner.symbols import Problem
+from confab.planner.transitions import Key
+from confab.reasoner.symbols import Problem
 
 ENDS = 8
 """So many individuals at each end of a large group are looked at for whether they are in another state."""

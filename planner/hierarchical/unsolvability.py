@@ -1,7 +1,8 @@
 """Where a search gets stuck: is there a plan at all? Asked cheapest first.
 
 All of it looks at the lowest level only: what an upper level can't do proves nothing, since the level below may do it otherwise.
-What says "no" here is a reason to stop searching; the proof is the certificate, which `planner.solve` asks for and has checked.
+What says "no" here is a reason to stop searching; the proof is the certificate, which `confab.planner.solve` asks for and has
+checked.
 """
 
 from __future__ import annotations
@@ -10,15 +11,15 @@ import math
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from planner.hierarchical.subplans import Segments
-from planner.hierarchical.subproblem import LEAST
-from planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
-from reasoner.limits import within
-from reasoner.symbols import Fact, Problem, State
+from confab.planner.hierarchical.subplans import Segments
+from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
+from confab.reasoner.limits import within
+from confab.reasoner.symbols import Fact, Problem, State
 
 if TYPE_CHECKING:
-    from planner.grounded.reachability import Reached
-    from planner.grounded.task import Task
+    from confab.planner.grounded.reachability import Reached
+    from confab.planner.grounded.task import Task
 
 LOOKING = 1_800_000
 """The work of looking at all states, in states times relaxed operators, that no search has to come before."""
@@ -34,8 +35,8 @@ def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = N
     """Return why a problem has no plan, with a certificate, if so much work until a deadline shows it."""
     if deadline is not None and perf_counter() >= deadline:
         return None
-    from planner.certificate_reasons import told
-    from planner.certifying import certify
+    from confab.planner.certificate_reasons import told
+    from confab.planner.certifying import certify
 
     with within(None if deadline is None else max(0.0, deadline - perf_counter())):
         certificate = certify(problem, most)
@@ -47,7 +48,7 @@ def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = N
 
 def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
     """Return what could be reached on a level, from the problem's initial state or another, if nothing ever became false."""
-    from planner.grounded import reachability
+    from confab.planner.grounded import reachability
 
     reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
     reached.close()
@@ -74,7 +75,7 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 
     Else that level is returned, grounded, or why it is too large for that.
     """
-    from planner.grounded.grounding import ground
+    from confab.planner.grounded.grounding import ground
 
     try:
         reached = closed(problem, level, deadline)
@@ -110,7 +111,7 @@ def looked_at(task: Task, segments: Segments, before: int) -> int:
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
     """Return that none of all states fulfils the goal, if that is so and at most so many have to be looked at."""
-    from planner.grounded.shortest import shortest
+    from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)
     if found.plan is not None or found.bound < math.inf:

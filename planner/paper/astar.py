@@ -16,10 +16,10 @@ import heapq
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from planner.paper.transitions import Applied, Values
-from planner.plan import Counts, Limits, Status
-from reasoner.amounts import meets
-from reasoner.limits import OutOfTimeError
+from confab.planner.paper.transitions import Applied, Values
+from confab.planner.plan import Counts, Limits, Status
+from confab.reasoner.amounts import meets
+from confab.reasoner.limits import OutOfTimeError
 
 Goal = Mapping[int, str]
 """Wanted values by position in the state."""

@@ -11,8 +11,8 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from reasoner.memory.links import Conclusion, Links
-from reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.memory.links import Conclusion, Links
+from confab.reasoner.symbols import Problem, State, Symbol
 
 
 @dataclass(frozen=True)

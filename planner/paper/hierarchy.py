@@ -14,13 +14,13 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TypeAlias
 
-from planner.paper.astar import Found, Goal, a_star, mismatches
-from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
-from planner.paper.transitions import Applied, Model, Values, ground
-from planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
-from reasoner.limits import OutOfTimeError
-from reasoner.memory.links import Links
-from reasoner.symbols import Fact, GroundBehavior, Problem
+from confab.planner.paper.astar import Found, Goal, a_star, mismatches
+from confab.planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
+from confab.planner.paper.transitions import Applied, Model, Values, ground
+from confab.planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
+from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.memory.links import Links
+from confab.reasoner.symbols import Fact, GroundBehavior, Problem
 
 SETTLED, UNSETTLED = "settled", "unsettled"
 """Marks of a symbol that did not have its rest value in the beginning: at rest or unchanged, or changed; see `Target`."""
@@ -77,7 +77,7 @@ def plan(
     limits : Limits
         Maximum number of expansions of each search, and seconds of the whole call.
     grounds : mapping of level to quantified behaviours, optional
-        As `reasoner.reading.quantification` returns them; by default quantified from the problem's classes.
+        As `confab.reasoner.reading.quantification` returns them; by default quantified from the problem's classes.
     leave_levels : bool
         Whether the level below gets the goal if a level has no plan that can be refined.
     proof : Proof

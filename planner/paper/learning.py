@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planner.paper.cogency import PAPER, PaperConstants, situation
-from planner.paper.transitions import Model, Values
-from planner.plan import Plan, Step
-from reasoner.limits import check
-from reasoner.memory.links import Conclusion, Links
-from reasoner.symbols import GroundBehavior, Problem, State
+from confab.planner.paper.cogency import PAPER, PaperConstants, situation
+from confab.planner.paper.transitions import Model, Values
+from confab.planner.plan import Plan, Step
+from confab.reasoner.limits import check
+from confab.reasoner.memory.links import Conclusion, Links
+from confab.reasoner.symbols import GroundBehavior, Problem, State
 
 
 class LearningError(ValueError):

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from planner.derived_facts import Rules
-from planner.transitions import Forward, Table, Writer, key_of
-from reasoner.amounts import Number
-from reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
+from confab.planner.derived_facts import Rules
+from confab.planner.transitions import Forward, Table, Writer, key_of
+from confab.reasoner.amounts import Number
+from confab.reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
 
 Values = tuple[str, ...]
 
@@ -118,7 +118,8 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
     """Return all quantified behaviours of a level in the order of their IDs.
 
-    They equal the results of the SPARQL queries of `reasoner.reading.quantification`, but are computed from the problem's classes.
+    They equal the results of the SPARQL queries of `confab.reasoner.reading.quantification`, but are computed from the problem's
+    classes.
     """
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []

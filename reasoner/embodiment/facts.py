@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.embodiment.values import Color, Vector
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import local_name
-from reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
+from confab.reasoner.embodiment.values import Color, Vector
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import local_name
+from confab.reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
 
 PREFIXES = {
     "": EMBODIMENT,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from reasoner.embodiment.values import Embodiment, Feature, Flaw, Link, Mechanism, Part
+from confab.reasoner.embodiment.values import Embodiment, Feature, Flaw, Link, Mechanism, Part
 
 JOINT = "perceive_joint"
 """The perceiver that distinguishes open from shut."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
-from reasoner.embodiment.values import Embodiment, Flaw, Shape
+from confab.reasoner.embodiment.values import Embodiment, Flaw, Shape
 
 
 def too_wide(embodiment: Embodiment) -> Iterator[Flaw]:

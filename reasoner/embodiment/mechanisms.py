@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from reasoner.embodiment.facts import BodyFacts, EmbodimentError
-from reasoner.embodiment.values import Feature, Link, Mechanism, Part
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
+from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
 """The attributes that state a part's extent; a radius counts twice."""

@@ -1,4 +1,4 @@
-"""Reach facts: computed from the robot's geometry by `sim.reach`, stored in a file beside the scene."""
+"""Reach facts: computed from the robot's geometry by `confab.sim.reach`, stored in a file beside the scene."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.files import alone, write_whole
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.names import Names
-from reasoner.vocabulary import CORE, OWL, PROV, RDF
+from confab.reasoner.files import alone, write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.names import Names
+from confab.reasoner.vocabulary import CORE, OWL, PROV, RDF
 
 RELATIONS = "SELECT DISTINCT ?relation WHERE { ?relation a :ReachRelation } ORDER BY ?relation"
 HASHES = "SELECT DISTINCT ?hash WHERE { ?ontology :inputsHash ?hash }"

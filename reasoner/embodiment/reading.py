@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-import ontology
-from reasoner.embodiment.facts import BodyFacts, EmbodimentError
-from reasoner.embodiment.mechanisms import mechanisms
-from reasoner.embodiment.skills import skill_uses
-from reasoner.embodiment.values import (
+from confab import ontology
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
+from confab.reasoner.embodiment.mechanisms import mechanisms
+from confab.reasoner.embodiment.skills import skill_uses
+from confab.reasoner.embodiment.values import (
     Body,
     Color,
     Embodiment,
@@ -24,7 +24,7 @@ from reasoner.embodiment.values import (
     Shape,
     Stand,
 )
-from reasoner.names import local_name
+from confab.reasoner.names import local_name
 
 PALETTE: tuple[Color, ...] = (
     (0.95, 0.50, 0.10, 1.0),

@@ -1,15 +1,15 @@
 """Rules of validation on skills that are described in phases: see `RULES` at the end.
 
-`sim.phases` also calls `unplayed`, `unset` and `endless` before it executes a skill.
+`confab.sim.phases` also calls `unplayed`, `unset` and `endless` before it executes a skill.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from reasoner.embodiment.facts import camel
-from reasoner.embodiment.skills import TERM
-from reasoner.embodiment.values import Embodiment, Flaw, Phase, SkillUse
+from confab.reasoner.embodiment.facts import camel
+from confab.reasoner.embodiment.skills import TERM
+from confab.reasoner.embodiment.values import Embodiment, Flaw, Phase, SkillUse
 
 JOINT_NUMBERS = {"opened", "shut", "lower", "upper", "wide"}
 """Numbers of a joint that an expression may name."""

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 import pyoxigraph as ox
 
-from reasoner.embodiment.facts import BodyFacts, EmbodimentError, grouped, rows, snake
-from reasoner.embodiment.values import Guard, Phase, SkillUse
-from reasoner.names import local_name
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError, grouped, rows, snake
+from confab.reasoner.embodiment.values import Guard, Phase, SkillUse
+from confab.reasoner.names import local_name
 
 VARIABLES = """
 SELECT DISTINCT ?behavior ?term WHERE {
@@ -21,7 +21,7 @@ FINGERS = ("", "open", "shut", "grasp")
 BROUGHT = ("", "base")
 CONDITIONS = ("empty", "holding", "place", "thing")
 QUANTITIES = ("slip", "tilt", "height", "off", "joint", "push", "grip", "bearing", "leaning", "astray")
-"""The words that phases may use; `sim.phases`, `sim.touch` and `sim.measuring` have a table for each kind."""
+"""The words that phases may use; `confab.sim.phases`, `confab.sim.touch` and `confab.sim.measuring` have a table for each kind."""
 VERDICTS = (
     "unreachable",
     "goal in collision",
@@ -39,7 +39,7 @@ VERDICTS = (
     "ill-defined",
     "unexpected",
 )
-"""The failure codes that a guard may name after ``else``; `sim.verdict.CODES` explains them."""
+"""The failure codes that a guard may name after ``else``; `confab.sim.verdict.CODES` explains them."""
 
 GUARD = re.compile(r"(\w+) *(>=|<=) *([\w.+-]+)(?: +else +(.+))?")
 TERM = re.compile(r"([+-]?)(\d*\.?\d+|[A-Za-z]\w*)")

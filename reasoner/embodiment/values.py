@@ -1,7 +1,7 @@
 """The embodiment that the ontology describes for `sim/`: robots, fixtures, places, objects, skills and perceivers.
 
 Frozen values without RDF. Lengths are in metres, masses in kilograms, angles in radians, forces in newtons; frames are the
-world's (z up). `reasoner.embodiment.reading` reads them from the graph; `sim/` builds a physical world from them.
+world's (z up). `confab.reasoner.embodiment.reading` reads them from the graph; `sim/` builds a physical world from them.
 Every name of the domain (an object, a behaviour, a situation type) that `sim/` uses comes from here or from the plan.
 """
 
@@ -228,7 +228,8 @@ class Phase:
     """One motion of a skill, relative to a feature of a thing.
 
     `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
-    key of `sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or for the point that
+    key of `confab.sim.phases.MOTIONS`. `to` is the goal, a role with a feature, ``target.grip``, for the hand's tip or for the
+    point that
     `bring` names. `offset` is a shift from the goal in the hand's frame, `above` a shift upwards. `offset`, `above`, `value`,
     `speed` and `wait` are expressions: sums of numbers and settings, ``raised-slip``.
 

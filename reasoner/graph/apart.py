@@ -22,11 +22,11 @@ from typing import Any, TypeAlias
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
-from reasoner.limits import LimitError, current
-from reasoner.names import nearest
-from reasoner.vocabulary import CORE
-from reasoner.workers import end, kill, start
+from confab.reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
+from confab.reasoner.limits import LimitError, current
+from confab.reasoner.names import nearest
+from confab.reasoner.vocabulary import CORE
+from confab.reasoner.workers import end, kill, start
 
 UNION = tuple(BASE + name for name in (*GRAPHS, DERIVED))
 PROCESS = Path(__file__).with_name("asked_apart.py")

@@ -1,4 +1,4 @@
-"""The process that answers queries for `reasoner.graph.apart`. It needs nothing else of this project.
+"""The process that answers queries for `confab.reasoner.graph.apart`. It needs nothing else of this project.
 
 It keeps a graph, and forks for each query: the fork gives up what it doesn't need (more memory and time than it is allowed, and new
 files, which connections are, too) and ends with its answer. The next message, or the end of the asking process, ends it before.

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.files import as_iri_part, write_whole
-from reasoner.graph.apart import QueryLimits, ask
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.kinds import CONSTRUCTED, stamped
-from reasoner.vocabulary import OWL, RDF
+from confab.reasoner.files import as_iri_part, write_whole
+from confab.reasoner.graph.apart import QueryLimits, ask
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.kinds import CONSTRUCTED, stamped
+from confab.reasoner.vocabulary import OWL, RDF
 
 
 def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: QueryLimits | None = None) -> int:
@@ -23,7 +23,7 @@ def write_construct(graph: KnowledgeGraph, query: str, path: Path, limits: Query
     KnowledgeError
         The query isn't SPARQL, or its answer is no triples, or none at all.
     LimitError
-        As `reasoner.graph.apart.ask`.
+        As `confab.reasoner.graph.apart.ask`.
     """
     name = ox.NamedNode(f"{graph.scene.rstrip('#/').rsplit('/', 1)[0]}/{as_iri_part(path.stem)}")
     kind, _, answer = ask(graph, query, limits)

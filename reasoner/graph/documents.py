@@ -17,8 +17,8 @@ from xml.parsers import expat
 
 import pyoxigraph as ox
 
-from reasoner.limits import check, current
-from reasoner.nesting import JSON, MOST_NESTED, TURTLE, nested, nested_elements
+from confab.reasoner.limits import check, current
+from confab.reasoner.nesting import JSON, MOST_NESTED, TURTLE, nested, nested_elements
 
 log = logging.getLogger(__name__)
 
@@ -115,7 +115,7 @@ def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFo
 def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
     from subprocess import TimeoutExpired
 
-    from reasoner.workers import WorkerError, call
+    from confab.reasoner.workers import WorkerError, call
 
     left = current().left
     try:

@@ -17,11 +17,11 @@ import pyoxigraph as ox
 import urllib3
 from urllib3.exceptions import HTTPError, LocationValueError, MaxRetryError
 
-import ontology
-from reasoner.files import write_whole
-from reasoner.graph.documents import DocumentError, plain_xml, safe
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.vocabulary import OWL
+from confab import ontology
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.documents import DocumentError, plain_xml, safe
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.vocabulary import OWL
 
 MOST_BYTES = 20_000_000
 SECONDS = 30.0

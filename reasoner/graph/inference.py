@@ -2,7 +2,7 @@
 
 Only what can't change is concluded. Facts of situation types are left out, since behaviours change them; they count merely as
 proof that their subject and object have the domain and range of the property. A class that is defined by situations is
-compiled into conditions instead, see `reasoner.reading.definitions`.
+compiled into conditions instead, see `confab.reasoner.reading.definitions`.
 
 The reasoner runs only if the ontology says something from which more follows than the reader sees by itself (it follows
 subclasses): `needed` asks for that. What RL can't conclude is said in docs/inference.md.
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
-from reasoner.names import local_name
-from reasoner.vocabulary import CORE, OWL, RDF, RDFS
+from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.names import local_name
+from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 
 TYPE, SAME, SUBCLASS = ox.NamedNode(RDF + "type"), OWL + "sameAs", RDFS + "subClassOf"
 GIVEN = ("asserted", "reach")

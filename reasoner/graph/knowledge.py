@@ -1,8 +1,8 @@
 """The knowledge graph: ontology files with all that they import, in one SPARQL store.
 
 Each concern has a named graph of its own (`GRAPHS`); a query sees their union. Files are read, never written here. Nothing is
-fetched from the network (`reasoner.graph.fetching` does, if asked): an import is looked up in the catalog beside the file, then
-in the shipped one.
+fetched from the network (`confab.reasoner.graph.fetching` does, if asked): an import is looked up in the catalog beside the
+file, then in the shipped one.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from urllib.parse import unquote
 
 import pyoxigraph as ox
 
-import ontology
-from reasoner.graph.documents import DocumentError, document
-from reasoner.limits import check
-from reasoner.names import nearest
-from reasoner.vocabulary import CORE, PREFIXES, TYPE
+from confab import ontology
+from confab.reasoner.graph.documents import DocumentError, document
+from confab.reasoner.limits import check
+from confab.reasoner.names import nearest
+from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 if TYPE_CHECKING:
-    from reasoner.updates.compiling import Fault
-    from reasoner.updates.texts import Place
+    from confab.reasoner.updates.compiling import Fault
+    from confab.reasoner.updates.texts import Place
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
@@ -49,7 +49,7 @@ Answer: TypeAlias = ox.QuerySolutions | ox.QueryTriples | ox.QueryBoolean
 
 
 class Remote(Protocol):
-    """A store elsewhere that answers SPARQL 1.1, as `reasoner.graph.stores.Endpoint` is."""
+    """A store elsewhere that answers SPARQL 1.1, as `confab.reasoner.graph.stores.Endpoint` is."""
 
     def query(self, query: str, prefixes: Mapping[str, str], bindings: Mapping[str, str], noted: bool = True) -> Answer:
         """Return what a query answers; `confirm` asks it again if it is noted."""
@@ -239,7 +239,7 @@ def write_out(graph: KnowledgeGraph) -> list[Fault]:
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
         return []
-    from reasoner.updates.compiling import compiled
+    from confab.reasoner.updates.compiling import compiled
 
     found = compiled(lambda query: graph.select(query, SCENE), _spelled(graph), graph.prefixes)
     asserted = ox.NamedNode(BASE + "asserted")
@@ -297,7 +297,7 @@ def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
 
 
 def _forget_what_names_nothing(graph: KnowledgeGraph) -> None:
-    """Take out of a scene's reach what was refuted about things that the scene has no more (`reasoner.refutations`)."""
+    """Take out of a scene's reach what was refuted about things that the scene has no more (`confab.reasoner.refutations`)."""
     store, reach, asserted = graph.store, ox.NamedNode(BASE + "reach"), ox.NamedNode(BASE + "asserted")
     refuted = list(store.quads_for_pattern(None, ox.NamedNode(CORE + "precondition"), None, reach))
     quads = list(store.quads_for_pattern(None, None, None, reach)) if refuted else []

@@ -11,8 +11,8 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
-from reasoner.validation.hermit import world_of
+from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
+from confab.reasoner.validation.hermit import world_of
 
 
 class Mirror:

@@ -9,7 +9,7 @@ import pyoxigraph as ox
 import rdflib
 from rdflib.plugins.stores.memory import Memory
 
-from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph
+from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph
 
 
 def rdflib_graph(graph: KnowledgeGraph, edited: Callable[[], None]) -> rdflib.Graph:

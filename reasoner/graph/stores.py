@@ -22,8 +22,17 @@ import pyoxigraph as ox
 import urllib3
 from urllib3.exceptions import HTTPError, MaxRetryError, ReadTimeoutError, TimeoutError
 
-import ontology
-from reasoner.graph.knowledge import BASE, Answer, KnowledgeError, KnowledgeGraph, load, read_prefixes, scene_file, text
+from confab import ontology
+from confab.reasoner.graph.knowledge import (
+    BASE,
+    Answer,
+    KnowledgeError,
+    KnowledgeGraph,
+    load,
+    read_prefixes,
+    scene_file,
+    text,
+)
 
 AUTHORIZATION = "CONFAB_SPARQL_AUTHORIZATION"
 """Environment variable with the value of the Authorization header, e.g. ``Bearer …``."""
@@ -299,14 +308,14 @@ def on_disk(source: str | Path, folder: Path) -> KnowledgeGraph:
     Parameters
     ----------
     source : str or Path
-        As in `reasoner.graph.knowledge.load`.
+        As in `confab.reasoner.graph.knowledge.load`.
     folder : Path
         Of the store; made if missing. One process at a time can use it.
 
     Raises
     ------
     KnowledgeError
-        As `reasoner.graph.knowledge.load`; or the folder is in use or is no store.
+        As `confab.reasoner.graph.knowledge.load`; or the folder is in use or is no store.
     """
     try:
         store = ox.Store(str(folder))

@@ -22,11 +22,11 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.files import as_iri_part, write_whole
-from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
-from reasoner.names import Names
-from reasoner.symbols import FALSE, TRUE
-from reasoner.vocabulary import ARGUMENTS, CORE, EPISODES, OWL, PROV, RDF, XSD
+from confab.reasoner.files import as_iri_part, write_whole
+from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
+from confab.reasoner.names import Names
+from confab.reasoner.symbols import FALSE, TRUE
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, EPISODES, OWL, PROV, RDF, XSD
 
 Data = Mapping[str, Any]
 

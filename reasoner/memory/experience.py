@@ -22,8 +22,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
-from reasoner.symbols import Condition, ValueCondition
-from reasoner.symbols import Fact as Goal
+from confab.reasoner.symbols import Condition, ValueCondition
+from confab.reasoner.symbols import Fact as Goal
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its terms."""

@@ -1,6 +1,7 @@
 """Experience on disk and in stores: rules and methods as triples, counts as annotated axioms, in Turtle that Protégé opens.
 
-`reasoner.memory.rules_file` writes each learned item once. There is a counter for each replica, epoch and item (`:countsFor`),
+`confab.reasoner.memory.rules_file` writes each learned item once. There is a counter for each replica, epoch and item
+(`:countsFor`),
 which is `:associatedWith` the item itself and the lifted facts that held. An ``owl:Axiom`` on each of these links has `:chosen`,
 `:passedOver`, `:failed` and the resulting `:probability`. Writers never share a counter, and all else is named by its content, so
 the union of two files is a file of both memories. An edited rule keeps its counts.
@@ -22,12 +23,12 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, Fact, Said, Tally
-from reasoner.memory.rules_file import RuleReader, RuleWriter, Words, label
-from reasoner.names import Names
-from reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import ITSELF, Experience, Fact, Said, Tally
+from confab.reasoner.memory.rules_file import RuleReader, RuleWriter, Words, label
+from confab.reasoner.names import Names
+from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
 
 FORMAT = 5
 TALLY = ("chosen", "passedOver", "failed")

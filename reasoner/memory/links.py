@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from reasoner.symbols import Symbol
+from confab.reasoner.symbols import Symbol
 
 Conclusion: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A quantified behaviour: its name and arguments."""

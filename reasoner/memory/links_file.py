@@ -14,14 +14,14 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
-from reasoner.memory.experience_file import Lines, lines
-from reasoner.memory.links import Links
-from reasoner.names import Names
-from reasoner.nesting import MOST_NESTED, nested
-from reasoner.symbols import FALSE, TRUE, Symbol
-from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, RDFS, XSD
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.memory.experience_file import Lines, lines
+from confab.reasoner.memory.links import Links
+from confab.reasoner.names import Names
+from confab.reasoner.nesting import MOST_NESTED, nested
+from confab.reasoner.symbols import FALSE, TRUE, Symbol
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, RDFS, XSD
 
 ASSERTED = """
 SELECT DISTINCT ?node ?property ?value WHERE {

@@ -14,9 +14,9 @@ from urllib.parse import quote, unquote
 
 import pyoxigraph as ox
 
-from reasoner.memory.experience import GoalKind, Method, OpenRole, Order, Rule, Said
-from reasoner.names import Names
-from reasoner.symbols import (
+from confab.reasoner.memory.experience import GoalKind, Method, OpenRole, Order, Rule, Said
+from confab.reasoner.names import Names
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
@@ -28,7 +28,7 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, RDF
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, RDF
 
 Node: TypeAlias = "Mapping[str, Sequence[str]]"
 """The values of a node by property, without the core's namespace."""

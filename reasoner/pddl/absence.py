@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from reasoner.pddl.formulas import Atom, Term
-from reasoner.pddl.vocabulary import Vocabulary
-from reasoner.symbols import Behavior, Condition, Problem, ValueCondition, Witness
+from confab.reasoner.pddl.formulas import Atom, Term
+from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition, Witness
 
 
 class Kept:

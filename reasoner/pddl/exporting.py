@@ -1,7 +1,7 @@
 """A level of a scene written as PDDL, as plainly as it can be said, for planners that know little more than STRIPS.
 
 A class is a type, or a predicate of one argument if it cuts across others; an individual is an object, also as a value; a
-situation type is a predicate of its arguments and, unless it is boolean, its value. `reasoner.pddl.lowering` says the rest.
+situation type is a predicate of its arguments and, unless it is boolean, its value. `confab.reasoner.pddl.lowering` says the rest.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from reasoner.pddl.formulas import (
+from confab.reasoner.pddl.formulas import (
     TRUE,
     Assignment,
     Atom,
@@ -32,9 +32,9 @@ from reasoner.pddl.formulas import (
     terms_of,
     typed,
 )
-from reasoner.pddl.lowering import Action, Lowering
-from reasoner.pddl.vocabulary import Vocabulary
-from reasoner.symbols import Problem, State
+from confab.reasoner.pddl.lowering import Action, Lowering
+from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.symbols import Problem, State
 
 LINE = "\n    "
 

@@ -8,7 +8,7 @@ from itertools import product
 from math import prod
 from typing import TypeAlias
 
-from reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
+from confab.reasoner.pddl.syntax import CHANGES, Form, Typed, Word, either
 
 Atom = tuple[str, ...]
 """A predicate and its terms."""

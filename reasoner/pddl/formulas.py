@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TypeAlias
 
-from reasoner.amounts import written
+from confab.reasoner.amounts import written
 
 DIGITS = 30
 """Decimal places of a number that has no end, where it can't be written as a quotient."""

@@ -1,4 +1,4 @@
-"""From PDDL to the values of `reasoner.symbols`.
+"""From PDDL to the values of `confab.reasoner.symbols`.
 
 ==============================  ================================================================
 in PDDL                         here
@@ -32,9 +32,9 @@ from functools import cached_property, reduce
 from itertools import product
 from math import prod
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
-from reasoner.derivation import circles
-from reasoner.pddl.forms import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
+from confab.reasoner.derivation import circles
+from confab.reasoner.pddl.forms import (
     Atom,
     Effect,
     NumericEffect,
@@ -48,9 +48,9 @@ from reasoner.pddl.forms import (
     words_in,
     words_of,
 )
-from reasoner.pddl.invariants import Invariants, Part
-from reasoner.pddl.syntax import COMPARISONS, Form, Pddl, PddlError, Typed, Word, is_number
-from reasoner.symbols import (
+from confab.reasoner.pddl.invariants import Invariants, Part
+from confab.reasoner.pddl.syntax import COMPARISONS, Form, Pddl, PddlError, Typed, Word, is_number
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

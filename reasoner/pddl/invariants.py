@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
-from reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_of
-from reasoner.pddl.syntax import Action, Form, Pddl
+from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_of
+from confab.reasoner.pddl.syntax import Action, Form, Pddl
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
 """For a predicate's number of arguments, which one may be the object and which one the value."""

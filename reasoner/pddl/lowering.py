@@ -21,14 +21,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
-from reasoner.amounts import inside as parts
-from reasoner.derivation import circular
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.pddl.absence import Kept
-from reasoner.pddl.formulas import FALSE as NEVER
-from reasoner.pddl.formulas import TRUE as ALWAYS
-from reasoner.pddl.formulas import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
+from confab.reasoner.amounts import inside as parts
+from confab.reasoner.derivation import circular
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.pddl.absence import Kept
+from confab.reasoner.pddl.formulas import FALSE as NEVER
+from confab.reasoner.pddl.formulas import TRUE as ALWAYS
+from confab.reasoner.pddl.formulas import (
     Assignment,
     Atom,
     Call,
@@ -45,8 +45,8 @@ from reasoner.pddl.formulas import (
     same,
     some,
 )
-from reasoner.pddl.vocabulary import Vocabulary
-from reasoner.symbols import (
+from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
     AnyOf,

@@ -1,4 +1,4 @@
-"""A planning problem written as a scene in Turtle: what `reasoner.reading.problem` reads back as the same problem.
+"""A planning problem written as a scene in Turtle: what `confab.reasoner.reading.problem` reads back as the same problem.
 
 Domain and scene go into one file. Every condition and effect is an individual with an IRI of its own, so that Protégé
 shows and edits it. Effects are numbered in the order in which they are made.
@@ -13,9 +13,9 @@ from functools import cached_property
 
 import pyoxigraph as ox
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
-from reasoner.language import measures
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from confab.reasoner.language import measures
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
@@ -34,7 +34,7 @@ from reasoner.symbols import (
     Witness,
     substituted,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS, XSD
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDFS, SKOS, XSD
 
 HEADER = f"""\
 @prefix :        <{{scene}}#> .

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure
-from reasoner.language import walk
-from reasoner.pddl.formulas import FALSE as NEVER
-from reasoner.pddl.formulas import TRUE as ALWAYS
-from reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both
-from reasoner.symbols import TRUE, Problem, Witness
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
+from confab.reasoner.language import walk
+from confab.reasoner.pddl.formulas import FALSE as NEVER
+from confab.reasoner.pddl.formulas import TRUE as ALWAYS
+from confab.reasoner.pddl.formulas import Atom, Call, Formula, Number, Operation, Term, both
+from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
 """A class whose only individual is what a predicate without arguments is about."""

@@ -23,12 +23,12 @@ from itertools import product
 
 import pyoxigraph as ox
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure
-from reasoner.derivation import circular, strata
-from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
-from reasoner.reading.problem import Reading
-from reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
+from confab.reasoner.derivation import circular, strata
+from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -48,7 +48,7 @@ from reasoner.symbols import (
     Witness,
     allowed,
 )
-from reasoner.vocabulary import ARGUMENTS, RDF
+from confab.reasoner.vocabulary import ARGUMENTS, RDF
 
 SITUATION = BASE + "situation"
 RELATION_PROPERTIES = (
@@ -145,9 +145,9 @@ def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = N
 
     Examples
     --------
-    >>> from reasoner.graph.knowledge import load
-    >>> from reasoner.graph.inference import infer
-    >>> from reasoner.reading.problem import read
+    >>> from confab.reasoner.graph.knowledge import load
+    >>> from confab.reasoner.graph.inference import infer
+    >>> from confab.reasoner.reading.problem import read
     >>> graph = load("living-room")
     >>> _ = infer(graph)
     >>> for found in affordances(graph, read(graph)):

@@ -4,7 +4,7 @@
 who is one before planning. Wherever a behaviour names such a class, its definition takes its place:
 
 =========================================  =======================================================
-in OWL                                      in `reasoner.symbols`
+in OWL                                      in `confab.reasoner.symbols`
 =========================================  =======================================================
 ``A and B``                                 both conditions
 ``A or B``                                  `AnyOf`
@@ -27,10 +27,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from reasoner.amounts import Amount, Expression, Measure, exact
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import Names, local_name
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Expression, Measure, exact
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import Names, local_name
+from confab.reasoner.symbols import (
     TRUE,
     AnyOf,
     ClassCondition,
@@ -43,7 +43,7 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.vocabulary import OWL, RDF, RDFS
+from confab.reasoner.vocabulary import OWL, RDF, RDFS
 
 THING = OWL + "Thing"
 INSIDE = "|".join(
@@ -102,8 +102,8 @@ class Definitions:
     numbers : set of properties that lead to numbers
     kinds : mapping of property to the classes of subject and value, as names; "" where nothing says it
     concluded : mapping of class to situation type and owner
-        Classes that rules conclude, SWRL's (`reasoner.reading.swrl`) or others, or that are defined by themselves, the situation
-        type that holds of each, and the class that has it, "" if several do.
+        Classes that rules conclude, SWRL's (`confab.reasoner.reading.swrl`) or others, or that are defined by themselves, the
+        situation type that holds of each, and the class that has it, "" if several do.
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]

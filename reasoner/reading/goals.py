@@ -7,16 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from reasoner.amounts import (
+from confab.reasoner.amounts import (
     DECIMAL,
     Amount,
     bounds_written,
     written,
 )
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import nearest
-from reasoner.reading.parts import Parts
-from reasoner.symbols import (
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import nearest
+from confab.reasoner.reading.parts import Parts
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Comparison,

@@ -8,11 +8,11 @@ from itertools import chain
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
-from reasoner.reading.problem import Frame
-from reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Node, Schema, Triple, index_of, link, stated
-from reasoner.reading.swrl import SWRL
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.reading.problem import Frame
+from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Node, Schema, Triple, index_of, link, stated
+from confab.reasoner.reading.swrl import SWRL
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
 PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
 """What leads from a fact that is a node of its own to the individuals in it."""

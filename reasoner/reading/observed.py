@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.files import write_whole
-from reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
-from reasoner.names import Names
-from reasoner.possible import ImpossibleStateError, refuse_impossible
-from reasoner.reading.problem import Reading
-from reasoner.symbols import State, Symbol
-from reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
+from confab.reasoner.files import write_whole
+from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
+from confab.reasoner.names import Names
+from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.symbols import State, Symbol
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, RDF
 
 FACTS = """
 SELECT DISTINCT ?fact ?property ?value WHERE { ?fact a :SituatedObjectInstance ; ?property ?value } ORDER BY ?fact ?property"""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from reasoner.amounts import (
+from confab.reasoner.amounts import (
     COMPARING,
     OPERATIONS,
     Amount,
@@ -15,10 +15,10 @@ from reasoner.amounts import (
     Expression,
     Measure,
 )
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.names import Names, local_name
-from reasoner.reading.definitions import Definitions
-from reasoner.reading.rows import (
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.names import Names, local_name
+from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.rows import (
     HIGHEST_COST,
     HIGHEST_LEVEL,
     Node,
@@ -27,7 +27,7 @@ from reasoner.reading.rows import (
     ordered,
     whole_number,
 )
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -44,7 +44,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE
+from confab.reasoner.vocabulary import ARGUMENTS, CORE
 
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50

@@ -1,10 +1,10 @@
-"""From the knowledge graph to the values of `reasoner.symbols`: what is there, what can be done, what holds, what is wanted.
+"""From the knowledge graph to the values of `confab.reasoner.symbols`: what is there, what can be done, what holds, what is wanted.
 
-The graph is read in a few large queries; their rows become nodes (`reasoner.reading.rows`), the nodes become conditions, effects
-and behaviours (`reasoner.reading.parts`) and goals (`reasoner.reading.goals`), and all of them a problem:
+The graph is read in a few large queries; their rows become nodes (`confab.reasoner.reading.rows`), the nodes become conditions,
+effects and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`), and all of them a problem:
 
 ============================  ==============================================
-in the ontology               in `reasoner.symbols`
+in the ontology               in `confab.reasoner.symbols`
 ============================  ==============================================
 ``:SituationType``            `SituationType`
 ``:Behavior``                 `Behavior`, its terms starting with ``?``
@@ -21,23 +21,23 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 
-from reasoner.amounts import (
+from confab.reasoner.amounts import (
     Amount,
     Quantity,
     inside,
     written,
 )
-from reasoner.derivation import circles, needed
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.language import walk
-from reasoner.limits import check
-from reasoner.names import Names, local_name
-from reasoner.possible import values_at_fault
-from reasoner.reading import swrl
-from reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
-from reasoner.reading.goals import check_arguments, with_task
-from reasoner.reading.parts import Parts
-from reasoner.reading.rows import (
+from confab.reasoner.derivation import circles, needed
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.language import walk
+from confab.reasoner.limits import check
+from confab.reasoner.names import Names, local_name
+from confab.reasoner.possible import values_at_fault
+from confab.reasoner.reading import swrl
+from confab.reasoner.reading.definitions import AXIOMS, EXPRESSIONS, Definitions
+from confab.reasoner.reading.goals import check_arguments, with_task
+from confab.reasoner.reading.parts import Parts
+from confab.reasoner.reading.rows import (
     HIGHEST_LEVEL,
     HIGHEST_NUMBER,
     Member,
@@ -54,7 +54,7 @@ from reasoner.reading.rows import (
     superclasses,
     whole_number,
 )
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -73,7 +73,7 @@ from reasoner.symbols import (
     ValueEffect,
     spread,
 )
-from reasoner.vocabulary import CORE, EMBODIMENT, RDFS
+from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
 KINDS = (
@@ -140,7 +140,7 @@ class Reading:
     """A scene as the planner takes it, with the table that leads from its names back to IRIs.
 
     `whole` tells whether all individuals of the scene are in it, or those only that its task can need
-    (`reasoner.reading.relevance`); `schema` is what it was read by.
+    (`confab.reasoner.reading.relevance`); `schema` is what it was read by.
     """
 
     problem: Problem
@@ -190,7 +190,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         parts[text(part)].append(core_triple(row))
     written = [triple for triple in parts["node"] if graph.remote and triple[1] in (CORE + "update", CORE + "extends")]
     if written:  # a store elsewhere has the text alone
-        from reasoner.updates.compiling import compiled
+        from confab.reasoner.updates.compiling import compiled
 
         found = compiled(lambda query: graph.select(query, SCENE), {}, graph.prefixes)
         if found.faults:

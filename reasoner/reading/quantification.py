@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.limits import check
-from reasoner.names import nearest
-from reasoner.reading.problem import Reading
-from reasoner.reading.rows import FIRST_INDEX_OF_NONE
-from reasoner.symbols import Behavior, GroundBehavior, Parameter
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.limits import check
+from confab.reasoner.names import nearest
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE
+from confab.reasoner.symbols import Behavior, GroundBehavior, Parameter
 
 
 def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[GroundBehavior, ...]:
@@ -22,8 +22,8 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
 
     Examples
     --------
-    >>> from reasoner.graph.knowledge import load
-    >>> from reasoner.reading.problem import read
+    >>> from confab.reasoner.graph.knowledge import load
+    >>> from confab.reasoner.reading.problem import read
     >>> graph = load("beverage-serving")
     >>> for ground in quantify(graph, read(graph), 2)[:3]:
     ...     print(ground)

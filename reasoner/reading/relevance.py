@@ -21,16 +21,16 @@ from typing import TypeAlias
 
 import pyoxigraph as ox
 
-from reasoner.amounts import situations_in, terms_of
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.language import situations_of, terms
-from reasoner.limits import check
-from reasoner.names import local_name
-from reasoner.reading.goals import BOUNDS, with_goals
-from reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
-from reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
-from reasoner.reading.rows import Member, Schema, Triple
-from reasoner.symbols import (
+from confab.reasoner.amounts import situations_in, terms_of
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.language import situations_of, terms
+from confab.reasoner.limits import check
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.goals import BOUNDS, with_goals
+from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
+from confab.reasoner.reading.problem import Frame, Reading, frame, read_schema, reading_of
+from confab.reasoner.reading.rows import Member, Schema, Triple
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -43,7 +43,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.vocabulary import CORE, PREFIXES, TYPE
+from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
 """Queries that follow routes one step each; what lies farther is closed by a property path, of which the last is one."""
@@ -71,21 +71,21 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     ----------
     graph : KnowledgeGraph
     goals : sequence of str
-        Goals that replace some of the task's, as in `reasoner.reading.problem.with_goals`; what they name is read as well.
+        Goals that replace some of the task's, as in `confab.reasoner.reading.problem.with_goals`; what they name is read as well.
 
     Returns
     -------
     Reading
-        As `reasoner.reading.problem.read` gives, with fewer individuals. IDs number what was read.
+        As `confab.reasoner.reading.problem.read` gives, with fewer individuals. IDs number what was read.
 
     Raises
     ------
     KnowledgeError
-        As `reasoner.reading.problem.read`, for the individuals that matter.
+        As `confab.reasoner.reading.problem.read`, for the individuals that matter.
 
     Examples
     --------
-    >>> from reasoner.graph.knowledge import load
+    >>> from confab.reasoner.graph.knowledge import load
     >>> recognise(load("beverage-serving")).problem.classes["Movable"]
     ('bottle1', 'bottle2', 'cup1', 'cup2')
     """

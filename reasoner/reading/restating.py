@@ -1,6 +1,6 @@
 """A scene with other facts or goals: a copy of its graph in which a symbol has another value, or another is wanted of it.
 
-What is refuted (`reasoner.refutations`) is stated here, too, as the precondition that it is.
+What is refuted (`confab.reasoner.refutations`) is stated here, too, as the precondition that it is.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from hashlib import sha256
 
 import pyoxigraph as ox
 
-from reasoner.amounts import bounds, written
-from reasoner.files import as_iri_part
-from reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
-from reasoner.possible import ImpossibleStateError, refuse_impossible
-from reasoner.reading.problem import Reading
-from reasoner.refutations import Refutation
-from reasoner.symbols import FALSE, TRUE, Fact, Symbol
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE, XSD
+from confab.reasoner.amounts import bounds, written
+from confab.reasoner.files import as_iri_part
+from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE, XSD
 
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
 STATED = "SELECT ?node ?property ?value WHERE { ?node a :SituatedObjectInstance ; ?property ?value }"

@@ -12,13 +12,13 @@ from itertools import chain
 
 import pyoxigraph as ox
 
-from reasoner.amounts import (
+from confab.reasoner.amounts import (
     exact,
     written,
 )
-from reasoner.graph.knowledge import KnowledgeError, Term, text
-from reasoner.names import Names, local_name
-from reasoner.vocabulary import CORE, OWL, TYPE
+from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
+from confab.reasoner.names import Names, local_name
+from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
 FIRST_INDEX_OF_NONE = 10**9  # what has no index comes last, by name
 DATA = frozenset(CORE + name for name in ("index", "negated", "level", "fromLevel", "firstId", "cost", "update"))

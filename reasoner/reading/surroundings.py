@@ -10,10 +10,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
-from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
-from reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
-from reasoner.reading.problem import Frame, Reading, frame, reading_of
-from reasoner.symbols import (
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
+from confab.reasoner.reading.problem import Frame, Reading, frame, reading_of
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,
@@ -24,7 +24,7 @@ from reasoner.symbols import (
     Witness,
     substituted,
 )
-from reasoner.vocabulary import CORE, TYPE
+from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
 """Situation types or relations as IRIs, each with the places where the individual stands that is looked for."""

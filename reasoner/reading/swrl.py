@@ -1,7 +1,7 @@
 """SWRL rules, as Protégé writes them, compiled into rules of situation types.
 
 ===========================================  ==================================================================
-in SWRL                                      in `reasoner.symbols`
+in SWRL                                      in `confab.reasoner.symbols`
 ===========================================  ==================================================================
 head ``isInside(?x, ?z)``                    `Rule` of the situation type with that value property
 head ``Heavy(?x)``                           `Rule` of the situation type that ``:holdsOf`` the class
@@ -21,12 +21,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from reasoner.amounts import Calculation, Expression, exact
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.language import mentions
-from reasoner.names import local_name
-from reasoner.reading.definitions import INSIDE, Definitions
-from reasoner.symbols import (
+from confab.reasoner.amounts import Calculation, Expression, exact
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import mentions
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.definitions import INSIDE, Definitions
+from confab.reasoner.symbols import (
     TRUE,
     Comparison,
     Condition,
@@ -36,7 +36,7 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.vocabulary import LABEL, RDF, TYPE
+from confab.reasoner.vocabulary import LABEL, RDF, TYPE
 
 SWRL = "http://www.w3.org/2003/11/swrl#"
 BUILT_IN = "http://www.w3.org/2003/11/swrlb#"

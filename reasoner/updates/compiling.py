@@ -1,4 +1,4 @@
-"""What behaviours of a graph say as SPARQL updates, as the individuals that say the same (`reasoner.updates.nodes`)."""
+"""What behaviours of a graph say as SPARQL updates, as the individuals that say the same (`confab.reasoner.updates.nodes`)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import pyoxigraph as ox
 
-from reasoner.names import local_name
-from reasoner.updates.nodes import Writer
-from reasoner.updates.texts import Ask, Place, Update, Vocabulary
-from reasoner.updates.words import UpdateError
-from reasoner.vocabulary import CORE, PREFIXES
+from confab.reasoner.names import local_name
+from confab.reasoner.updates.nodes import Writer
+from confab.reasoner.updates.texts import Ask, Place, Update, Vocabulary
+from confab.reasoner.updates.words import UpdateError
+from confab.reasoner.vocabulary import CORE, PREFIXES
 
 UPDATES = """SELECT ?behavior ?property ?value WHERE {
   VALUES ?property { :update :extends } ?behavior ?property ?value

@@ -15,14 +15,14 @@ from typing import Literal
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
-from reasoner.names import local_name
-from reasoner.reading.problem import as_written, read_schema
-from reasoner.reading.rows import Schema
-from reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
-from reasoner.updates.compiling import compiled
-from reasoner.updates.writing import Situations, update
-from reasoner.vocabulary import CORE, INDIVIDUAL, LABEL, SKOS, TYPE, XSD
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import as_written, read_schema
+from confab.reasoner.reading.rows import Schema
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Witness, substituted
+from confab.reasoner.updates.compiling import compiled
+from confab.reasoner.updates.writing import Situations, update
+from confab.reasoner.vocabulary import CORE, INDIVIDUAL, LABEL, SKOS, TYPE, XSD
 
 TOKEN = re.compile(
     r'"""(?:[^"\\]|\\.|"(?!""))*"""|\'\'\'(?:[^\'\\]|\\.|\'(?!\'\'))*\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\''

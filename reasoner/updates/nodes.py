@@ -29,10 +29,10 @@ from typing import Any, TypeAlias
 
 import pyoxigraph as ox
 
-from reasoner.amounts import written
-from reasoner.names import local_name, nearest
-from reasoner.updates.texts import Place, Update, Vocabulary
-from reasoner.updates.words import (
+from confab.reasoner.amounts import written
+from confab.reasoner.names import local_name, nearest
+from confab.reasoner.updates.texts import Place, Update, Vocabulary
+from confab.reasoner.updates.words import (
     A,
     Number,
     Operation,
@@ -48,7 +48,7 @@ from reasoner.updates.words import (
     triples,
     words,
 )
-from reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE, XSD
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE, XSD
 
 SIGNS = {sign: sign for sign in ("<", "<=", "=", ">=", ">")} | {"!=": "="}
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}

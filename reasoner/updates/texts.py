@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from reasoner.names import local_name
+from confab.reasoner.names import local_name
 
 Ask = Callable[[str], Sequence[Sequence[Any]]]
 """Returns the rows of a query."""

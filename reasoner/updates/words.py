@@ -17,8 +17,8 @@ from typing import Any
 
 import pyparsing
 
-from reasoner.files import silent_about_numbers
-from reasoner.vocabulary import RDF
+from confab.reasoner.files import silent_about_numbers
+from confab.reasoner.vocabulary import RDF
 
 A = "a"
 FIRST, REST, NIL = (RDF + name for name in ("first", "rest", "nil"))

@@ -1,4 +1,4 @@
-"""A behaviour written as the SPARQL update that `reasoner.updates.compiling` reads as the same behaviour.
+"""A behaviour written as the SPARQL update that `confab.reasoner.updates.compiling` reads as the same behaviour.
 
 Parameters come first, each with its type; then one condition a line. What the situation determines has its type behind the
 condition that determines it, unless every value of the situation will do.
@@ -11,9 +11,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, written
-from reasoner.language import walk
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
+from confab.reasoner.language import walk
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

@@ -6,10 +6,10 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence, Set
 
-from reasoner.amounts import terms_of
-from reasoner.language import mentions
-from reasoner.sentences import said
-from reasoner.symbols import (
+from confab.reasoner.amounts import terms_of
+from confab.reasoner.language import mentions
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -22,12 +22,12 @@ from reasoner.symbols import (
     Witness,
     substituted,
 )
-from reasoner.validation.case import Case, Fault
-from reasoner.validation.contradictions import dead
-from reasoner.validation.quantities import some
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.contradictions import dead
+from confab.reasoner.validation.quantities import some
 
 EVERY_OTHER = re.compile(r"\?each\d")
-"""Who a class stands for where another one stands for somebody already (`reasoner.reading.parts`)."""
+"""Who a class stands for where another one stands for somebody already (`confab.reasoner.reading.parts`)."""
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
@@ -271,7 +271,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
     for symbol, value in sorted(problem.initial.items()):
         perceived = problem.domain.situations[symbol.situation].perceived
         if perceived is not None and perceived.exclusive:
-            continue  # an error: `reasoner.validation.situations`
+            continue  # an error: `confab.reasoner.validation.situations`
         if len(symbol.arguments) == 1 and asks.get((symbol.situation, value)):
             holders[symbol.situation, value].append(symbol.arguments[0])
     for (situation, value), individuals in holders.items():

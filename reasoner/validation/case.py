@@ -9,9 +9,9 @@ from functools import cached_property
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
-from reasoner.reading.problem import Reading
-from reasoner.vocabulary import RDF
+from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
+from confab.reasoner.reading.problem import Reading
+from confab.reasoner.vocabulary import RDF
 
 Fault = tuple[str, str, str, str]
 """Node, what, why, remedy."""

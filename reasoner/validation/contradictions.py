@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from reasoner.amounts import COMPARING, Amount
-from reasoner.language import groups
-from reasoner.sentences import said
-from reasoner.symbols import (
+from confab.reasoner.amounts import COMPARING, Amount
+from confab.reasoner.language import groups
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
@@ -23,8 +23,8 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.validation.case import Case, Fault
-from reasoner.validation.definitions import both
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.definitions import both
 
 Clash = tuple[Condition, Condition]
 """Two conditions that no state satisfies together."""

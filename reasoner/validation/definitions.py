@@ -7,19 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 
 import pyoxigraph as ox
 
-from reasoner.derivation import needed
-from reasoner.names import local_name
-from reasoner.reading.definitions import Definitions
-from reasoner.reading.rows import Node, Schema
-from reasoner.symbols import (
+from confab.reasoner.derivation import needed
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.rows import Node, Schema
+from confab.reasoner.symbols import (
     ClassCondition,
     Domain,
     Parameter,
     Rule,
     ValueCondition,
 )
-from reasoner.validation.case import Case, Fault
-from reasoner.vocabulary import CORE, OWL, RDF, RDFS
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 
 AXIOMS_OF_PROPERTIES = {
     OWL + "TransitiveProperty": "is transitive",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,
@@ -25,7 +25,7 @@ from reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Case, Fault
 
 
 def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import KnowledgeGraph, readable
-from reasoner.names import local_name
-from reasoner.updates.texts import Place
-from reasoner.vocabulary import CORE, RDFS
+from confab.reasoner.graph.knowledge import KnowledgeGraph, readable
+from confab.reasoner.names import local_name
+from confab.reasoner.updates.texts import Place
+from confab.reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
 CAUSES = ("unreadable", "undeclared-term")

@@ -27,13 +27,13 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph
-from reasoner.limits import LimitError, check, current
-from reasoner.names import local_name
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import Behavior, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
-from reasoner.vocabulary import OWL, RDF
-from reasoner.workers import CPU_SECONDS, end, start
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph
+from confab.reasoner.limits import LimitError, check, current
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import Behavior, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
+from confab.reasoner.vocabulary import OWL, RDF
+from confab.reasoner.workers import CPU_SECONDS, end, start
 
 PROTOTYPE = "urn:confab:prototype:"
 NUMBER = "urn:confab:number:"

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import inf
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
-from reasoner.language import groups, walk
-from reasoner.sentences import counted, said
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
+from confab.reasoner.language import groups, walk
+from confab.reasoner.sentences import counted, said
+from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     ClassCondition,
@@ -19,8 +19,8 @@ from reasoner.symbols import (
     Problem,
     Witness,
 )
-from reasoner.validation.case import Case, Fault
-from reasoner.vocabulary import CORE
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.vocabulary import CORE
 
 
 def unlike_units(case: Case) -> Iterator[Fault]:

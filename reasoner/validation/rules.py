@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from reasoner.validation import behaviors, contradictions, definitions, quantities, situations, terms
-from reasoner.validation.case import Case, Fault
-from reasoner.validation.exclusive import values_not_kept_exclusive
+from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, situations, terms
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "undeclared-term": terms.undeclared_terms,

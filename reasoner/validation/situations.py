@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reasoner.possible import against_physics
-from reasoner.validation.case import Case, Fault
+from confab.reasoner.possible import against_physics
+from confab.reasoner.validation.case import Case, Fault
 
 
 def impossible_situations(case: Case) -> Iterator[Fault]:

@@ -11,12 +11,12 @@ from urllib.parse import unquote
 
 import pyoxigraph as ox
 
-import ontology
-from reasoner.graph.knowledge import SCENE, text
-from reasoner.names import local_name, nearest
-from reasoner.reading.swrl import SWRL
-from reasoner.validation.case import Case, Fault
-from reasoner.vocabulary import OWL, RDF, RDFS, XSD
+from confab import ontology
+from confab.reasoner.graph.knowledge import SCENE, text
+from confab.reasoner.names import local_name, nearest
+from confab.reasoner.reading.swrl import SWRL
+from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.vocabulary import OWL, RDF, RDFS, XSD
 
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"))
 ATOMS = (SWRL + "argument1", SWRL + "argument2")

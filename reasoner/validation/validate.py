@@ -5,10 +5,10 @@ what checks         where it is said
 ==================  ========================================================================
 form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
-our own rules       `reasoner.validation.rules.RULES`, for what a query can't say well
-measures of bodies  `reasoner.embodiment.measures.RULES`, where there is a robot
-joints, features    `reasoner.embodiment.joint_checks.RULES`, likewise
-skills in phases    `reasoner.embodiment.skill_checks.RULES`, likewise
+our own rules       `confab.reasoner.validation.rules.RULES`, for what a query can't say well
+measures of bodies  `confab.reasoner.embodiment.measures.RULES`, where there is a robot
+joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, likewise
+skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, likewise
 logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
 ==================  ========================================================================
 """
@@ -25,22 +25,22 @@ from typing import TYPE_CHECKING
 
 import pyoxigraph as ox
 
-import ontology
-from reasoner.embodiment import joint_checks, measures, skill_checks
-from reasoner.embodiment.facts import EmbodimentError
-from reasoner.embodiment.reading import read_embodiment
-from reasoner.files import silent_about_numbers
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file, text
-from reasoner.names import local_name
-from reasoner.reading.problem import Reading, read
-from reasoner.updates.compiling import Fault
-from reasoner.validation.case import Case
-from reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
-from reasoner.validation.rules import REMARKS, RULES, WARNINGS
-from reasoner.validation.situations import impossible_situations
-from reasoner.validation.terms import misread
-from reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
+from confab import ontology
+from confab.reasoner.embodiment import joint_checks, measures, skill_checks
+from confab.reasoner.embodiment.facts import EmbodimentError
+from confab.reasoner.embodiment.reading import read_embodiment
+from confab.reasoner.files import silent_about_numbers
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file, text
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.updates.compiling import Fault
+from confab.reasoner.validation.case import Case
+from confab.reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
+from confab.reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from confab.reasoner.validation.situations import impossible_situations
+from confab.reasoner.validation.terms import misread
+from confab.reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:
     import rdflib
@@ -104,7 +104,7 @@ def validate(
     ------
     KnowledgeError
         There is no such file.
-    reasoner.validation.hermit.NoJavaError
+    confab.reasoner.validation.hermit.NoJavaError
         `deep` is wanted and there is no Java; the message says how to get one.
     """
     return unique(finding for file in files for finding in _validate_one(file, deep, done or (lambda _: None)))
@@ -182,7 +182,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     yield from _by_rules(case, places, found)
     if deep:
         done(f"asking HermiT about {path.name}")
-        from reasoner.validation.hermit import faults as deep_faults
+        from confab.reasoner.validation.hermit import faults as deep_faults
 
         for rule, node, what, why, remedy in deep_faults(graph):
             yield places.finding(rule, node, what, why, remedy)

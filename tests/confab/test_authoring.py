@@ -7,13 +7,13 @@ import pytest
 from click.testing import CliRunner
 
 import confab
-import ontology
+from confab import ontology
 from confab.authoring import difference, migrate, new_domain, unknown_terms
 from confab.cli import app
 from confab.reaching import with_current_reach
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.links_file import memory_lines
-from reasoner.validation.validate import validate
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.links_file import memory_lines
+from confab.reasoner.validation.validate import validate
 
 
 def test_a_new_domain_validates_and_can_be_planned_in(tmp_path: Path) -> None:

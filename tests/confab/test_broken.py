@@ -18,14 +18,14 @@ import confab
 from confab.authoring import migrate, new_domain
 from confab.cli import main
 from confab.memory import Memory
+from confab.ontology import ROOT
+from confab.ontology import scenes as shipped_scenes
+from confab.reasoner.files import alone, write_whole
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.limits import Deadline, LimitError, current
+from confab.reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 from confab.terminal import BUG, GAVE_UP, INTERRUPTED, MISUSE, YES, Ending, ended_by, run_to_end
-from ontology import ROOT
-from ontology import scenes as shipped_scenes
-from reasoner.files import alone, write_whole
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from reasoner.limits import Deadline, LimitError, current
-from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
 
 Answer = tuple[int, str, str]
 Ask = Callable[..., Answer]
@@ -170,7 +170,7 @@ def test_what_is_read_only_or_no_ordinary_file_stays_and_the_message_names_it(tm
 
 def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
     program = (
-        "import resource, sys; from pathlib import Path; from reasoner.files import write_whole\n"
+        "import resource, sys; from pathlib import Path; from confab.reasoner.files import write_whole\n"
         "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
         "try: write_whole(Path(sys.argv[1]), 'x' * 5000)\nexcept OSError as error: print(error.filename, error.strerror)"
     )
@@ -551,7 +551,7 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
 
     server = http.server.HTTPServer(("127.0.0.1", 0), Handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    from reasoner.graph import apart
+    from confab.reasoner.graph import apart
 
     scene, url = confab.load("living-room"), f"<http://127.0.0.1:{server.server_port}/q>"
     query = f"SELECT * WHERE {{ SERVICE SILENT {url} {{ ?a ?b ?c }} }}"
@@ -567,7 +567,7 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ['"SERVICE"', "<urn:SERVICE>", "?service", ":SERVICE", "'''a\nSERVICE'''"])
 def test_the_word_service_may_be_spoken_of(text: str) -> None:
-    from reasoner.graph.apart import SERVICE, TEXTS
+    from confab.reasoner.graph.apart import SERVICE, TEXTS
 
     assert SERVICE.search(TEXTS.sub(" ", f"SELECT * {{ ?a ?b {text} }}")) is None
 
@@ -666,7 +666,7 @@ def test_no_look_for_faults_outlasts_the_time_limit(tearoom: Path, ask: Ask, mon
         looked.append(current().seconds)
         raise LimitError("gave up")
 
-    monkeypatch.setattr("reasoner.validation.validate.quick_errors", slowly)
+    monkeypatch.setattr("confab.reasoner.validation.validate.quick_errors", slowly)
     assert ask("plan", tearoom, "--time-limit", "60")[0] == YES
     assert looked == [60.0]
 
@@ -765,12 +765,12 @@ main()
 @pytest.mark.parametrize(
     ("command", "moment"),
     [
-        ("run one-arm-serving --no-video --out . --memory m.ttl", "sim.world:World.execute"),
-        ("run towers-small --no-video --out . --memory m.ttl", "reasoner.files:os.fsync"),
-        ("plan living-room -o p.json", "planner.validation:validate"),
-        ("plan living-room -o p.json", "reasoner.files:os.fsync"),
-        ("learn living-room --memory m.ttl", "reasoner.files:os.fsync"),
-        ("query living-room ASK{?s?p?o}", "reasoner.graph.apart:QueryWorker._send"),
+        ("run one-arm-serving --no-video --out . --memory m.ttl", "confab.sim.world:World.execute"),
+        ("run towers-small --no-video --out . --memory m.ttl", "confab.reasoner.files:os.fsync"),
+        ("plan living-room -o p.json", "confab.planner.validation:validate"),
+        ("plan living-room -o p.json", "confab.reasoner.files:os.fsync"),
+        ("learn living-room --memory m.ttl", "confab.reasoner.files:os.fsync"),
+        ("query living-room ASK{?s?p?o}", "confab.reasoner.graph.apart:QueryWorker._send"),
         ("serve living-room --port 0", "socket:create_server"),
     ],
 )

@@ -12,8 +12,8 @@ from rich.console import Console
 
 from confab import load
 from confab.commands.given import blame_reach
-from planner.plan import Outcome, Status
-from reasoner.limits import Deadline
+from confab.planner.plan import Outcome, Status
+from confab.reasoner.limits import Deadline
 
 
 def confab(*arguments: str, cwd: Path | None = None, **env: str) -> subprocess.CompletedProcess[str]:

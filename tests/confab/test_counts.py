@@ -16,13 +16,13 @@ from rdflib.plugins.stores.memory import SimpleMemory
 
 import confab
 from confab.checking import refused
-from planner.solve import Request, solve
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
-from reasoner.names import local_name
-from reasoner.reading.problem import SCHEMA
-from reasoner.reading.relevance import recognise
-from reasoner.reading.rows import Member, Schema
+from confab.planner.solve import Request, solve
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import SCHEMA
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.reading.rows import Member, Schema
 
 
 class Looked(SimpleMemory):
@@ -143,7 +143,7 @@ def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
         found = {text(x) for (x,) in graph.select("SELECT ?x WHERE { ?x a owl:NamedIndividual }", SCENE)}
         return {x for x in found if local_name(x) in endings} - {individual for individual, _, _ in members}
 
-    monkeypatch.setattr("reasoner.reading.relevance._namesakes", namesakes)
+    monkeypatch.setattr("confab.reasoner.reading.relevance._namesakes", namesakes)
     path = tmp_path / "scene.ttl"
     write_scene(path, "served")
     alone = counted(path)
@@ -186,13 +186,13 @@ UNWANTED = (
     ),
     *(
         "sim",
-        "planner.acting",
-        "planner.experience",
-        "planner.grounded",
-        "reasoner.embodiment",
-        "reasoner.validation",
-        "reasoner.pddl",
-        "reasoner.memory.experience_file",
+        "confab.planner.acting",
+        "confab.planner.experience",
+        "confab.planner.grounded",
+        "confab.reasoner.embodiment",
+        "confab.reasoner.validation",
+        "confab.reasoner.pddl",
+        "confab.reasoner.memory.experience_file",
     ),
 )
 """What a plan in a shipped scene has no use for: heavy, or other commands' rooms."""
@@ -227,6 +227,6 @@ def test_the_plan_command_imports_what_it_needs() -> None:
 
 
 def test_what_it_doesnt_need_is_noticed() -> None:
-    modules = imported("import rdflib, planner.grounded.task")
-    assert {name for name in modules if name in UNWANTED} >= {"rdflib", "planner.grounded"}
+    modules = imported("import rdflib, confab.planner.grounded.task")
+    assert {name for name in modules if name in UNWANTED} >= {"rdflib", "confab.planner.grounded"}
     assert len(modules) - own(modules) > MOST_MODULES

@@ -15,16 +15,16 @@ import confab
 from confab import engines
 from confab.cli import app
 from confab.engines import Answer, answer, at_rest, plan_by_engine, some_installed
-from planner.grounded.best_first import search
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.plan import Outcome, Reason, Status
-from planner.validation import validate
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import Deadline
-from reasoner.pddl.exporting import to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
+from confab.planner.grounded.best_first import search
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
 
 SCENE = "beverage-serving-moved"
 
@@ -86,7 +86,7 @@ def test_what_is_no_plan_is_said_to_be_none(
 
 def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     gave_up = Outcome(Status.GAVE_UP, reason=Reason("the limit came first"))
-    monkeypatch.setattr("planner.hierarchical.planner.plan", lambda *_, **__: gave_up)
+    monkeypatch.setattr("confab.planner.hierarchical.planner.plan", lambda *_, **__: gave_up)
     scene = confab.load(SCENE)
     result = scene.plan(time_limit=60)
     assert result.solved and result.json()["engine"] == "any"

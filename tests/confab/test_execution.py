@@ -10,16 +10,16 @@ import pytest
 from rich.console import Console
 
 import confab
-import ontology
+from confab import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from planner.acting.episode import Change, Intervention
-from planner.acting.executive import Moment
-from planner.acting.symbolic_world import SymbolicWorld
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
-from reasoner.memory.episodes import assert_episode
-from reasoner.validation.validate import validate
-from reasoner.vocabulary import EPISODES, PROV
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.executive import Moment
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
+from confab.reasoner.memory.episodes import assert_episode
+from confab.reasoner.validation.validate import validate
+from confab.reasoner.vocabulary import EPISODES, PROV
 
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 

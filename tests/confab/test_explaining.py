@@ -6,8 +6,8 @@ import pytest
 
 import confab
 from confab.explaining import Explanation, explain
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import Ground
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import Ground
 from worlds.lessons import taught
 
 STEPS: list[Ground] = [("B1_MOVE", ("cup1", "location7"))]

@@ -9,7 +9,7 @@ import rdflib
 
 import confab
 from confab.picturing import class_tree
-from reasoner.generate import write_scene
+from confab.reasoner.generate import write_scene
 
 TABLETOP = rdflib.Namespace("https://w3id.org/confab/tabletop#")
 SERVING = rdflib.Namespace("https://w3id.org/confab/beverage-serving#")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks import fuzz
-from planner.plan import Outcome, Reason, Status
-from planner.solve import Request
+from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.solve import Request
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch,
 
 
 def test_a_plan_that_is_none_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.validation.validate", lambda *_: ["seeded"])
+    monkeypatch.setattr("confab.planner.validation.validate", lambda *_: ["seeded"])
     monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)
     assert failure is not None

@@ -9,8 +9,8 @@ import confab
 from confab.cli import app
 from confab.labels import Labels
 from confab.lifted import Sayings
-from reasoner.sentences import denied
-from reasoner.symbols import (
+from confab.reasoner.sentences import denied
+from confab.reasoner.symbols import (
     Condition,
     Domain,
     EqualityCondition,

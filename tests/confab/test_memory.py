@@ -12,13 +12,13 @@ from click.testing import CliRunner
 import confab
 from confab.authoring import unknown_terms
 from confab.cli import app
-from planner.acting.episode import Failure
-from planner.plan import Plan
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
-from reasoner.memory.links import Links
-from reasoner.memory.links_file import memory_lines
+from confab.planner.acting.episode import Failure
+from confab.planner.plan import Plan
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
+from confab.reasoner.memory.links import Links
+from confab.reasoner.memory.links_file import memory_lines
 
 
 @pytest.fixture(scope="module")

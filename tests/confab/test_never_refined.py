@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import confab
-from planner.plan import Status
-from reasoner.graph.knowledge import KnowledgeError
+from confab.planner.plan import Status
+from confab.reasoner.graph.knowledge import KnowledgeError
 from tests.reasoner.worlds import HEAD
 
 WORLD = """

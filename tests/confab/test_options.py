@@ -8,13 +8,13 @@ import pytest
 import confab
 from confab import cli
 from confab.authoring import new_domain
-from planner.plan import Outcome, Plan, Status
-from planner.solve import MODES
-from reasoner.generate import write_scene
-from reasoner.memory.links import Links
-from reasoner.reading.observed import save_observed
-from reasoner.reading.relevance import recognise
-from reasoner.symbols import Symbol
+from confab.planner.plan import Outcome, Plan, Status
+from confab.planner.solve import MODES
+from confab.reasoner.generate import write_scene
+from confab.reasoner.memory.links import Links
+from confab.reasoner.reading.observed import save_observed
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.symbols import Symbol
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.outputs import DOORS, FILES, KIND_OF, LINKS, Door, answers, call, inside, prepare
-from reasoner.files import check_replaceable, write_whole
-from reasoner.kinds import GENERATED, MEMORY, PLAN, REPORT, kind_of, stamped
+from confab.reasoner.files import check_replaceable, write_whole
+from confab.reasoner.kinds import GENERATED, MEMORY, PLAN, REPORT, kind_of, stamped
 
 
 @pytest.fixture(scope="module")

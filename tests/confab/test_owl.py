@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 import confab
-import ontology
+from confab import ontology
 from confab.authoring import new_domain
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.validation.validate import validate
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.validation.validate import validate
 
 LABELS = "SELECT ?label WHERE { <https://example.org/tearoom-scene#plate3> rdfs:label ?label }"
 

@@ -14,14 +14,14 @@ from rich.console import Console
 import confab
 from confab.authoring import new_domain
 from confab.physics import Report, on_trust
+from confab.planner.plan import Plan
+from confab.reasoner.embodiment.reach import reach_hash
+from confab.reasoner.symbols import Symbol
 from confab.show import plan_tree, show
-from planner.plan import Plan
-from reasoner.embodiment.reach import reach_hash
-from reasoner.symbols import Symbol
-from sim.faults import hidden_wall
-from sim.reach import fingerprint, reach
-from sim.verdict import SkillError, Verdict
-from sim.verify import Rollout
+from confab.sim.faults import hidden_wall
+from confab.sim.reach import fingerprint, reach
+from confab.sim.verdict import SkillError, Verdict
+from confab.sim.verify import Rollout
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_the_committed_reach_facts_fit_the_geometry() -> None:
 
 
 def test_a_scene_that_is_symbolic_only_is_refused_by_name(tmp_path: Path) -> None:
-    from reasoner.generate import write_scene
+    from confab.reasoner.generate import write_scene
 
     write_scene(tmp_path / "table.ttl", "served")
     symbolic = confab.load(tmp_path / "table.ttl")
@@ -167,8 +167,8 @@ def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
     scene: confab.Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a window, PyBullet's server refuses to draw; what is asked of it can be seen all the same."""
-    from sim.screen import Screen
-    from sim.world import World
+    from confab.sim.screen import Screen
+    from confab.sim.world import World
 
     written: list[str] = []
 
@@ -176,8 +176,8 @@ def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
         written.append(text)
         return 7
 
-    monkeypatch.setattr("sim.screen.pybullet.addUserDebugText", write)
-    monkeypatch.setattr("sim.engine.pybullet.GUI", pybullet.DIRECT)
+    monkeypatch.setattr("confab.sim.screen.pybullet.addUserDebugText", write)
+    monkeypatch.setattr("confab.sim.engine.pybullet.GUI", pybullet.DIRECT)
     begin = time.monotonic()
     with World(scene.embodiment, scene.problem.initial, watch=Screen(("REACH", "GRASP"), 4.0), gui=True) as world:
         for world.current in (0, 1):

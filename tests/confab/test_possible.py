@@ -7,10 +7,10 @@ import pytest
 
 import confab
 from confab.board import Sheet
-from reasoner.possible import impossible
-from reasoner.reading.observed import load_observed, save_observed
-from reasoner.symbols import Fact, Symbol
-from reasoner.validation.validate import validate
+from confab.reasoner.possible import impossible
+from confab.reasoner.reading.observed import load_observed, save_observed
+from confab.reasoner.symbols import Fact, Symbol
+from confab.reasoner.validation.validate import validate
 
 TWICE = "cup1 and cup2 have the same LOCATION, location1; state another LOCATION of one of them"
 HELD = "<left_hand, HOLDS> is cup1, but <cup1, LOCATION> is location2, and left_hand isn't at it"

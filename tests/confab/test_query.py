@@ -9,15 +9,15 @@ import rdflib
 from click.testing import CliRunner
 
 import confab
-import ontology
+from confab import ontology
 from confab.authoring import new_domain
 from confab.cli import app
 from confab.following import _following
-from reasoner.graph.apart import QueryLimits
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.limits import LimitError, within
-from reasoner.reading.affordance import SITUATION
-from reasoner.validation.validate import quick_errors
+from confab.reasoner.graph.apart import QueryLimits
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError, within
+from confab.reasoner.reading.affordance import SITUATION
+from confab.reasoner.validation.validate import quick_errors
 
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
 OF_CUP1 = "SELECT ?where WHERE { :cup1 k:location ?where }"

@@ -7,16 +7,16 @@ from shutil import copy
 import pytest
 
 import confab
-import ontology
+from confab import ontology
 from confab.physics import Report
+from confab.reasoner.refutations import Refutation
+from confab.reasoner.symbols import Fact, Symbol
 from confab.refuting import keep, knowing, refuted_in
 from confab.scene import Scene
-from reasoner.refutations import Refutation
-from reasoner.symbols import Fact, Symbol
-from sim.swings import check_swing
-from sim.verdict import SkillError
-from sim.verify import expectations
-from sim.world import World
+from confab.sim.swings import check_swing
+from confab.sim.verdict import SkillError
+from confab.sim.verify import expectations
+from confab.sim.world import World
 
 BLOCKED = "blocked-cupboard"
 IN_THE_WAY = Fact(Symbol("LOCATION", ("bottle",)), "before_door")

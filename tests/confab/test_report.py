@@ -16,15 +16,15 @@ from click.testing import CliRunner
 import confab
 from confab.cli import app
 from confab.memory import Memory
+from confab.planner.plan import Plan
 from confab.report.course import of_episode, of_plan, of_rollout
 from confab.report.maps import ground_of
 from confab.report.notebook import SHOWN
 from confab.report.page import report_html
 from confab.report.pieces import anchor
+from confab.sim.verdict import Verdict
+from confab.sim.verify import Rollout, StepReport
 from confab.table import Table
-from planner.plan import Plan
-from sim.verdict import Verdict
-from sim.verify import Rollout, StepReport
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = [

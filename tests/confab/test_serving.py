@@ -22,8 +22,8 @@ from rdflib.plugins.stores.sparqlstore import SPARQLStore
 
 import confab
 from benchmarks.load import measured
+from confab.reasoner.graph.apart import QueryLimits
 from confab.serving import AT_ONCE, Server, serving
-from reasoner.graph.apart import QueryLimits
 
 CUPS = "SELECT ?cup ?where WHERE { ?cup a k:Cup ; k:location ?where } ORDER BY ?cup"
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"

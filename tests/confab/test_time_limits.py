@@ -13,12 +13,12 @@ import confab
 from confab.cli import COMMANDS, app
 from confab.commands.options import Seconds
 from confab.execution import Execution
+from confab.planner.plan import Status
 from confab.planning import Result
+from confab.reasoner.generate import write_scene
+from confab.reasoner.limits import LimitError, OutOfTimeError, current
 from confab.scene import Scene
 from confab.terminal import GAVE_UP
-from planner.plan import Status
-from reasoner.generate import write_scene
-from reasoner.limits import LimitError, OutOfTimeError, current
 
 SOON, SLACK = 0.1, 1.5
 """The limit, and CPU seconds within which a call ends, imports included: without a limit each takes longer, or doesn't end."""

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 import confab
 from confab.checking import refused
-from planner.plan import Plan, Status, Step
-from planner.validation import Fault, carried_out, successor, validate
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.language import DomainError
-from reasoner.reading import relevance
-from reasoner.reading.problem import read
-from reasoner.reading.rows import Triple
-from reasoner.symbols import Problem, State
+from confab.planner.plan import Plan, Status, Step
+from confab.planner.validation import Fault, carried_out, successor, validate
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import DomainError
+from confab.reasoner.reading import relevance
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.rows import Triple
+from confab.reasoner.symbols import Problem, State
 from tests.reasoner.worlds import graph_of, worlds
 
 CASES = Path(__file__).parent / "cases"

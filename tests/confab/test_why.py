@@ -9,9 +9,9 @@ import confab
 from confab.cli import app
 from confab.labels import labels_of
 from confab.lifted import Sayings
-from planner.plan_costs import cost_of
-from planner.validation import validate
-from reasoner.memory.experience import ITSELF
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import validate
+from confab.reasoner.memory.experience import ITSELF
 
 DOMAIN = """(define (domain lamps) (:requirements :strips :typing) (:types lamp room)
  (:predicates (in ?r - room) (door ?a ?b - room) (lit ?l - lamp) (hangs ?l - lamp ?r - room))

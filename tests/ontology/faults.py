@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import ontology
-from reasoner.validation.findings import Finding
-from reasoner.validation.validate import validate
+from confab import ontology
+from confab.reasoner.validation.findings import Finding
+from confab.reasoner.validation.validate import validate
 
 NAME, WITH_BODIES = "washing", "watering"
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "validation.md"

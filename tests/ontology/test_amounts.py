@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-import ontology
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import read
-from reasoner.validation.validate import validate
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.validation.validate import validate
 
 CATALOG = """<catalog prefer="public" xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
 <uri name="https://w3id.org/confab/canteen" uri="canteen.ttl"/></catalog>"""

@@ -2,14 +2,14 @@
 
 import pytest
 
-from planner.validation import successor
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeGraph, load
-from reasoner.names import local_name
-from reasoner.reading.problem import read
-from reasoner.symbols import Symbol
-from reasoner.validation.case import Case
-from reasoner.validation.exclusive import values_not_kept_exclusive
+from confab.planner.validation import successor
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeGraph, load
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Symbol
+from confab.reasoner.validation.case import Case
+from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
 PREFIXES = (
     "PREFIX owl: <http://www.w3.org/2002/07/owl#> PREFIX k: <https://w3id.org/confab/tabletop#> "

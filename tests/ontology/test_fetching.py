@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph import fetching
-from reasoner.graph.fetching import fetch
-from reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.graph import fetching
+from confab.reasoner.graph.fetching import fetch
+from confab.reasoner.graph.knowledge import KnowledgeError, load
 
 TURTLE = "<{iri}> a <http://www.w3.org/2002/07/owl#Ontology> {more} .\n"
 XML = (

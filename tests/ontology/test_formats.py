@@ -7,8 +7,8 @@ import pytest
 
 import confab
 from confab.authoring import new_domain
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.updates.converting import convert
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.updates.converting import convert
 
 FORMS = {
     "nt": ox.RdfFormat.N_TRIPLES,
@@ -102,7 +102,7 @@ def test_brackets_in_texts_and_many_that_are_closed_are_no_depth(tmp_path: Path)
 def test_json_ld_that_explodes_is_parsed_where_it_takes_nothing_along(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("reasoner.graph.documents.MEGABYTES", 300)
+    monkeypatch.setattr("confab.reasoner.graph.documents.MEGABYTES", 300)
     terms = ",".join(f'"t{i}": "urn:t{i}"' for i in range(10_000))
     level = '{"@context": {"x": "urn:x"}, "@id": "urn:b", "t2":'
     file = tmp_path / "wide.jsonld"

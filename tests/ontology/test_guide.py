@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-import ontology
+from confab import ontology
 from confab.authoring import new_domain
-from reasoner.graph.knowledge import load, text
-from reasoner.names import local_name
-from reasoner.validation.validate import validate
-from sim.perception import BUILT_IN as PERCEIVERS
-from sim.skills import BUILT_IN as SKILLS
+from confab.reasoner.graph.knowledge import load, text
+from confab.reasoner.names import local_name
+from confab.reasoner.validation.validate import validate
+from confab.sim.perception import BUILT_IN as PERCEIVERS
+from confab.sim.skills import BUILT_IN as SKILLS
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "authoring.md"
 BLOCK = re.compile(r"^```(turtle|console)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from reasoner.validation.hermit import classify
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from confab.reasoner.validation.hermit import classify
 
 pytestmark = pytest.mark.slow
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-import ontology
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.names import local_name
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.names import local_name
 from tests.ontology.faults import skeleton
 from worlds.owlapi import ontology_iri
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.names import local_name
-from reasoner.validation.findings import Finding
-from reasoner.validation.validate import validate
+from confab.reasoner.names import local_name
+from confab.reasoner.validation.findings import Finding
+from confab.reasoner.validation.validate import validate
 from worlds.entailed import implies
 
 THEATRE = Path(__file__).parents[2] / "docs" / "examples" / "theatre"

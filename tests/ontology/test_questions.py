@@ -10,10 +10,10 @@ from pathlib import Path
 import pyoxigraph as ox
 import pytest
 
-import ontology
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeGraph, load, text
-from reasoner.names import local_name
+from confab import ontology
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
+from confab.reasoner.names import local_name
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import pyoxigraph as ox
 import pytest
 
 import confab
-import ontology
-from reasoner.generate import write_scene
-from reasoner.reading.observed import save_observed
+from confab import ontology
+from confab.reasoner.generate import write_scene
+from confab.reasoner.reading.observed import save_observed
 from tests.ontology.faults import WITH_BODIES, skeleton
 from tests.ontology.test_imports import TEMPLATES
 from tests.planner.test_costs import DELIVERY

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import confab
-import ontology
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.validation.findings import listing
-from reasoner.validation.hermit import NoJavaError
-from reasoner.validation.rules import REMARKS, RULES, WARNINGS
-from reasoner.validation.validate import checks, quick_errors, validate
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.validation.findings import listing
+from confab.reasoner.validation.hermit import NoJavaError
+from confab.reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from confab.reasoner.validation.validate import checks, quick_errors, validate
 from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, found, seed, skeleton
 
 

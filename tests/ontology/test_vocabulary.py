@@ -8,9 +8,9 @@ import pytest
 import rdflib
 from rdflib import OWL, RDF, RDFS, SKOS
 
-import ontology
 from benchmarks import vocabulary
-from reasoner.validation.hermit import NoJavaError, java
+from confab import ontology
+from confab.reasoner.validation.hermit import NoJavaError, java
 
 SYNC = """
 import contextlib, io, sys, owlready2

@@ -1,4 +1,4 @@
-"""A second reading of `reasoner.symbols`, as slow and as plain as possible: every binding is tried, states are dictionaries."""
+"""A second, slow and plain reading of `confab.reasoner.symbols`: every binding is tried, states are dictionaries."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
-from reasoner.amounts import Amount, Calculation, Expression, Measure, meets, written
-from reasoner.derivation import strata
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, meets, written
+from confab.reasoner.derivation import strata
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

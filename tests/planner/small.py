@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from reasoner.symbols import (
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -8,20 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.acting.episode import Change, End, Episode, Intervention
-from planner.acting.executive import Moment, Patience, act
-from planner.acting.failure_memory import Caution
-from planner.acting.symbolic_world import Said, SymbolicWorld
-from planner.hierarchical.planner import plan
-from planner.paper.hierarchy import plan as paper_plan
-from planner.paper.learning import learn
-from planner.plan import Plan, Step
-from planner.validation import successor, validate
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import load
-from reasoner.memory.links import Links
-from reasoner.reading.problem import read
-from reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+from confab.planner.acting.episode import Change, End, Episode, Intervention
+from confab.planner.acting.executive import Moment, Patience, act
+from confab.planner.acting.failure_memory import Caution
+from confab.planner.acting.symbolic_world import Said, SymbolicWorld
+from confab.planner.hierarchical.planner import plan
+from confab.planner.paper.hierarchy import plan as paper_plan
+from confab.planner.paper.learning import learn
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import successor, validate
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.memory.links import Links
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 SERVED_AS_IN_FIGURE_8 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},

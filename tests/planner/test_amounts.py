@@ -6,13 +6,22 @@ from fractions import Fraction
 import pytest
 
 import confab
-from planner.grounded.best_first import plan_level
-from planner.plan import Limits, Outcome, Status
-from planner.solve import Request, solve
-from reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.symbols import AmountEffect, Behavior, Comparison, Parameter, Problem, SituationType, Symbol, ValueEffect
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.solve import Request, solve
+from confab.reasoner.amounts import Amount, Calculation, Quantity, bounds_written, meets, written
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.symbols import (
+    AmountEffect,
+    Behavior,
+    Comparison,
+    Parameter,
+    Problem,
+    SituationType,
+    Symbol,
+    ValueEffect,
+)
 from worlds.writing import becomes, has, world
 
 JUG, CUP = Parameter("?j", "Jug"), Parameter("?c", "Cup")

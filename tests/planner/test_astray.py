@@ -2,13 +2,13 @@
 
 import pytest
 
-from planner.hierarchical import refinement_cache
-from planner.hierarchical.planner import beside, plan
-from planner.hierarchical.refinement_cache import NEAR, WHOLE, WIDER
-from planner.hierarchical.serialization import Call, compiled
-from planner.plan import Status
-from planner.validation import validate
-from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
+from confab.planner.hierarchical import refinement_cache
+from confab.planner.hierarchical.planner import beside, plan
+from confab.planner.hierarchical.refinement_cache import NEAR, WHOLE, WIDER
+from confab.planner.hierarchical.serialization import Call, compiled
+from confab.planner.plan import Status
+from confab.planner.validation import validate
+from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
 from worlds.hierarchies import hierarchy
 from worlds.writing import becomes, behavior, has, lacks, world
 

@@ -4,9 +4,9 @@ from itertools import permutations
 
 import pytest
 
-from planner.paper.transitions import Model
-from reasoner.language import DomainError
-from reasoner.symbols import (
+from confab.planner.paper.transitions import Model
+from confab.reasoner.language import DomainError
+from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     Condition,

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from planner.hierarchical.inherited_preconditions import binding
-from planner.hierarchical.planner import plan
-from planner.plan import Plan
-from planner.validation import successor, validate
-from reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition
+from confab.planner.hierarchical.inherited_preconditions import binding
+from confab.planner.hierarchical.planner import plan
+from confab.planner.plan import Plan
+from confab.planner.validation import successor, validate
+from confab.reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition
 from worlds.families import family, tabletop
 
 

@@ -7,13 +7,13 @@ from random import Random
 
 import pytest
 
-from planner.causal_links import Kind, Need, purposes
-from planner.contrast import instead_of
-from planner.hierarchical.planner import plan as default
-from planner.plan import Limits, Plan, Step
-from planner.plan_costs import cost_of
-from planner.validation import Fault, validate
-from reasoner.symbols import Behavior, Problem, Symbol, ValueEffect
+from confab.planner.causal_links import Kind, Need, purposes
+from confab.planner.contrast import instead_of
+from confab.planner.hierarchical.planner import plan as default
+from confab.planner.plan import Limits, Plan, Step
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import Fault, validate
+from confab.reasoner.symbols import Behavior, Problem, Symbol, ValueEffect
 from tests.planner.small import CASES
 from worlds.families import tabletop
 from worlds.hierarchies import hierarchy

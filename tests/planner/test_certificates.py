@@ -12,13 +12,13 @@ from random import Random
 import pytest
 
 import confab
-from planner.certificate_checks import refusal
-from planner.certificates import Certificate, certificate_from, certificate_json
-from planner.certified import certified
-from planner.certifying import certify
-from planner.plan import Outcome, Reason, Status
-from planner.solve import MODES, Request, solve
-from reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
+from confab.planner.certificate_checks import refusal
+from confab.planner.certificates import Certificate, certificate_from, certificate_json
+from confab.planner.certified import certified
+from confab.planner.certifying import certify
+from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.solve import MODES, Request, solve
+from confab.reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
 from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy
 from worlds.interpreter import Interpreter, TooManyStatesError

@@ -5,10 +5,10 @@ from fractions import Fraction
 
 import pytest
 
-from planner.plan import Plan, Step
-from planner.validation import Facts, Rules, stretches, successor, validate
-from reasoner.amounts import Amount, Quantity
-from reasoner.symbols import (
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import Facts, Rules, stretches, successor, validate
+from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

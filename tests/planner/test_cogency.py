@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
-from planner.paper.learning import reinforce
-from reasoner.memory.links import Links
-from reasoner.symbols import Domain, Problem, SituationType, Symbol
+from confab.planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
+from confab.planner.paper.learning import reinforce
+from confab.reasoner.memory.links import Links
+from confab.reasoner.symbols import Domain, Problem, SituationType, Symbol
 
 LOCATION = SituationType("LOCATION", ("Cup",), "LOCATION")
 CUP = Symbol("LOCATION", ("cup",))

@@ -8,17 +8,17 @@ from random import Random
 import pytest
 
 import confab
-from planner.plan import Limits, Status
-from planner.plan_costs import cost_of
-from planner.solve import Request, solve
-from planner.validation import validate
-from reasoner.graph.knowledge import load
-from reasoner.pddl.exporting import to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.pddl.turtle import turtle
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem
+from confab.planner.plan import Limits, Status
+from confab.planner.plan_costs import cost_of
+from confab.planner.solve import Request, solve
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem
 from worlds.numbers import jugs, rounds
 
 

@@ -11,21 +11,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.grounded.derived import in_parts
-from planner.grounded.derived_arrays import Bit
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.hierarchical.operators import Program
-from planner.plan import Limits, Status
-from planner.solve import Request, solve
-from planner.transitions import Table, key_of
-from planner.validation import Facts
-from reasoner.amounts import Quantity
-from reasoner.graph.knowledge import load
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.reading.problem import read
-from reasoner.symbols import (
+from confab.planner.grounded.derived import in_parts
+from confab.planner.grounded.derived_arrays import Bit
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.operators import Program
+from confab.planner.plan import Limits, Status
+from confab.planner.solve import Request, solve
+from confab.planner.transitions import Table, key_of
+from confab.planner.validation import Facts
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -39,7 +39,7 @@ from reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from reasoner.validation.validate import validate
+from confab.reasoner.validation.validate import validate
 from tests.planner import naive
 from worlds.axioms import Plain, axioms
 from worlds.language import DEFINED, language
@@ -292,8 +292,8 @@ def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int
     found = []
     for few in (0, 10**6):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("planner.grounded.derived.CALLS", few)
-            patch.setattr("planner.grounded.derived.AT_ONCE", 10**9)
+            patch.setattr("confab.planner.grounded.derived.CALLS", few)
+            patch.setattr("confab.planner.grounded.derived.AT_ONCE", 10**9)
             derived = in_parts(bits)
             states = [derived.completed(stated | above) for stated in range(1 << first)]
             after = [derived.after(state ^ change, state) for state, change in zip(states, changes, strict=True)]

@@ -2,12 +2,12 @@
 
 import pytest
 
-from planner.hierarchical.detours import without_detours
-from planner.hierarchical.planner import plan
-from planner.hierarchical.serialization import Call, compiled
-from planner.levels import levels_left
-from planner.validation import validate
-from reasoner.symbols import Problem, SituationType
+from confab.planner.hierarchical.detours import without_detours
+from confab.planner.hierarchical.planner import plan
+from confab.planner.hierarchical.serialization import Call, compiled
+from confab.planner.levels import levels_left
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem, SituationType
 from worlds.writing import becomes, behavior, has, lacks, world
 
 

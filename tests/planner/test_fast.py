@@ -12,18 +12,18 @@ from time import perf_counter
 
 import pytest
 
-from planner.grounded.grounding import ground as grounded
-from planner.grounded.shortest import shortest, ways
-from planner.grounded.task import Task
-from planner.hierarchical import bounds as optimal
-from planner.hierarchical import subproblem
-from planner.hierarchical.planner import compiled, plan
-from planner.hierarchical.serialization import Call
-from planner.hierarchical.subproblem import LEAST, Width
-from planner.paper.transitions import Model, ground
-from planner.plan import Limits, Status
-from planner.validation import validate
-from reasoner.symbols import Problem, Symbol
+from confab.planner.grounded.grounding import ground as grounded
+from confab.planner.grounded.shortest import shortest, ways
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import bounds as optimal
+from confab.planner.hierarchical import subproblem
+from confab.planner.hierarchical.planner import compiled, plan
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.subproblem import LEAST, Width
+from confab.planner.paper.transitions import Model, ground
+from confab.planner.plan import Limits, Status
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem, Symbol
 from tests.planner.test_wants import museum
 from worlds.families import FAMILIES, family, random_table, table, tabletop
 from worlds.rooms import rooms
@@ -218,7 +218,7 @@ def test_put_down_and_picked_up_again_is_dropped() -> None:
 
 def test_the_same_input_gives_the_same_plan_in_any_process() -> None:
     code = (
-        "from worlds.families import family\nfrom planner.hierarchical.planner import plan\n"
+        "from worlds.families import family\nfrom confab.planner.hierarchical.planner import plan\n"
         "for f in ('served', 'full', 'blocked'):\n"
         "    print([(str(s), sorted(s.bindings.items())) for s in plan(family(f, 12)).plan.walk()])"
     )

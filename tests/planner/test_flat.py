@@ -10,24 +10,24 @@ from functools import partial
 import numpy as np
 import pytest
 
-from planner.grounded import reachability
-from planner.grounded.best_first import ahead, plan_level, search
-from planner.grounded.grounding import ground
-from planner.grounded.hff import Evaluate, Evaluation, heuristic
-from planner.grounded.hff_dense import Effort
-from planner.grounded.hff_dense import heuristic as by_arrays
-from planner.grounded.landmarks import behind, in_series, landmarks
-from planner.grounded.novelty import Seen, by_novelty
-from planner.grounded.plan_windows import regrouped, shortened, shorter
-from planner.grounded.task import Task
-from planner.hierarchical import planner as fast
-from planner.hierarchical.serialization import Call, Compiled
-from planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
-from planner.solve import MODES, Request, solve
-from planner.validation import validate
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.symbols import TRUE, Problem, Symbol
+from confab.planner.grounded import reachability
+from confab.planner.grounded.best_first import ahead, plan_level, search
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.hff import Evaluate, Evaluation, heuristic
+from confab.planner.grounded.hff_dense import Effort
+from confab.planner.grounded.hff_dense import heuristic as by_arrays
+from confab.planner.grounded.landmarks import behind, in_series, landmarks
+from confab.planner.grounded.novelty import Seen, by_novelty
+from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import planner as fast
+from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
+from confab.planner.solve import MODES, Request, solve
+from confab.planner.validation import validate
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.symbols import TRUE, Problem, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
 from tests.planner.test_wants import museum
@@ -108,11 +108,11 @@ def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) 
 
         return evaluate
 
-    monkeypatch.setattr("planner.grounded.best_first.relaxed", slow)
-    monkeypatch.setattr("planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
-    monkeypatch.setattr("planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
+    monkeypatch.setattr("confab.planner.grounded.best_first.relaxed", slow)
+    monkeypatch.setattr("confab.planner.grounded.best_first.ENABLING", 0)  # else a few evaluations do
+    monkeypatch.setattr("confab.planner.grounded.best_first.effort", lambda task: Effort(100, 100, 100, 1))
     for module in ("plan", "grounded.best_first", "grounded.plan_windows", "grounded.reachability"):
-        monkeypatch.setattr(f"planner.{module}.perf_counter", lambda: float(evaluated))
+        monkeypatch.setattr(f"confab.planner.{module}.perf_counter", lambda: float(evaluated))
     problem = carrier(16)
     assert plan_level(problem).status is Status.SOLVED and evaluated > 50
     evaluated = 0
@@ -302,7 +302,7 @@ def test_a_wasteful_plan_is_searched_again_without_lookahead(monkeypatch: pytest
     assert isinstance(task, Task)
     again = search(task)
     assert task.carried_out(task.initial, again.plan)[0] & task.goal == task.goal
-    monkeypatch.setattr("planner.grounded.best_first.AGAIN", 0)
+    monkeypatch.setattr("confab.planner.grounded.best_first.AGAIN", 0)
     assert len(again.plan) < len(search(task).plan)
 
 
@@ -384,15 +384,15 @@ def test_arrays_reach_what_costs_more_than_a_number_holds(parts: int, layers: in
 
 
 def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.grounded.novelty.MOST_BYTES", 0)
-    monkeypatch.setattr("planner.grounded.best_first.MOST_BYTES", 0)
+    monkeypatch.setattr("confab.planner.grounded.novelty.MOST_BYTES", 0)
+    monkeypatch.setattr("confab.planner.grounded.best_first.MOST_BYTES", 0)
     outcome = plan_level(carrier(40))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
     assert outcome.reason.text == "there isn't enough memory to go on"
 
 
 def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.grounded.best_first.landmarks", lambda *_: np.empty(1 << 55))
+    monkeypatch.setattr("confab.planner.grounded.best_first.landmarks", lambda *_: np.empty(1 << 55))
     outcome = plan_level(carrier(8))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert not validate(carrier(8), outcome.plan)

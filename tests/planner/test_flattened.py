@@ -9,15 +9,15 @@ import pytest
 
 import confab
 from benchmarks.following import scene
-from planner.hierarchical import flattened
-from planner.hierarchical.planner import plan as default_plan
-from planner.hierarchical.regrouping import under_the_levels_above
-from planner.hierarchical.serialization import Call
-from planner.paper.hierarchy import plan as paper_plan
-from planner.plan import Limits, Plan
-from planner.solve import Request, solve
-from planner.validation import validate
-from reasoner.symbols import Problem
+from confab.planner.hierarchical import flattened
+from confab.planner.hierarchical.planner import plan as default_plan
+from confab.planner.hierarchical.regrouping import under_the_levels_above
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.paper.hierarchy import plan as paper_plan
+from confab.planner.plan import Limits, Plan
+from confab.planner.solve import Request, solve
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem
 from worlds.agreement import cheapest
 from worlds.hierarchies import hierarchy
 

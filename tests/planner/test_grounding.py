@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.grounded import grounding
-from planner.grounded.best_first import plan_level, search
-from planner.grounded.formulas import Formulas
-from planner.grounded.grounding import ground
-from planner.grounded.hff import heuristic
-from planner.grounded.task import Task
-from planner.plan import Limits, Reason, Status
-from reasoner.language import DomainError
-from reasoner.symbols import (
+from confab.planner.grounded import grounding
+from confab.planner.grounded.best_first import plan_level, search
+from confab.planner.grounded.formulas import Formulas
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.hff import heuristic
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Limits, Reason, Status
+from confab.reasoner.language import DomainError
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,

@@ -6,22 +6,22 @@ from itertools import product
 
 import pytest
 
-from planner.grounded.best_first import plan_level
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.hierarchical.planner import Call, compiled
-from planner.hierarchical.planner import plan as default
-from planner.hierarchical.subproblem import LEAST
-from planner.hierarchical.unsolvability import exhausted, looked_at
-from planner.levels import levels_left
-from planner.paper.hierarchy import DOUBT
-from planner.paper.hierarchy import plan as paper
-from planner.plan import Outcome, Plan, Status, UnsolvableError
-from planner.solve import Request, _proof, solve
-from planner.validation import successor, validate
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse
-from reasoner.symbols import FALSE, TRUE, Problem, SituationType, Symbol
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.planner import Call, compiled
+from confab.planner.hierarchical.planner import plan as default
+from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.hierarchical.unsolvability import exhausted, looked_at
+from confab.planner.levels import levels_left
+from confab.planner.paper.hierarchy import DOUBT
+from confab.planner.paper.hierarchy import plan as paper
+from confab.planner.plan import Outcome, Plan, Status, UnsolvableError
+from confab.planner.solve import Request, _proof, solve
+from confab.planner.validation import successor, validate
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Symbol
 from tests.planner import naive
 from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable

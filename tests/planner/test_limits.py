@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import confab
-from planner.acting import executive
-from planner.acting.symbolic_world import SymbolicWorld
-from planner.grounded.joins import Table
-from planner.hierarchical.unsolvability import impossible
-from planner.plan import Limits, Outcome, Plan, Status
-from reasoner.limits import OutOfTimeError, check, current, within
-from reasoner.symbols import TRUE, RelationCondition, SituationType
+from confab.planner.acting import executive
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.grounded.joins import Table
+from confab.planner.hierarchical.unsolvability import impossible
+from confab.planner.plan import Limits, Outcome, Plan, Status
+from confab.reasoner.limits import OutOfTimeError, check, current, within
+from confab.reasoner.symbols import TRUE, RelationCondition, SituationType
 from worlds.writing import becomes, behavior, has, world
 
 CASES = Path(__file__).parent / "cases"

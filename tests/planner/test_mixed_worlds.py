@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from confab.planner.plan import Plan, Step
+from confab.reasoner.reading.problem import read
 from confab.scene import load
-from planner.plan import Plan, Step
-from reasoner.reading.problem import read
 from tests.planner.naive import complete, results
 from worlds.interpreter import Interpreter
 from worlds.judging import Judge

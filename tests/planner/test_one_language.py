@@ -13,20 +13,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.grounded.grounding import ground as grounded
-from planner.grounded.task import Task
-from planner.hierarchical.operators import Program
-from planner.paper.transitions import Model, ground
-from planner.solve import RejectedPlanError, Request, solve
-from planner.transitions import Table
-from planner.validation import successor
-from reasoner import symbols
-from reasoner.amounts import Quantity
-from reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
-from reasoner.language import groups
-from reasoner.reading.affordance import applicable_query, write_situation
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
+from confab.planner.grounded.grounding import ground as grounded
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.operators import Program
+from confab.planner.paper.transitions import Model, ground
+from confab.planner.solve import RejectedPlanError, Request, solve
+from confab.planner.transitions import Table
+from confab.planner.validation import successor
+from confab.reasoner import symbols
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.language import groups
+from confab.reasoner.reading.affordance import applicable_query, write_situation
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 from tests.planner import naive, small
 from tests.reasoner.worlds import graph_of, worlds
 from worlds.language import DEFINED, language

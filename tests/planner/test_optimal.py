@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import pytest
 
-from planner.grounded.best_first import plan_level
-from planner.grounded.grounding import ground
-from planner.grounded.shortest import shortest
-from planner.grounded.task import Task
-from planner.hierarchical import bounds as optimal
-from planner.hierarchical.bounds import lm_cut
-from planner.plan import Limits, Reason, Status
-from planner.plan_costs import cost_of
-from planner.solve import Request, solve
-from planner.validation import validate
-from reasoner.symbols import FALSE, TRUE, SituationType, Symbol
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.shortest import shortest
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import bounds as optimal
+from confab.planner.hierarchical.bounds import lm_cut
+from confab.planner.plan import Limits, Reason, Status
+from confab.planner.plan_costs import cost_of
+from confab.planner.solve import Request, solve
+from confab.planner.validation import validate
+from confab.reasoner.symbols import FALSE, TRUE, SituationType, Symbol
 from worlds.families import family, random_table
 from worlds.writing import becomes, behavior, has, world
 

@@ -4,15 +4,15 @@ from itertools import permutations
 
 import pytest
 
-from planner.paper.hierarchy import plan
-from planner.paper.learning import learn
-from planner.plan import Plan, Status, Step
-from planner.validation import validate
-from reasoner.graph.knowledge import load
-from reasoner.memory.links import Links
-from reasoner.reading.problem import read
-from reasoner.reading.quantification import quantify
-from reasoner.symbols import Problem
+from confab.planner.paper.hierarchy import plan
+from confab.planner.paper.learning import learn
+from confab.planner.plan import Plan, Status, Step
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.memory.links import Links
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.quantification import quantify
+from confab.reasoner.symbols import Problem
 
 FIGURE_7 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from planner.certificate_checks import refusal as refused
-from planner.certificate_reasons import told
-from planner.certifying import certify
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.hierarchical.planner import Call, compiled
-from planner.hierarchical.subproblem import LEAST
-from planner.hierarchical.unsolvability import LOOKING, closed, exhausted, impossible, looked_at, proved, refusal
-from planner.plan import OUT_OF_MEMORY, Reason, UnsolvableError
-from reasoner.amounts import Quantity
-from reasoner.symbols import (
+from confab.planner.certificate_checks import refusal as refused
+from confab.planner.certificate_reasons import told
+from confab.planner.certifying import certify
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.planner import Call, compiled
+from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.hierarchical.unsolvability import LOOKING, closed, exhausted, impossible, looked_at, proved, refusal
+from confab.planner.plan import OUT_OF_MEMORY, Reason, UnsolvableError
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,
@@ -357,7 +357,7 @@ def test_a_level_is_refused_for_more_changes_than_are_allowed() -> None:
 
 
 def test_a_level_that_is_too_large_says_so_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.hierarchical.unsolvability.MOST_ROWS", 2)
+    monkeypatch.setattr("confab.planner.hierarchical.unsolvability.MOST_ROWS", 2)
     said = proved(kitchen({"AT cup1": "sink"}), 1)
     assert isinstance(said, Reason)
     assert said.text.startswith("level 1 is too large to be grounded: ")
@@ -369,7 +369,7 @@ def test_a_level_for_which_memory_runs_out_proves_nothing(monkeypatch: pytest.Mo
     def out(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("planner.grounded.grounding.ground", out)
+    monkeypatch.setattr("confab.planner.grounded.grounding.ground", out)
     assert proved(kitchen({"AT cup1": "sink"}), 1) == OUT_OF_MEMORY
 
 

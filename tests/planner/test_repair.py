@@ -9,15 +9,15 @@ from time import sleep
 import pytest
 
 from benchmarks.execution import Trial, rest_after
-from planner.acting.repair import CLOSE, changed_individuals, difference, mend, rejected, replan, vanished
-from planner.hierarchical.planner import plan
-from planner.hierarchical.serialization import Compiled, compiled
-from planner.plan import Limits, Outcome, Plan, Status, Step
-from planner.plan_costs import cost_of
-from planner.validation import successor
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem, State, Symbol
+from confab.planner.acting.repair import CLOSE, changed_individuals, difference, mend, rejected, replan, vanished
+from confab.planner.hierarchical.planner import plan
+from confab.planner.hierarchical.serialization import Compiled, compiled
+from confab.planner.plan import Limits, Outcome, Plan, Status, Step
+from confab.planner.plan_costs import cost_of
+from confab.planner.validation import successor
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem, State, Symbol
 from worlds.families import family, tabletop
 
 
@@ -179,7 +179,7 @@ def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.Mon
     def in_vain(*_: object) -> None:
         sleep(0.05)
 
-    monkeypatch.setattr("planner.acting.repair.repair", in_vain)
+    monkeypatch.setattr("confab.planner.acting.repair.repair", in_vain)
     mended = mend(now, planned().steps, serving(), planner, using(), limits=Limits(seconds=60.0))
     assert mended.kind == "replan"
     assert mended.steps is not None

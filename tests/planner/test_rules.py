@@ -11,26 +11,26 @@ from pathlib import Path
 import pytest
 
 import confab
-from planner.experience.advice import Memory, plan
-from planner.experience.evidence import View
-from planner.experience.leading import FREE, Guide, rules_in
-from planner.experience.lessons import compared, live, teach
-from planner.experience.regression import Course
-from planner.grounded.task import Task
-from planner.hierarchical import planner as fast
-from planner.hierarchical import recovery
-from planner.hierarchical.operators import Program
-from planner.hierarchical.serialization import Call, Compiled, compiled
-from planner.hierarchical.subplans import EXPANSION
-from planner.plan import Outcome, Plan, Reason, Status, Step
-from planner.transitions import Cell
-from planner.validation import validate
-from reasoner.amounts import LESS, MORE
-from reasoner.language import terms
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Order, Tally
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse_files
-from reasoner.symbols import Problem, RelationCondition, SituationType, ValueCondition, Witness
+from confab.planner.experience.advice import Memory, plan
+from confab.planner.experience.evidence import View
+from confab.planner.experience.leading import FREE, Guide, rules_in
+from confab.planner.experience.lessons import compared, live, teach
+from confab.planner.experience.regression import Course
+from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import planner as fast
+from confab.planner.hierarchical import recovery
+from confab.planner.hierarchical.operators import Program
+from confab.planner.hierarchical.serialization import Call, Compiled, compiled
+from confab.planner.hierarchical.subplans import EXPANSION
+from confab.planner.plan import Outcome, Plan, Reason, Status, Step
+from confab.planner.transitions import Cell
+from confab.planner.validation import validate
+from confab.reasoner.amounts import LESS, MORE
+from confab.reasoner.language import terms
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Order, Tally
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse_files
+from confab.reasoner.symbols import Problem, RelationCondition, SituationType, ValueCondition, Witness
 from tests.planner.small import van
 from worlds.lessons import backwards, problem, taught
 from worlds.writing import becomes, behavior, has, world
@@ -420,7 +420,7 @@ def test_a_farther_way_is_looked_for_when_the_nearer_ones_are_none() -> None:
 
 
 def test_who_only_follows_rules_does_not_load_how_they_are_learned() -> None:
-    text = "import sys, planner.experience.advice; print([m for m in sys.modules if m.endswith(('regression', 'lessons'))])"
+    text = "import sys, confab.planner.experience.advice; print([m for m in sys.modules if m.endswith(('regression', 'lessons'))])"
     assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 

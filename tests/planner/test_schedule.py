@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.acting.schedule import Order, makespan, partial_order, ready, schedule, urgency_of, worker_of
-from planner.hierarchical.planner import plan
-from planner.plan import Plan, Step
-from planner.validation import validate
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem
+from confab.planner.acting.schedule import Order, makespan, partial_order, ready, schedule, urgency_of, worker_of
+from confab.planner.hierarchical.planner import plan
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem
 
 
 @cache

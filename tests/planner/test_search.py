@@ -5,12 +5,12 @@ from itertools import count
 
 import pytest
 
-from planner.paper.astar import a_star
-from planner.paper.cogency import PaperConstants
-from planner.paper.hierarchy import plan
-from planner.paper.transitions import Applied, Values
-from planner.plan import Limits, Status
-from reasoner.symbols import GroundBehavior
+from confab.planner.paper.astar import a_star
+from confab.planner.paper.cogency import PaperConstants
+from confab.planner.paper.hierarchy import plan
+from confab.planner.paper.transitions import Applied, Values
+from confab.planner.plan import Limits, Status
+from confab.reasoner.symbols import GroundBehavior
 from worlds.families import tabletop
 
 
@@ -57,7 +57,7 @@ def test_the_limit_of_expansions_gives_up_instead_of_claiming_anything() -> None
 def test_the_time_limit_ends_a_search_within_one_state(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = count()
     for module in ("plan", "paper.hierarchy", "paper.astar"):
-        monkeypatch.setattr(f"planner.{module}.perf_counter", lambda: float(next(clock)), raising=False)
+        monkeypatch.setattr(f"confab.planner.{module}.perf_counter", lambda: float(next(clock)), raising=False)
     outcome = plan(tabletop(), limits=Limits(seconds=4.0))
     assert outcome.status is Status.GAVE_UP
     assert sum(counts.generated for counts in outcome.search.values()) <= 5

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from planner.hierarchical.planner import plan
-from planner.plan import Limits, Status
-from planner.solve import Request, solve
-from planner.validation import successor, validate
-from reasoner.symbols import Problem, State
+from confab.planner.hierarchical.planner import plan
+from confab.planner.plan import Limits, Status
+from confab.planner.solve import Request, solve
+from confab.planner.validation import successor, validate
+from confab.reasoner.symbols import Problem, State
 from worlds.families import family
 from worlds.hierarchies import hierarchy
 
@@ -49,7 +49,7 @@ def test_that_a_lower_level_comes_first_is_told() -> None:
 def test_the_lowest_level_alone_leaves_nothing_touched_that_was_found_not_at_rest(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("planner.hierarchical.planner.soon", lambda recovery: False)
-    monkeypatch.setattr("planner.hierarchical.planner.achieved", lambda recovery: False)
+    monkeypatch.setattr("confab.planner.hierarchical.planner.soon", lambda recovery: False)
+    monkeypatch.setattr("confab.planner.hierarchical.planner.achieved", lambda recovery: False)
     outcome = solve(Request(hierarchy(seed)))
     assert outcome.status is Status.SOLVED

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from planner.paper.hierarchy import plan
-from planner.plan import Plan, Step
-from planner.validation import validate
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem, Symbol
+from confab.planner.paper.hierarchy import plan
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem, Symbol
 from tests.planner.small import Case, fire_door, tool, van
 
 

@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from planner.hierarchical.operators import Achiever, Program
-from planner.hierarchical.planner import plan
-from planner.hierarchical.refinement_cache import WIDER
-from planner.hierarchical.serialization import Call, Compiled
-from planner.hierarchical.subgoals import Env, Wants
-from planner.hierarchical.subproblem import focus
-from planner.plan import Limits, Status
-from planner.transitions import Cell
-from reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
+from confab.planner.hierarchical.operators import Achiever, Program
+from confab.planner.hierarchical.planner import plan
+from confab.planner.hierarchical.refinement_cache import WIDER
+from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.hierarchical.subgoals import Env, Wants
+from confab.planner.hierarchical.subproblem import focus
+from confab.planner.plan import Limits, Status
+from confab.planner.transitions import Cell
+from confab.reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
 from worlds.families import family, random_table
 from worlds.rooms import rooms
 from worlds.writing import becomes, behavior, has, world

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from planner.hierarchical.operators import named
-from planner.plan import Step
-from planner.solve import Request, solve
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import read
-from reasoner.reading.relevance import recognise
-from reasoner.symbols import Symbol
-from reasoner.validation.validate import validate
+from confab.planner.hierarchical.operators import named
+from confab.planner.plan import Step
+from confab.planner.solve import Request, solve
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.symbols import Symbol
+from confab.reasoner.validation.validate import validate
 
 THEATRE = Path(__file__).parents[2] / "docs" / "examples" / "theatre"
 Theatre = Callable[[str, str], Path]

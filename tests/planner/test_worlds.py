@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import pytest
 
 import confab
-from planner.plan import Plan, Status
-from planner.validation import successor, validate
-from reasoner.symbols import Problem
+from confab.planner.plan import Plan, Status
+from confab.planner.validation import successor, validate
+from confab.reasoner.symbols import Problem
 
 SECONDS = 90.0
 

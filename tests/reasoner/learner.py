@@ -3,9 +3,9 @@
 import sys
 from pathlib import Path
 
-from reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
-from reasoner.memory.experience_file import load, save
-from reasoner.names import Names
+from confab.reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
+from confab.reasoner.memory.experience_file import load, save
+from confab.reasoner.names import Names
 
 
 def main(path: Path) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from planner.paper.transitions import Model, ground
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeGraph, load, text
-from reasoner.names import local_name
-from reasoner.reading.affordance import SITUATION, affordances, applicable_query, write_situation
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import State, Symbol
+from confab.planner.paper.transitions import Model, ground
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
+from confab.reasoner.names import local_name
+from confab.reasoner.reading.affordance import SITUATION, affordances, applicable_query, write_situation
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import State, Symbol
 from tests.ontology.faults import skeleton
 
 

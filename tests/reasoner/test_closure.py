@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.reading.relevance import recognise
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.relevance import recognise
 from tests.reasoner.test_recognition import solvable
 from tests.reasoner.worlds import HEAD, graph_of
 

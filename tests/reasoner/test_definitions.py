@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from planner.paper.transitions import Model
-from planner.solve import Request, solve
-from planner.validation import Facts
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import (
+from confab.planner.paper.transitions import Model
+from confab.planner.solve import Request, solve
+from confab.planner.validation import Facts
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import (
     AnyOf,
     ClassCondition,
     Condition,
@@ -21,8 +21,8 @@ from reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from reasoner.validation.validate import validate
-from reasoner.vocabulary import XSD
+from confab.reasoner.validation.validate import validate
+from confab.reasoner.vocabulary import XSD
 from tests.ontology.faults import skeleton
 
 DIRTY = "c:about :B1_WASH.item ; c:situationType :CLEANLINESS ; c:value :dirty"

@@ -5,7 +5,7 @@ from copy import deepcopy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Order, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Order, Tally
 
 things = st.sampled_from([GoalKind("LOCATION", ("Cup",)), GoalKind("BEVERAGE", ("Cup",)), Order("A", "B", ((0, 0),))])
 facts = st.sampled_from([ITSELF, ("cup is a Bowl", "yes"), ("cup is a Bowl", "no"), ("who is hand", "left_hand")])

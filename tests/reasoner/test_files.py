@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner import files
-from reasoner.files import alone, as_iri_part, write_whole
-from reasoner.limits import LimitError
+from confab.reasoner import files
+from confab.reasoner.files import alone, as_iri_part, write_whole
+from confab.reasoner.limits import LimitError
 
 ROWS = "thing\n"
 """The columns of a query's rows, which replace rows of the same columns."""

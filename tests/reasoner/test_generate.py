@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.hierarchical.planner import plan
-from reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, write_scene
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import Problem, Symbol
-from reasoner.validation.validate import validate
+from confab.planner.hierarchical.planner import plan
+from confab.reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, write_scene
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.validation.validate import validate
 
 
 def reading_of(folder: Path, family: str, **sizes: int) -> Reading:

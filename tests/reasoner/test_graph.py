@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-import ontology
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.limits import Deadline, LimitError, within
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.limits import Deadline, LimitError, within
 
 HEADER = """@prefix owl: <http://www.w3.org/2002/07/owl#> .
 <https://example.org/mine> a owl:Ontology ; owl:imports <{}> .

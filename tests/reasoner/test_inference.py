@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph.inference import infer, needed
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from reasoner.reading.problem import read
+from confab.reasoner.graph.inference import infer, needed
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from confab.reasoner.reading.problem import read
 from tests.ontology.faults import skeleton
 
 NEAR = ":near rdfs:label 'near' ; a owl:ObjectProperty, owl:NamedIndividual, c:Relation"

@@ -4,9 +4,9 @@ from fractions import Fraction
 
 import pytest
 
-from reasoner.amounts import Amount, Calculation, Measure
-from reasoner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
-from reasoner.symbols import (
+from confab.reasoner.amounts import Amount, Calculation, Measure
+from confab.reasoner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
+from confab.reasoner.symbols import (
     AmountEffect,
     AnyOf,
     Behavior,

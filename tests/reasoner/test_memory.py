@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 import rdflib
 
-from planner.paper.hierarchy import plan
-from planner.paper.learning import learn
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_into
-from reasoner.memory.links import Links
-from reasoner.memory.links_file import links_text, load_links, memory_names, save_links
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import Symbol
+from confab.planner.paper.hierarchy import plan
+from confab.planner.paper.learning import learn
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_into
+from confab.reasoner.memory.links import Links
+from confab.reasoner.memory.links_file import links_text, load_links, memory_names, save_links
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import Symbol
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ from pathlib import Path
 import pyoxigraph as ox
 import pytest
 
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Tally
-from reasoner.memory.experience_file import MOST, lines, load, parse, probability, save, turtle
-from reasoner.memory.rules_file import MOST_INSIDE, RuleReader, label
-from reasoner.names import Names
-from reasoner.symbols import AnyOf, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
-from reasoner.vocabulary import CORE
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Tally
+from confab.reasoner.memory.experience_file import MOST, lines, load, parse, probability, save, turtle
+from confab.reasoner.memory.rules_file import MOST_INSIDE, RuleReader, label
+from confab.reasoner.names import Names
+from confab.reasoner.symbols import AnyOf, ClassCondition, Condition, RelationCondition, ValueCondition, Witness
+from confab.reasoner.vocabulary import CORE
 
 DOMAIN = "https://x.org/k"
 NAMES = Names(f"{DOMAIN}#{name}" for name in ("MOVE", "AT", "near", "Cup", "cup1"))

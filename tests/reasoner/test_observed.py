@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.memory.links import Links
-from reasoner.memory.links_file import save_links
-from reasoner.reading.observed import assert_observed, load_observed, save_observed
-from reasoner.reading.problem import read
-from reasoner.symbols import Symbol
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.memory.links import Links
+from confab.reasoner.memory.links_file import save_links
+from confab.reasoner.reading.observed import assert_observed, load_observed, save_observed
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Symbol
 
 CUP2 = Symbol("LOCATION", ("cup2",))
 

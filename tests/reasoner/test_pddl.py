@@ -11,21 +11,21 @@ from pathlib import Path
 import pytest
 
 from confab.pddl_commands import export_pddl, import_pddl, read_pddl_plan
-from planner.grounded.best_first import plan_level, search
-from planner.grounded.grounding import ground
-from planner.grounded.task import Task
-from planner.plan import Limits, Plan, Status, Step
-from planner.solve import Request, solve
-from planner.validation import validate as faults
-from reasoner.amounts import Measure
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.pddl.exporting import Exported, plan_of, to_pddl
-from reasoner.pddl.importing import Imported, imported
-from reasoner.pddl.syntax import PddlError, parse, parse_files
-from reasoner.pddl.turtle import turtle
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem
-from reasoner.validation.validate import validate
+from confab.planner.grounded.best_first import plan_level, search
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
+from confab.planner.plan import Limits, Plan, Status, Step
+from confab.planner.solve import Request, solve
+from confab.planner.validation import validate as faults
+from confab.reasoner.amounts import Measure
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
+from confab.reasoner.pddl.importing import Imported, imported
+from confab.reasoner.pddl.syntax import PddlError, parse, parse_files
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem
+from confab.reasoner.validation.validate import validate
 from tests.planner.naive import tabletop
 
 TRUCKS = (

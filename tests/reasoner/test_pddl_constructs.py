@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from planner.grounded.best_first import plan_level
-from planner.plan import Status
-from planner.solve import Request, solve
-from reasoner.amounts import Measure
-from reasoner.graph.knowledge import load
-from reasoner.pddl.exporting import to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import PddlError, parse
-from reasoner.pddl.turtle import turtle
-from reasoner.reading.problem import read
-from reasoner.validation.validate import validate
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.plan import Status
+from confab.planner.solve import Request, solve
+from confab.reasoner.amounts import Measure
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.reading.problem import read
+from confab.reasoner.validation.validate import validate
 from tests.reasoner.test_pddl import assert_same_behaviour, same
 
 AT = "(:predicates (at ?x) (way ?x ?y))"

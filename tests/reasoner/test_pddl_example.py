@@ -6,8 +6,8 @@ from pathlib import Path
 
 import confab
 from confab.pddl_commands import import_pddl
-from planner.validation import validate as faults
-from reasoner.validation.validate import validate
+from confab.planner.validation import validate as faults
+from confab.reasoner.validation.validate import validate
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "ferry"
 

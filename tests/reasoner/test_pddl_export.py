@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from confab.pddl_commands import import_pddl
-from planner.grounded.best_first import plan_level
-from planner.plan import Status
-from reasoner.amounts import Amount, Quantity
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.pddl.exporting import to_pddl
-from reasoner.pddl.importing import imported
-from reasoner.pddl.syntax import parse, parse_files
-from reasoner.symbols import (
+from confab.planner.grounded.best_first import plan_level
+from confab.planner.plan import Status
+from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse, parse_files
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
@@ -32,7 +32,7 @@ from reasoner.symbols import (
     Witness,
     spread,
 )
-from reasoner.validation.validate import validate
+from confab.reasoner.validation.validate import validate
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import mixed
 

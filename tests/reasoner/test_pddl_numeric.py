@@ -6,15 +6,15 @@ from random import Random
 
 import pytest
 
-from planner.plan import Limits, Status
-from planner.solve import Request, solve
-from reasoner.graph.knowledge import load
-from reasoner.pddl.exporting import plan_of, to_pddl
-from reasoner.pddl.importing import Imported, imported
-from reasoner.pddl.syntax import PddlError, parse
-from reasoner.pddl.turtle import turtle
-from reasoner.reading.problem import read
-from reasoner.symbols import Problem
+from confab.planner.plan import Limits, Status
+from confab.planner.solve import Request, solve
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.pddl.exporting import plan_of, to_pddl
+from confab.reasoner.pddl.importing import Imported, imported
+from confab.reasoner.pddl.syntax import PddlError, parse
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Problem
 
 FUNCTIONS = ("(level ?x)", "(level ?y)", "(total)")
 STATES = 300

@@ -7,13 +7,13 @@ from tempfile import TemporaryDirectory
 import pytest
 from hypothesis import given, settings
 
-import ontology
-from planner.paper.transitions import ground
-from reasoner.generate import write_scene
-from reasoner.graph.knowledge import load
-from reasoner.reading.problem import read
-from reasoner.reading.quantification import quantify, query_for
-from reasoner.reading.relevance import recognise
+from confab import ontology
+from confab.planner.paper.transitions import ground
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.quantification import quantify, query_for
+from confab.reasoner.reading.relevance import recognise
 from tests.reasoner.worlds import graph_of, worlds
 
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.goals import parse_fact, with_goals
-from reasoner.reading.problem import Reading, read
-from reasoner.symbols import Symbol, Witness
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.goals import parse_fact, with_goals
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.symbols import Symbol, Witness
 
 SCENES = Path(__file__).resolve().parents[2] / "ontology" / "scenes"
 SCENE = """

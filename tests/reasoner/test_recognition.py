@@ -8,18 +8,18 @@ import pytest
 from hypothesis import assume, event, given, settings
 from hypothesis import strategies as st
 
-from ontology import ROOT
-from planner.paper.astar import mismatches
-from planner.paper.hierarchy import plan
-from planner.paper.transitions import Model, ground
-from planner.plan import Limits, Status
-from reasoner.generate import families, generate, write_scene
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from reasoner.language import DomainError
-from reasoner.reading.goals import with_goals
-from reasoner.reading.problem import read
-from reasoner.reading.relevance import recognise
-from reasoner.symbols import Problem
+from confab.ontology import ROOT
+from confab.planner.paper.astar import mismatches
+from confab.planner.paper.hierarchy import plan
+from confab.planner.paper.transitions import Model, ground
+from confab.planner.plan import Limits, Status
+from confab.reasoner.generate import families, generate, write_scene
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from confab.reasoner.language import DomainError
+from confab.reasoner.reading.goals import with_goals
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.symbols import Problem
 from tests.ontology.faults import skeleton
 from tests.reasoner.worlds import HEAD, graph_of, worlds
 

@@ -14,11 +14,22 @@ from pathlib import Path
 import pytest
 import rdflib
 
-from reasoner.graph.knowledge import KnowledgeError
-from reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Said, Tally
-from reasoner.memory.experience_file import load, pull, push, save
-from reasoner.names import Names
-from reasoner.symbols import AnyOf, ClassCondition, EqualityCondition, RelationCondition, ValueCondition, Witness
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.memory.experience import (
+    ITSELF,
+    Experience,
+    GoalKind,
+    Lesson,
+    Method,
+    OpenRole,
+    Order,
+    Rule,
+    Said,
+    Tally,
+)
+from confab.reasoner.memory.experience_file import load, pull, push, save
+from confab.reasoner.names import Names
+from confab.reasoner.symbols import AnyOf, ClassCondition, EqualityCondition, RelationCondition, ValueCondition, Witness
 
 NAMES = Names(f"https://x.org/k#{name}" for name in ("B1_MOVE", "B1_POUR", "Cup", "Bottle"))
 DOMAIN = "https://x.org/k"

@@ -13,14 +13,14 @@ from urllib.request import Request, urlopen
 
 import pytest
 
-from planner.paper.hierarchy import plan
-from reasoner.generate import write_scene
-from reasoner.graph import stores
-from reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from reasoner.graph.stores import Endpoint, connect, on_disk
-from reasoner.reading.problem import read
-from reasoner.reading.relevance import recognise
-from reasoner.vocabulary import CORE
+from confab.planner.paper.hierarchy import plan
+from confab.reasoner.generate import write_scene
+from confab.reasoner.graph import stores
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
+from confab.reasoner.graph.stores import Endpoint, connect, on_disk
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.vocabulary import CORE
 from tests.reasoner.servers import free_port, oxigraph, rdflib_endpoint
 
 PAPER = "https://w3id.org/confab/beverage-serving"
@@ -84,7 +84,7 @@ def test_a_named_graph_per_ontology_lets_one_endpoint_hold_several_scenes(scene:
 
 def load_iri(file: Path) -> list[str]:
     probe = KnowledgeGraph("")
-    from reasoner.graph.knowledge import read_into
+    from confab.reasoner.graph.knowledge import read_into
 
     read_into(probe, file, "asserted")
     return [str(row[0].value) for row in probe.select("SELECT ?o { ?o a owl:Ontology }") if row[0]]

@@ -7,13 +7,13 @@ from random import Random
 import pytest
 
 from benchmarks.entailed import NAMES, compared, derived, first_problem, in_state
-from planner.solve import Request, solve
-from planner.validation import Facts, validate
-from reasoner.graph.knowledge import KnowledgeError, load
-from reasoner.reading.goals import with_goals
-from reasoner.reading.problem import read
-from reasoner.reading.relevance import recognise
-from reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
+from confab.planner.solve import Request, solve
+from confab.planner.validation import Facts, validate
+from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.goals import with_goals
+from confab.reasoner.reading.problem import read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
 from tests.planner import naive
 from worlds.entailed import CONCLUDED, DEFINED, PROPERTIES, domain, implies, random_state
 from worlds.owlapi import jars, jvm

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import pytest
 
-from reasoner import symbols
-from reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
-from reasoner.symbols import (
+from confab.reasoner import symbols
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
+from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,

@@ -12,20 +12,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ontology
-from planner.solve import Request, solve
-from reasoner.amounts import Amount, Calculation, Measure
-from reasoner.graph.inference import infer
-from reasoner.graph.knowledge import SCENE, Answer, KnowledgeError, KnowledgeGraph, load, read_into
-from reasoner.names import local_name
-from reasoner.pddl.turtle import turtle
-from reasoner.reading.problem import as_written, read, read_schema
-from reasoner.symbols import AmountEffect, Behavior, Comparison
-from reasoner.updates.compiling import Fault
-from reasoner.updates.converting import compiled_again, convert, plainly, situations_of
-from reasoner.updates.writing import update
-from reasoner.validation.validate import validate
-from reasoner.vocabulary import CORE
+from confab import ontology
+from confab.planner.solve import Request, solve
+from confab.reasoner.amounts import Amount, Calculation, Measure
+from confab.reasoner.graph.inference import infer
+from confab.reasoner.graph.knowledge import SCENE, Answer, KnowledgeError, KnowledgeGraph, load, read_into
+from confab.reasoner.names import local_name
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.reading.problem import as_written, read, read_schema
+from confab.reasoner.symbols import AmountEffect, Behavior, Comparison
+from confab.reasoner.updates.compiling import Fault
+from confab.reasoner.updates.converting import compiled_again, convert, plainly, situations_of
+from confab.reasoner.updates.writing import update
+from confab.reasoner.validation.validate import validate
+from confab.reasoner.vocabulary import CORE
 from worlds.language import language
 
 ROOT = Path(__file__).resolve().parents[2]

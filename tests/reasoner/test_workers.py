@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from reasoner.workers import LAUNCHER, WorkerError, call, end, start
+from confab.reasoner.workers import LAUNCHER, WorkerError, call, end, start
 
 SLEEP = "import subprocess, time; subprocess.Popen(['sleep', '60']); print('up', flush=True); time.sleep(60)"
 PARENT = f"""
 import ctypes, os, signal, subprocess, sys, threading, time
-from reasoner.workers import start
+from confab.reasoner.workers import start
 found = []
 def begin():
     found.append(start([sys.executable, "-c", {SLEEP!r}], stdout=subprocess.PIPE))

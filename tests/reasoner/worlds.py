@@ -5,7 +5,7 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from reasoner.graph.knowledge import KnowledgeGraph, load
+from confab.reasoner.graph.knowledge import KnowledgeGraph, load
 
 HEAD = """
 @prefix : <https://w3id.org/confab/core#> .

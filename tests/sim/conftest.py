@@ -7,15 +7,15 @@ from functools import cache
 import pytest
 
 import confab
-from planner.plan import Step
-from reasoner.embodiment.values import Embodiment
-from reasoner.symbols import State
-from sim.verify import expectations
+from confab.planner.plan import Step
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.symbols import State
+from confab.sim.verify import expectations
 
 
 @dataclass(frozen=True)
 class Case:
-    """What `sim.verify.verify` takes."""
+    """What `confab.sim.verify.verify` takes."""
 
     embodiment: Embodiment
     initial: State

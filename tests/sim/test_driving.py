@@ -6,13 +6,13 @@ import numpy as np
 import pybullet
 import pytest
 
-from reasoner.embodiment.values import Embodiment, Fixture
-from sim.arms import hand_frames
-from sim.driving import drive
-from sim.staging import Perturbation
-from sim.verdict import SkillError
-from sim.verify import verify
-from sim.world import World
+from confab.reasoner.embodiment.values import Embodiment, Fixture
+from confab.sim.arms import hand_frames
+from confab.sim.driving import drive
+from confab.sim.staging import Perturbation
+from confab.sim.verdict import SkillError
+from confab.sim.verify import verify
+from confab.sim.world import World
 
 from .conftest import case
 

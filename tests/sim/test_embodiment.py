@@ -1,10 +1,10 @@
 import pyoxigraph as ox
 import pytest
 
-from reasoner.embodiment.facts import EmbodimentError
-from reasoner.embodiment.reading import read_embodiment
-from reasoner.graph.knowledge import load
-from reasoner.names import local_name
+from confab.reasoner.embodiment.facts import EmbodimentError
+from confab.reasoner.embodiment.reading import read_embodiment
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.names import local_name
 
 from .conftest import Case
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.faults import PLANTED, Planted, nominal
-from sim.faults import PLANTS
-from sim.rollouts import Trial
-from sim.verdict import CODES
+from confab.sim.faults import PLANTS
+from confab.sim.rollouts import Trial
+from confab.sim.verdict import CODES
 
 from .conftest import Case
 

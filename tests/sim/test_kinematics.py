@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ontology
-from confab import load
-from sim.arms import Arm, hand_frames, link_transforms, read_arm, turn
-from sim.assembly import read_robot
-from sim.kinematics import inverse, swivel_of, three_angles
-from sim.urdf import Array, read_urdf
+from confab import load, ontology
+from confab.sim.arms import Arm, hand_frames, link_transforms, read_arm, turn
+from confab.sim.assembly import read_robot
+from confab.sim.kinematics import inverse, swivel_of, three_angles
+from confab.sim.urdf import Array, read_urdf
 
 URDF = str(ontology.ROOT / "robots" / "two-arms.urdf")
 JOINTS = ("shoulder_pitch", "shoulder_yaw", "shoulder_roll", "elbow", "wrist_yaw", "wrist_pitch", "wrist_roll")

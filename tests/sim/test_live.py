@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import pytest
 
 import confab
-from planner.acting.episode import Change, Intervention
-from planner.plan import Step
-from reasoner.symbols import Fact, Symbol
-from sim.live import LiveWorld
-from sim.world import World
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.plan import Step
+from confab.reasoner.symbols import Fact, Symbol
+from confab.sim.live import LiveWorld
+from confab.sim.world import World
 
 REACH = Step((0,), 8, 3, "B3_REACH_HAND_OBJECT", ("right_hand", "bottle1"), {"place": "location4"}, None, ())
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pybullet
 
-from sim.world import World
+from confab.sim.world import World
 from tests.sim.conftest import Case
 
 

@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 
 import confab
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.plan import Step
 from confab.reaching import with_reach
+from confab.reasoner.embodiment.skill_checks import RULES
+from confab.reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES, VERDICTS
+from confab.reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
+from confab.reasoner.symbols import Fact, Symbol
 from confab.scene import Scene
-from planner.acting.episode import Change, Intervention
-from planner.plan import Step
-from reasoner.embodiment.skill_checks import RULES
-from reasoner.embodiment.skills import CONDITIONS, FINGERS, MOTIONS, QUANTITIES, VERDICTS
-from reasoner.embodiment.values import Embodiment, Feature, Link, Mechanism, Part, SkillUse
-from reasoner.symbols import Fact, Symbol
-from sim import measuring, phases, touch
-from sim.faults import displaced
-from sim.linkage import read_mechanism, wide
-from sim.live import LiveWorld
-from sim.skills import perform
-from sim.staging import Perturbation
-from sim.verdict import CODES, SkillError, Verdict
-from sim.verify import compare, expectations, verify
-from sim.world import World
+from confab.sim import measuring, phases, touch
+from confab.sim.faults import displaced
+from confab.sim.linkage import read_mechanism, wide
+from confab.sim.live import LiveWorld
+from confab.sim.skills import perform
+from confab.sim.staging import Perturbation
+from confab.sim.verdict import CODES, SkillError, Verdict
+from confab.sim.verify import compare, expectations, verify
+from confab.sim.world import World
 
 PANEL = Mechanism(
     "panel",

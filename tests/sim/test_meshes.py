@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reasoner.embodiment.facts import pybullet_data
-from sim.meshes import MOST, bounds, cover, surface, triangles
+from confab.reasoner.embodiment.facts import pybullet_data
+from confab.sim.meshes import MOST, bounds, cover, surface, triangles
 
 FOLDER = pybullet_data()
 

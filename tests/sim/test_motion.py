@@ -3,16 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reasoner.embodiment.values import Embodiment, Fixture
-from sim.arms import read_arm
-from sim.attempt import Attempt, rounding
-from sim.bodies import outline
-from sim.collision import Solid, Surroundings, box, free, read_mover
-from sim.motion import MotionLimits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
-from sim.stages import MARGIN, Stage
-from sim.urdf import Array, Spheres, read_urdf
-from sim.verdict import SkillError
-from sim.world import World
+from confab.reasoner.embodiment.values import Embodiment, Fixture
+from confab.sim.arms import read_arm
+from confab.sim.attempt import Attempt, rounding
+from confab.sim.bodies import outline
+from confab.sim.collision import Solid, Surroundings, box, free, read_mover
+from confab.sim.motion import MotionLimits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
+from confab.sim.stages import MARGIN, Stage
+from confab.sim.urdf import Array, Spheres, read_urdf
+from confab.sim.verdict import SkillError
+from confab.sim.world import World
 
 from .conftest import Case, case
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from benchmarks.perception import perception
-from reasoner.symbols import State
-from sim.faults import displaced, drained, lying
-from sim.staging import Perturbation
-from sim.verdict import Verdict
-from sim.verify import compare
-from sim.world import World
+from confab.reasoner.symbols import State
+from confab.sim.faults import displaced, drained, lying
+from confab.sim.staging import Perturbation
+from confab.sim.verdict import Verdict
+from confab.sim.verify import compare
+from confab.sim.world import World
 
 from .conftest import Case, case
 

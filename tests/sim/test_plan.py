@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from sim.arms import link_transforms, read_arm
-from sim.assembly import read_robot
-from sim.faults import hidden_wall
-from sim.film import BAR, DOING, DONE, Film
-from sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
-from sim.staging import Perturbation
-from sim.verify import verify
-from sim.world import World
+from confab.sim.arms import link_transforms, read_arm
+from confab.sim.assembly import read_robot
+from confab.sim.faults import hidden_wall
+from confab.sim.film import BAR, DOING, DONE, Film
+from confab.sim.picture import Camera, _draw_opaque, hide_vessels, picture, view_of
+from confab.sim.staging import Perturbation
+from confab.sim.verify import verify
+from confab.sim.world import World
 
 from .conftest import Case, case
 
@@ -115,8 +115,8 @@ def test_the_plan_after_the_user_moved_a_cup_verifies_with_the_same_result_in_an
     assert (rollout.ok, len(rollout.steps)) == (True, 10)
     script = """
 from tests.sim.conftest import case
-from sim.staging import Perturbation
-from sim.verify import verify
+from confab.sim.staging import Perturbation
+from confab.sim.verify import verify
 c = case("beverage-serving-moved")
 rollout = verify(c.embodiment, c.initial, c.steps, c.expected, seed=5)
 print([(r.seconds, sorted(r.verdict.measured.items())) for r in rollout.steps])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.pouring import _Servo, _Way
+from confab.sim.pouring import _Servo, _Way
 
 NUMBERS = {"lag": 0.3, "flow": 0.15, "wait": 1.0, "pour_angle": 2.09, "slow": 0.3}
 

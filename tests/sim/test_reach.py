@@ -1,7 +1,7 @@
 from dataclasses import replace
 
-from reasoner.embodiment.values import Fixture
-from sim.reach import fingerprint, hindrance, reach
+from confab.reasoner.embodiment.values import Fixture
+from confab.sim.reach import fingerprint, hindrance, reach
 
 from .conftest import Case
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from sim.rollouts import Trial, rollouts, wilson
-from sim.staging import Perturbation
-from sim.world import World
+from confab.sim.rollouts import Trial, rollouts, wilson
+from confab.sim.staging import Perturbation
+from confab.sim.world import World
 
 from .conftest import Case
 

@@ -7,17 +7,17 @@ import pytest
 
 import confab
 from confab.physics import Report
+from confab.planner.acting.episode import Change, Intervention
+from confab.planner.plan import Plan
+from confab.reasoner.embodiment.values import Embodiment, Mechanism, Part, PerceiverUse, Place
+from confab.reasoner.symbols import Fact, Symbol
 from confab.scene import Scene
-from planner.acting.episode import Change, Intervention
-from planner.plan import Plan
-from reasoner.embodiment.values import Embodiment, Mechanism, Part, PerceiverUse, Place
-from reasoner.symbols import Fact, Symbol
-from sim.faults import displaced
-from sim.live import LiveWorld, take_away
-from sim.perception import observe_covered
-from sim.verdict import SkillError
-from sim.verify import Rollout, verify
-from sim.world import World
+from confab.sim.faults import displaced
+from confab.sim.live import LiveWorld, take_away
+from confab.sim.perception import observe_covered
+from confab.sim.verdict import SkillError
+from confab.sim.verify import Rollout, verify
+from confab.sim.world import World
 
 CUP, JAR, LID = (Symbol("LOCATION", (name,)) for name in ("cup", "jar", "lid"))
 

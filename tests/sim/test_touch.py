@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import confab
-from sim.attempt import Attempt
-from sim.engine import Engine
-from sim.faults import misaligned
-from sim.motion import line, pose_of
-from sim.urdf import Array
-from sim.verify import expectations, verify
-from sim.world import World
+from confab.sim.attempt import Attempt
+from confab.sim.engine import Engine
+from confab.sim.faults import misaligned
+from confab.sim.motion import line, pose_of
+from confab.sim.urdf import Array
+from confab.sim.verify import expectations, verify
+from confab.sim.world import World
 
 
 @pytest.mark.parametrize("off", [(0.0, -0.004), (0.006, 0.0), (-0.006, 0.0)])
