@@ -11,7 +11,7 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.plan_windows import regrouped, shortened
 from confab.planner.grounded.task import Task
 from confab.planner.paper.transitions import Model, Values
-from confab.planner.plan import Plan, Step, TooLargeError
+from confab.planner.plan import Plan, Step, UngroundableError
 from confab.reasoner.files import check_replaceable, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
@@ -122,7 +122,7 @@ def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) 
     """Return the steps regrouped; as they are, if they don't lead to the goal or there is no time for it."""
     try:
         task = ground(problem, level)
-    except (OutOfTimeError, TooLargeError):
+    except (OutOfTimeError, UngroundableError):
         return plan
     if not isinstance(task, Task):
         return plan

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from confab.planner.plan import Outcome, Reason, Status, TooLargeError
+from confab.planner.plan import Outcome, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem
 
@@ -59,7 +59,7 @@ def _added_up(problem: Problem, certificate: Certificate) -> Reason | None:
         return None
     from confab.planner.grounded.grounding import ground
 
-    with suppress(TooLargeError, MemoryError, OutOfTimeError):
+    with suppress(UngroundableError, MemoryError, OutOfTimeError):
         task = ground(problem, most=ADDED_UP)
         return task if isinstance(task, Reason) and task.terms else None
     return None

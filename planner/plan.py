@@ -207,8 +207,8 @@ class UnsolvableError(Exception):
         self.reason, self.certificate = reason, certificate
 
 
-class TooLargeError(Exception):
-    """What would be grounded is larger than allowed; the message says how large."""
+class UngroundableError(Exception):
+    """A level can't be grounded: it is larger than allowed, or its amounts aren't linear; the message says which."""
 
 
 @contextmanager

@@ -99,10 +99,8 @@ class Judge:
         every: bool = False,
         only: str = "",
         meant: Interpreter | None = None,
-        exports: bool = True,
     ) -> None:
         self.world, self.folder, self.every, self.only = world, folder, every or bool(only), only
-        self.exports = exports
         self.found = Judged()
         self.meant = meant or Interpreter(world.problem)
         self.rng = Random(f"judge {world.seed}")
@@ -201,7 +199,7 @@ class Judge:
         if not self.only or self.only == "checker":
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
             self.call("checker", lambda: self.checker(read, plans))
-        if self.exports and self.sampled(EXPORTS, "export", "export"):
+        if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
         if self.sampled(EXECUTIONS, "execute", "execute"):

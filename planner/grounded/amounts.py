@@ -17,6 +17,7 @@ from functools import cached_property
 from math import inf
 from typing import TypeAlias
 
+from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import (
     COMPARING,
     Amount,
@@ -27,7 +28,6 @@ from confab.reasoner.amounts import (
     situations_in,
     written,
 )
-from confab.reasoner.language import DomainError
 from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"
@@ -126,7 +126,7 @@ class AmountTable:
 
         Raises
         ------
-        DomainError
+        UngroundableError
             Two amounts that change are multiplied, or one is divided by.
         """
         match expression:
@@ -147,9 +147,7 @@ class AmountTable:
                 if other.terms and (one.terms or sign == "/"):
                     one_of, by = (" and ".join(sorted(situations_in(side))) for side in (left, right))
                     did = f"multiplies {one_of} by {by}, which both" if sign == "*" else f"divides by {by}, which"
-                    raise DomainError(
-                        f"a calculation {did} change; a whole level isn't searched with that: multiply by what never changes"
-                    )
+                    raise UngroundableError(f"a calculation {did} change; a flat search takes linear ones alone")
                 if sign == "/":
                     return one.times(_exact(Fraction(1) / other.constant)) if other.constant else None
                 return other.times(one.constant) if other.terms else one.times(other.constant)

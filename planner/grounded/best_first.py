@@ -38,7 +38,7 @@ from confab.planner.grounded.landmarks import in_series, landmarks
 from confab.planner.grounded.novelty import MOST_BYTES, STATE_BYTES, Seen, by_novelty, path_to
 from confab.planner.grounded.plan_windows import shorter
 from confab.planner.grounded.task import Task, bits_of
-from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, TooLargeError
+from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
@@ -156,10 +156,8 @@ def plan_level(
     goal = problem.goal_on(level) if goal is None else goal
     try:
         task = ground(problem, level, initial, goal, most_rows or MOST_ROWS, deadline)
-    except (TooLargeError, OutOfTimeError) as error:
-        return Outcome(
-            Status.GAVE_UP, reason=Reason(f"grounding stopped at a limit: {error}"), seconds=perf_counter() - began
-        )
+    except (UngroundableError, OutOfTimeError) as error:
+        return Outcome(Status.GAVE_UP, reason=Reason(f"grounding stopped: {error}"), seconds=perf_counter() - began)
     except MemoryError:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY, seconds=perf_counter() - began)
     if isinstance(task, Reason):

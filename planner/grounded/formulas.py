@@ -16,7 +16,7 @@ from typing import Protocol
 from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.joins import Table
 from confab.planner.grounded.schemas import plain_variables
-from confab.planner.plan import TooLargeError
+from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import Amount, bounds
 from confab.reasoner.language import mentions
 from confab.reasoner.symbols import (
@@ -98,7 +98,7 @@ class Formulas:
         """Return what must hold for a condition (negated: its contrary) to hold."""
         self.asked += 1
         if self.asked > CONDITIONS_PER_ROW * self.reached.most:
-            raise TooLargeError(
+            raise UngroundableError(
                 f"more than {CONDITIONS_PER_ROW * self.reached.most} conditions with individuals put in"
             )
         if not self.asked % 1024:

@@ -85,8 +85,8 @@ def ground(
 
     Raises
     ------
-    TooLargeError
-        A join would have more than `most` rows.
+    UngroundableError
+        A join would have more than `most` rows, or an amount that changes is divided by, or multiplied by another.
     OutOfTimeError
         The deadline came first.
     DomainError

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.plan import TooLargeError
+from confab.planner.plan import UngroundableError
 from confab.reasoner.limits import check
 
 Ints = NDArray[np.int64]
@@ -57,13 +57,13 @@ class Table:
 
         Raises
         ------
-        TooLargeError
+        UngroundableError
             There are more than `most` pairs.
         """
         check("grounding", PAIR * len(self))
         if not columns:
             if len(values) * len(self) > most:
-                raise TooLargeError(f"{len(values) * len(self)} combinations, more than the {most} allowed")
+                raise UngroundableError(f"{len(values) * len(self)} combinations, more than the {most} allowed")
             check("grounding", PAIR * len(values) * len(self))
             left = np.repeat(np.arange(len(values)), len(self))
             return left, np.tile(np.arange(len(self)), len(values))
@@ -73,7 +73,7 @@ class Table:
         counts = np.searchsorted(keys, wanted, "right") - low
         total = int(counts.sum())
         if total > most:
-            raise TooLargeError(f"{total} combinations, more than the {most} allowed")
+            raise UngroundableError(f"{total} combinations, more than the {most} allowed")
         check("grounding", PAIR * total)
         left = np.repeat(np.arange(len(values)), counts)
         ends = np.cumsum(counts)

@@ -25,7 +25,7 @@ from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.hierarchical.unsolvability import closed, refusal
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, TooLargeError
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, OutOfTimeError
@@ -105,7 +105,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
         if refusal(closed(problem, level, deadline)) is not None:
             return 0.0, None
         task = ground(problem, level, deadline=deadline)
-    except (TooLargeError, OutOfTimeError):
+    except (UngroundableError, OutOfTimeError):
         return 0.0, None
     if isinstance(task, Reason):
         return math.inf, None

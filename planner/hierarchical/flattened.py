@@ -15,7 +15,7 @@ from confab.planner.hierarchical.postoptimization import worth
 from confab.planner.hierarchical.refinement_cache import RefinedStep
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.levels import levels_left
-from confab.planner.plan import Plan, TooLargeError
+from confab.planner.plan import Plan, UngroundableError
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
 
@@ -90,7 +90,7 @@ def small(problem: Problem, level: int, deadline: float | None, most: int = MOST
     goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
     try:
         task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=deadline)
-    except TooLargeError:
+    except UngroundableError:
         return None
     return task if isinstance(task, Task) else None
 

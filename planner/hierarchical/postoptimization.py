@@ -19,7 +19,7 @@ from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement_cache import RefinedStep, Refiner, Template
 from confab.planner.hierarchical.subplans import Ground
 from confab.planner.hierarchical.subproblem import FEW, problem_of
-from confab.planner.plan import Reason, TooLargeError
+from confab.planner.plan import Reason, UngroundableError
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.symbols import Domain, Problem, Symbol
 
@@ -139,7 +139,7 @@ class Improver:
         problem = replace(problem, domain=self._binding(level))
         try:
             task = ground(problem, level, most=50 * OPERATORS, deadline=self.segments.deadline)
-        except TooLargeError:
+        except UngroundableError:
             return None
         if isinstance(task, Reason) or len(task) > OPERATORS:
             return None

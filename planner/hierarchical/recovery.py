@@ -16,7 +16,7 @@ from confab.planner.hierarchical.serialization import ADVISED, LONGER, Asleep, A
 from confab.planner.hierarchical.subplans import Effort
 from confab.planner.hierarchical.subproblem import MAKING
 from confab.planner.hierarchical.unsolvability import MOST_ROWS, PAIRS, TEST, closed, impossible, looked_at, proved
-from confab.planner.plan import Reason, TooLargeError
+from confab.planner.plan import Reason, UngroundableError
 from confab.planner.transitions import Cell
 from confab.reasoner.symbols import State
 
@@ -61,7 +61,7 @@ class Recovery:
 
     @property
     def too_large(self) -> Reason | None:
-        """Why the lowest level is too large to be grounded, if it is and that was asked."""
+        """Why the lowest level can't be grounded, if it is and that was asked."""
         return self._lowest if isinstance(self._lowest, Reason) else None
 
     @cached_property
@@ -253,7 +253,7 @@ def hopeful(call: Call) -> bool:
         return sufficient(call, initial)
     try:
         reached = closed(call.problem, call.program.levels[-1], call.segments.deadline, initial)
-    except TooLargeError:
+    except UngroundableError:
         return True
     return all(reached.possible(symbol, value) for symbol, value in call.problem.goal.items())
 
@@ -266,7 +266,7 @@ def sufficient(call: Call, initial: State) -> bool:
     level, deadline = call.program.levels[-1], call.segments.deadline
     try:
         task = ground(call.problem, level, initial, most=MOST_ROWS, deadline=deadline)
-    except TooLargeError:
+    except UngroundableError:
         return True
     if isinstance(task, Reason) or task.amounts is None:
         return not isinstance(task, Reason)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
-from confab.planner.plan import Plan, Step, TooLargeError, renumbered
+from confab.planner.plan import Plan, Step, UngroundableError, renumbered
 from confab.planner.validation import successor
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
@@ -41,7 +41,7 @@ def _grouped(problem: Problem, steps: list[Step], level: int) -> list[Step]:
     """
     try:
         task = ground(problem, level, goal={})  # which may be none that it sees
-    except (TooLargeError, OutOfTimeError):
+    except (UngroundableError, OutOfTimeError):
         return steps
     values = _course(problem, steps)
     if not isinstance(task, Task) or values is None:

@@ -22,7 +22,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.subplans import Ground, Keep, Segments
-from confab.planner.plan import Counts, Limits, Reason, Status, TooLargeError
+from confab.planner.plan import Counts, Limits, Reason, Status, UngroundableError
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.language import walk
@@ -88,7 +88,7 @@ class World:
         """The step before each that was forbidden, or itself where it was the first, with the state in which it stands."""
         self.other_ways = False
         self.task: Task | None = None
-        with suppress(TooLargeError, OutOfTimeError, MemoryError):
+        with suppress(UngroundableError, OutOfTimeError, MemoryError):
             task = self._grounded(targets, keep, width)
             self.task = None if isinstance(task, Reason) else task
         segments.check_time()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.subplans import Segments
 from confab.planner.hierarchical.subproblem import LEAST
-from confab.planner.plan import OUT_OF_MEMORY, Reason, TooLargeError, UnsolvableError
+from confab.planner.plan import OUT_OF_MEMORY, Reason, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State
 
@@ -67,7 +67,7 @@ def refusal(reached: Reached, most: int = MOST_CHANGES) -> Reason | None:
     )
     if changes <= most:
         return None
-    return Reason(f"level {reached.level} is too large to be grounded: {changes} changes, more than the {most} allowed")
+    return Reason(f"level {reached.level} can't be grounded: {changes} changes, more than the {most} allowed")
 
 
 def proved(problem: Problem, level: int, deadline: float | None = None) -> Task | Reason:
@@ -86,8 +86,8 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
         if too_large is not None:
             return too_large
         task = ground(problem, level, deadline=deadline)
-    except TooLargeError as error:
-        return Reason(f"level {level} is too large to be grounded: {error}")
+    except UngroundableError as error:
+        return Reason(f"level {level} can't be grounded: {error}")
     except MemoryError:
         return OUT_OF_MEMORY
     if isinstance(task, Reason):

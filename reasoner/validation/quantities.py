@@ -105,7 +105,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
             yield (
                 names.iri(name),
                 f"{name} {does}, {'both of which' if first and sign == '*' else 'which'} behaviors change",
-                "where a whole level is searched, as in a world of one level or for the cheapest plan, that is refused",
+                "no flat search of a whole level takes that: hard tasks are given up, and no plan is proved to be the cheapest",
                 "multiply by a relation's number or a constant, which never changes, or add and subtract instead",
             )
 

@@ -22,7 +22,7 @@ from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.serialization import Call, Compiled
-from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, TooLargeError
+from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, UngroundableError
 from confab.planner.solve import MODES, Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.pddl.importing import imported
@@ -90,7 +90,7 @@ def test_limits_are_said_to_be_limits() -> None:
 
 
 def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
-    with pytest.raises(TooLargeError, match="more than the 10 allowed"):
+    with pytest.raises(UngroundableError, match="more than the 10 allowed"):
         ground(tabletop, 1, most=10)
 
 

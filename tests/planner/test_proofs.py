@@ -348,7 +348,7 @@ def test_a_level_is_refused_for_more_changes_than_are_allowed() -> None:
     said = refusal(reached, 0)
     assert said is not None
     many = int(said.text.split(": ")[1].split()[0])
-    assert said.text == f"level 1 is too large to be grounded: {many} changes, more than the 0 allowed"
+    assert said.text == f"level 1 can't be grounded: {many} changes, more than the 0 allowed"
     assert refusal(reached, many) is None
     assert refusal(reached, many - 1) is not None
     assert (
@@ -360,7 +360,7 @@ def test_a_level_that_is_too_large_says_so_and_proves_nothing(monkeypatch: pytes
     monkeypatch.setattr("confab.planner.hierarchical.unsolvability.MOST_ROWS", 2)
     said = proved(kitchen({"AT cup1": "sink"}), 1)
     assert isinstance(said, Reason)
-    assert said.text.startswith("level 1 is too large to be grounded: ")
+    assert said.text.startswith("level 1 can't be grounded: ")
     monkeypatch.undo()
     assert isinstance(proved(kitchen({"AT cup1": "sink"}), 1), Task)
 
