@@ -78,8 +78,12 @@ _HOMES = {
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first asked for, so that the command line starts fast."""
+    if name.startswith("_"):
+        raise AttributeError(f"module 'confab' has no attribute '{name}'")
     if name not in _HOMES:
-        raise AttributeError(f"module 'confab' has no attribute '{name}'; it has {', '.join(__all__)}")
+        from confab.hints import MODULE, wrong_name
+
+        wrong_name("the module confab", name, _sys.modules[__name__], MODULE)
     from importlib import import_module
 
     return getattr(import_module(_HOMES[name]), name)

@@ -17,7 +17,14 @@ from click.exceptions import Exit
 from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
-COMMANDS = {  # as the help lists them, the main one first
+GROUPS = {  # as the help lists them, the main ones first
+    "Plan and act": ("plan", "run", "verify", "execute", "explain"),
+    "Learn": ("learn", "memory"),
+    "Ask": ("query", "serve", "picture"),
+    "Author": ("validate", "new", "generate", "convert", "fetch"),
+    "Exchange": ("import", "export"),
+}
+COMMANDS = {
     "plan": ("planning", "plan"),
     "run": ("planning", "run"),
     "verify": ("planning", "verify"),
@@ -45,7 +52,27 @@ class Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return their names."""
-        return list(COMMANDS)
+        return [name for names in GROUPS.values() for name in names]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by their purpose."""
+        width = max(map(len, COMMANDS))
+        for title, names in GROUPS.items():
+            commands = [(name, self.get_command(ctx, name)) for name in names]
+            with formatter.section(title):
+                room = formatter.width - 6 - width
+                formatter.write_dl([(name.ljust(width), its.get_short_help_str(room)) for name, its in commands if its])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that is meant; for a wrong name, say the most similar one."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from confab.reasoner.names import nearest
+
+            hint = nearest(args[0], COMMANDS)
+            raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a command, if there is one of that name."""

@@ -8,11 +8,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, overload
 
 import pyoxigraph as ox
 
 from confab.accepting import sparql_of
+from confab.hints import SCENE, wrong_name
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
@@ -46,6 +47,19 @@ class Known:
     """
 
     knowledge: KnowledgeGraph
+
+    def __post_init__(self) -> None:
+        """Refuse a name or path, which `confab.load` takes."""
+        if not isinstance(self.knowledge, KnowledgeGraph):
+            raise TypeError(
+                f"a scene is made of a knowledge graph; got {self.knowledge!r}: use confab.load({self.knowledge!r})"
+            )
+
+    if not TYPE_CHECKING:  # a type checker reports wrong names by itself
+
+        def __getattr__(self, name: str) -> NoReturn:
+            """Say which name does what a wrong one means."""
+            wrong_name("a scene", name, type(self), SCENE)
 
     seconds: dict[str, float] = field(default_factory=dict)
 

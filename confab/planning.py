@@ -10,14 +10,15 @@ from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
+from confab.hints import RESULT, wrong_name
 from confab.interchange import outcome_json
 from confab.known import Known
 from confab.planner.certified import certified
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, paused_collection, renumbered
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, MODES, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -227,6 +228,10 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
     return reading if observed is None else load_observed(Path(observed), reading)
 
 
+AnyStep: TypeAlias = "int | str | tuple[int, ...] | Step"
+"""What a step of a plan is asked for by; see `Result.why`."""
+
+
 @dataclass
 class Result:
     """What came of planning: the outcome, and the scene in which it holds.
@@ -311,12 +316,12 @@ class Result:
 
         return purposes(self.problem, self.plan)
 
-    def why(self, step: int | str | tuple[int, ...]) -> Because:
+    def why(self, step: AnyStep) -> Because:
         """Return why a step is in the plan: what it gives, and what needs that.
 
         Parameters
         ----------
-        step : int, str or path
+        step : Step, int, str or path
             Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words.
 
         Examples
@@ -333,14 +338,14 @@ class Result:
         found = find_step(self.plan, step, self.labels)
         return because(self.plan, found, self.purposes[found.path], self.labels)
 
-    def why_not(self, asked: str, instead: int | str | None = None, seconds: float | None = None) -> WhyNot:
+    def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
         """Return why something else isn't done: what it lacks, or what plan follows from it and what that costs more.
 
         Parameters
         ----------
         asked : str
             ``cup2 LOCATION location8``, also with ``by left_hand``; or ``B2_PICK right_hand cup1``, ``B2_PICK hand=right_hand``.
-        instead : int or str, optional
+        instead : Step, int, str or path, optional
             In the place of which step; if left out, of the most similar one where it can be done.
         seconds : float, optional
             Limit of the whole call.
@@ -375,6 +380,12 @@ class Result:
         if self.solved:
             return account(self.plan, self.purposes, self.labels, headline)
         return Account(headline, proof=() if self.certificate is None else proved(self.certificate, self.labels))
+
+    if not TYPE_CHECKING:  # a type checker reports wrong names by itself
+
+        def __getattr__(self, name: str) -> NoReturn:
+            """Say which name does what a wrong one means."""
+            wrong_name("a result", name, type(self), RESULT)
 
     @property
     def certificate(self) -> Certificate | None:

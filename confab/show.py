@@ -104,6 +104,8 @@ def summary(outcome: Outcome) -> str:
     if outcome.plan is None:
         reason = outcome.reason.text if outcome.reason else "no reason given"
         return f"{outcome.status.value}: {reason} ({expanded} expansions, {outcome.seconds * 1000:.0f} ms)"
+    if not outcome.plan.steps:
+        return f"solved: nothing to do, since all goals hold ({outcome.seconds * 1000:.0f} ms)"
     bound = "" if outcome.cost is None else f", costs {outcome.cost:g}"
     bound += "" if outcome.bound is None else f", at least {outcome.bound:g} proved for the lowest level"
     counts = outcome.plan.length

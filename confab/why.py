@@ -224,13 +224,13 @@ def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
     return found
 
 
-def find_step(plan: Plan, asked: int | str | Sequence[int], labels: Labels) -> Step:
+def find_step(plan: Plan, asked: int | str | Sequence[int] | Step, labels: Labels) -> Step:
     """Return the step that is asked for.
 
     Parameters
     ----------
     plan : Plan
-    asked : int, str or path
+    asked : Step, int, str or path
         Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3, counted from 0; the position in the tree,
         ``0.1.2``; or words: of the step as it is printed, or of its label.
     labels : Labels
@@ -241,6 +241,8 @@ def find_step(plan: Plan, asked: int | str | Sequence[int], labels: Labels) -> S
         No step, or more than one, is so called.
     """
     steps = list(plan.walk())
+    if isinstance(asked, Step):
+        asked = asked.path
     if isinstance(asked, int):
         if not 0 <= asked < len(plan.steps):
             raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0")

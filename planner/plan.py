@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from time import perf_counter
-from typing import Protocol
+from typing import Protocol, overload
 
 from confab.planner.certificates import Certificate
 from confab.reasoner.limits import current
@@ -53,11 +53,50 @@ class Step:
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A tree of steps that leads from one state to the goal."""
+@dataclass(frozen=True, repr=False)
+class Plan(Sequence[Step]):
+    """A tree of steps that leads from one state to the goal; as a sequence, the steps of its first level.
+
+    Examples
+    --------
+    >>> import confab
+    >>> plan = confab.load("beverage-serving").plan().plan
+    >>> plan
+    Plan of 4 / 10 / 32 steps:
+      22 B1_MOVE cup1 location7
+      28 B1_MOVE cup2 location5
+      34 B1_POUR bottle1 cup1
+      39 B1_POUR bottle2 cup2
+    >>> len(plan), plan[-1].behavior
+    (4, 'B1_POUR')
+    """
 
     steps: tuple[Step, ...]
+
+    def __len__(self) -> int:
+        """Return the number of steps of the first level."""
+        return len(self.steps)
+
+    def __bool__(self) -> bool:
+        """Return True: a plan without steps is a plan, too."""
+        return True
+
+    @overload
+    def __getitem__(self, index: int) -> Step: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Step, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Step | tuple[Step, ...]:
+        """Return one step of the first level, or several."""
+        return self.steps[index]
+
+    def __repr__(self) -> str:
+        """Return the number of steps per level, and the steps of the first one."""
+        if not self.steps:
+            return "Plan without steps"
+        many = " / ".join(map(str, self.length.values()))
+        return "\n".join([f"Plan of {many} steps:", *(f"  {step}" for step in self.steps)])
 
     def walk(self) -> Iterator[Step]:
         """Yield all steps, each before its sub-steps."""

@@ -83,5 +83,5 @@ def test_a_memory_learns_saves_and_loads(tmp_path: Path, scene: confab.Scene, re
 
 
 def test_an_unknown_name_of_the_package_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'plann'"):
+    with pytest.raises(AttributeError, match=r"the module confab has no 'plann'"):
         _ = confab.plann

@@ -1,0 +1,100 @@
+"""Names that a newcomer tries: they work, or the error names what does."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+import confab
+from confab.hints import MODULE, RESULT, SCENE
+from confab.planner.plan import Plan
+from confab.reasoner.symbols import Fact
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving-moved")
+
+
+@pytest.fixture(scope="module")
+def result(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
+
+
+def wrong(hints: dict[str, str]) -> list[tuple[str, str]]:
+    return [(name, right) for right, names in hints.items() for name in names.split()]
+
+
+def test_each_wrong_name_of_a_scene_a_result_and_the_module_says_the_right_one(
+    scene: confab.Scene, result: confab.Result
+) -> None:
+    for there, hints in ((confab, MODULE), (scene, SCENE), (result, RESULT)):
+        for name, right in wrong(hints):
+            with pytest.raises(AttributeError, match=r"use ") as told:
+                getattr(there, name)
+            assert str(told.value).endswith(f"use {right}"), name
+
+
+def test_right_names_are_what_the_hints_say(scene: confab.Scene, result: confab.Result) -> None:
+    for there, hints in ((scene, SCENE), (result, RESULT)):
+        for right in hints:
+            found: object = there
+            for name in right.partition("(")[0].split("."):
+                found = getattr(found, name)
+
+
+def test_a_misspelt_name_says_the_most_similar_one(scene: confab.Scene) -> None:
+    with pytest.raises(AttributeError, match=r"a scene has no 'qury'; did you mean 'query'\?"):
+        getattr(scene, "qury")  # noqa: B009
+    with pytest.raises(AttributeError, match=r"did you mean 'load'"):
+        getattr(confab, "laod")  # noqa: B009
+    assert not hasattr(scene, "_repr_latex_")
+
+
+def test_a_scene_made_of_a_name_says_what_loads_it() -> None:
+    with pytest.raises(TypeError, match=r"use confab\.load\('beverage-serving'\)"):
+        confab.Scene("beverage-serving")  # type: ignore[arg-type]
+
+
+def test_a_plan_is_a_sequence_of_the_steps_of_its_first_level(result: confab.Result) -> None:
+    plan = result.plan
+    assert [*plan] == [*plan.steps] == [plan[i] for i in range(len(plan))]
+    assert plan[-1:] == plan.steps[-1:]
+    assert plan.index(plan[0]) == 0
+    assert plan[0] in plan
+    assert repr(plan).splitlines()[1] == f"  {plan[0]}"
+    assert Plan(())
+    assert len(Plan(())) == 0
+
+
+def test_a_step_is_asked_for_by_itself_its_name_its_path_and_its_words(result: confab.Result) -> None:
+    step = result.plan[0]
+    told = [repr(result.why(asked)) for asked in (step, 0, f"L{step.level}#0", step.path, str(step))]
+    assert len(set(told)) == 1
+
+
+def test_a_plan_is_copied_and_pickled(result: confab.Result) -> None:
+    assert copy.deepcopy(result.plan) == pickle.loads(pickle.dumps(result.plan)) == result.plan
+
+
+def test_a_plan_of_a_scene_whose_goals_hold_says_that_nothing_is_to_be_done(scene: confab.Scene) -> None:
+    now = scene.problem.initial
+    done = scene.plan([f"{Fact(symbol, now[symbol])}" for symbol in scene.problem.goal])
+    assert done.solved
+    assert repr(done).startswith("solved: nothing to do, since all goals hold")
+
+
+def test_the_command_line_runs_as_a_module_groups_its_commands_and_guesses_a_misspelt_one() -> None:
+    def said(*words: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "confab", *words]
+        return subprocess.run(line, capture_output=True, text=True, check=False)
+
+    text = said("--help").stdout
+    assert [text.index(title) for title in ("Plan and act:", "Learn:", "Ask:", "Author:", "Exchange:")]
+    wrong = said("plna")
+    assert wrong.returncode == 2
+    assert wrong.stderr.strip() == "confab: no such command 'plna'; did you mean 'plan'?; see confab --help"
