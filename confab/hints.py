@@ -84,4 +84,4 @@ def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) ->
         meant = next((right for right, wrong in hints.items() if name in wrong.split()), "")
         similar = nearest(name, [each for each in dir(there) if not each.startswith("_")])
         text += f"; use {meant}" if meant else similar
-    raise AttributeError(text)  # without `name` and `obj`, for which Python would add a guess of its own
+    raise AttributeError(text)

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from confab.planner.certificates import certificate_json
+from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
@@ -77,14 +77,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     KnowledgeError
         The file isn't JSON of that form, or a step names what the scene doesn't have; the message says where.
     """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
-    except RecursionError as error:
-        raise KnowledgeError(f"{path}: no plan: brackets are nested too deeply") from error
-    except ValueError as error:  # of JSON, of UTF-8, and of numbers with thousands of digits
-        raise KnowledgeError(f"{path}: not JSON: {error}") from error
+    data = _json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
     if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
         what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no 'steps'"
@@ -92,6 +85,33 @@ def read_plan(path: Path, problem: Problem) -> Plan:
             f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene"
         )
     return Plan(tuple(_step(step, (i,), path, problem) for i, step in enumerate(data["steps"])))
+
+
+def read_certificate(path: Path) -> Certificate:
+    """Read a certificate from a JSON file: what `confab plan --json` prints of an unsolvable task, or the certificate alone.
+
+    Raises
+    ------
+    KnowledgeError
+        The file isn't JSON of that form; the message says what was wanted.
+    """
+    data = _json(path, "certificate")
+    try:
+        return certificate_from(data.get("certificate", data) if isinstance(data, dict) else data)
+    except ValueError as error:
+        raise KnowledgeError(f"{path}: {error}") from error
+
+
+def _json(path: Path, what: str) -> Any:
+    """Return what a JSON file holds, which shall be a plan or a certificate."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
+    except RecursionError as error:
+        raise KnowledgeError(f"{path}: no {what}: brackets are nested too deeply") from error
+    except ValueError as error:  # of JSON, of UTF-8, and of numbers with thousands of digits
+        raise KnowledgeError(f"{path}: not JSON: {error}") from error
 
 
 def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:

@@ -228,7 +228,7 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
     return reading if observed is None else load_observed(Path(observed), reading)
 
 
-AnyStep: TypeAlias = "int | str | tuple[int, ...] | Step"
+AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 """What a step of a plan is asked for by; see `Result.why`."""
 
 
@@ -322,7 +322,8 @@ class Result:
         Parameters
         ----------
         step : Step, int, str or path
-            Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words.
+            Which step of the first level, counted from 0; ``L3#12``, the step 12 of level 3; its path, ``0.1.2``; or its words,
+            also as a tuple.
 
         Examples
         --------

@@ -224,7 +224,7 @@ def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
     return found
 
 
-def find_step(plan: Plan, asked: int | str | Sequence[int] | Step, labels: Labels) -> Step:
+def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels: Labels) -> Step:
     """Return the step that is asked for.
 
     Parameters
@@ -243,6 +243,8 @@ def find_step(plan: Plan, asked: int | str | Sequence[int] | Step, labels: Label
     steps = list(plan.walk())
     if isinstance(asked, Step):
         asked = asked.path
+    if not isinstance(asked, int | str) and any(isinstance(word, str) for word in asked):
+        asked = " ".join(map(str, asked))  # a behaviour and its arguments
     if isinstance(asked, int):
         if not 0 <= asked < len(plan.steps):
             raise KnowledgeError(f"no step {asked}: the first level has {len(plan.steps)}, counted from 0")

@@ -328,6 +328,9 @@ def execute(
     "--step", type=click.IntRange(min=0), default=0, metavar="N", help="Which step of the level, counted from 0."
 )
 @click.option("--level", type=int, default=1, metavar="L", help="On which level of the plan.")
+@click.option(
+    "--check", type=PATH, metavar="FILE", help="Verify a certificate that `plan --json` wrote, and search nothing."
+)
 @click.option("--against", metavar="BEHAVIOR", help="With --memory: the alternative, 'B2_PICK right_hand cup1'.")
 @click.option("--plot", type=Output(PICTURE), metavar="FILE", help="Draw memory's reasons: PNG, SVG or PDF.")
 @TIME_LIMIT
@@ -341,14 +344,25 @@ def explain(
     memory: Path | None,
     step: int,
     level: int,
+    check: Path | None,
     against: str | None,
     plot: Path | None,
     time_limit: float | None,
     as_json: bool,
 ) -> None:
     """Say why each step is there, why not another one, or why no plan."""
+    from confab.certificates import checked_certificate
     from confab.planning import Result
 
+    if check is not None:
+        if any(given is not None for given in (which, instead, memory, against, plot)):
+            raise KnowledgeError(
+                "--check verifies a certificate and plans nothing; leave out STEP, --not and what asks memory"
+            )
+        with limited(time_limit):
+            checked = checked_certificate(load_scene(scene), goal, check)
+        show_result(checked.json() if as_json else str(checked))
+        raise Exit(YES if checked.holds else NO)
     with limited(time_limit):
         told = _explained(scene, which, instead, goal, memory, step, level, against, plot)
     if isinstance(told, Result):

@@ -73,7 +73,10 @@ def test_a_plan_is_a_sequence_of_the_steps_of_its_first_level(result: confab.Res
 
 def test_a_step_is_asked_for_by_itself_its_name_its_path_and_its_words(result: confab.Result) -> None:
     step = result.plan[0]
-    told = [repr(result.why(asked)) for asked in (step, 0, f"L{step.level}#0", step.path, str(step))]
+    told = [
+        repr(result.why(asked))
+        for asked in (step, 0, f"L{step.level}#0", step.path, str(step), (step.behavior, *step.arguments))
+    ]
     assert len(set(told)) == 1
 
 
