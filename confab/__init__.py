@@ -78,9 +78,11 @@ _HOMES = {
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first asked for, so that the command line starts fast."""
-    if name.startswith("_"):
-        raise AttributeError(f"module 'confab' has no attribute '{name}'")
     if name not in _HOMES:
+        from importlib.util import find_spec
+
+        if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` asks here first
+            raise AttributeError(f"module 'confab' has no attribute '{name}'")
         from confab.hints import MODULE, wrong_name
 
         wrong_name("the module confab", name, _sys.modules[__name__], MODULE)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, overload
 import pyoxigraph as ox
 
 from confab.accepting import sparql_of
-from confab.hints import SCENE, wrong_name
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
@@ -59,6 +58,8 @@ class Known:
 
         def __getattr__(self, name: str) -> NoReturn:
             """Say which name does what a wrong one means."""
+            from confab.hints import SCENE, wrong_name
+
             wrong_name("a scene", name, type(self), SCENE)
 
     seconds: dict[str, float] = field(default_factory=dict)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
-from confab.hints import RESULT, wrong_name
 from confab.interchange import outcome_json
 from confab.known import Known
 from confab.planner.certified import certified
@@ -386,6 +385,8 @@ class Result:
 
         def __getattr__(self, name: str) -> NoReturn:
             """Say which name does what a wrong one means."""
+            from confab.hints import RESULT, wrong_name
+
             wrong_name("a result", name, type(self), RESULT)
 
     @property

@@ -148,21 +148,34 @@ def test_what_is_imported_is_read_back_from_turtle(tmp_path: Path) -> None:
         assert again.domain.situations == problem.domain.situations
 
 
+def levels_and_total(effect: str) -> tuple[str, str]:
+    """Return a domain with one effect beside another that raises levels, and a problem whose goal is a total."""
+    return (
+        "(define (domain d) (:types thing) (:functions (level ?x - thing) (total))"
+        f"(:action go :parameters (?x - thing) :effect {effect})"
+        "(:action up :parameters (?x - thing) :effect (increase (level ?x) 1)))",
+        "(define (problem p) (:domain d) (:objects a - thing) (:init (= (total) 0) (= (level a) 0)) (:goal (= (total) 7)))",
+    )
+
+
 @pytest.mark.parametrize(
     ("domain", "said"),
     [
-        ("(increase (total) (* (level ?x) (level ?x)))", "multiplies LEVEL by LEVEL, which both change"),
         ("(increase (total) much)", "wanted a number, got 'much'"),
         ("(increase (much ?x) 1)", "undefined function 'much'"),
         ("(assign (total) (level ?x ?x))", "takes 1 arguments, got 2"),
     ],
 )
 def test_what_cant_be_planned_with_is_refused_by_name(domain: str, said: str) -> None:
-    text = (
-        "(define (domain d) (:types thing) (:functions (level ?x - thing) (total))"
-        f"(:action go :parameters (?x - thing) :effect {domain})"
-        "(:action up :parameters (?x - thing) :effect (increase (level ?x) 1)))"
-    )
-    problem = "(define (problem p) (:domain d) (:objects a - thing) (:init (= (total) 0) (= (level a) 0)) (:goal (= (total) 7)))"
     with pytest.raises((PddlError, ValueError), match="(?s)" + said.replace("(", r"\(")):
-        solve(Request(imported(parse(text, problem)).problem, "optimal"))
+        solve(Request(imported(parse(*levels_and_total(domain))).problem, "optimal"))
+
+
+def test_a_product_of_amounts_that_change_is_given_up_by_name_where_a_flat_search_is_needed() -> None:
+    problem = imported(parse(*levels_and_total("(increase (total) (* (level ?x) (level ?x)))"))).problem
+    for mode in ("guarded", "optimal"):
+        outcome = solve(Request(problem, mode))
+        assert outcome.status is Status.GAVE_UP
+        assert outcome.reason is not None
+        assert "multiplies LEVEL by LEVEL, which both change" in outcome.reason.text
+    assert solve(Request(problem, "paper")).status is Status.SOLVED
