@@ -137,7 +137,8 @@ class Instead(Loader):
     """Finds one module, and gives it another text."""
 
     def __init__(self, file: str, text: str) -> None:
-        self.name, self.file, self.text = file.removesuffix(".py").replace("/", "."), ROOT / file, text
+        within = "" if file.startswith("confab/") else "confab."
+        self.name, self.file, self.text = within + file.removesuffix(".py").replace("/", "."), ROOT / file, text
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
         """Return how the module is loaded, if it is this one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -143,7 +143,7 @@ class _Causes:
         found: list[Cause] = []
         for rule in self.problem.domain.rules.get(situation, ()):
             given = {p.name: a for p, a in zip(rule.parameters, symbol.arguments, strict=True) if a not in free}
-            cause = self.too_few(rule, given) or self.lacking(rule.behavior, rule.conditions, given)
+            cause = self.too_few(rule, given) or self.lacking(claim, rule.behavior, rule.conditions, given)
             found.append(cause)
         amount = lowest.quantity(situation) is not None
         kept = not amount and self.certificate.always.get(symbol) == fact.value
@@ -180,7 +180,7 @@ class _Causes:
                     for term, word in zip(terms, words, strict=True)
                     if word in free and term in own and not members(behavior.kinds[term]) <= members(free[word])
                 ]
-                found.append(self.lacking(behavior, (*behavior.preconditions, *effect.when, *classes), bound))
+                found.append(self.lacking(claim, behavior, (*behavior.preconditions, *effect.when, *classes), bound))
         found = [cause for cause in found if cause.text]
         if amount and not found and fact.value != self.certificate.always.get(symbol):
             return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
@@ -230,8 +230,15 @@ class _Causes:
                 return Cause(text, (rule.situation, kind))
         return None
 
-    def lacking(self, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]) -> Cause:
-        """Return what of some conditions can't be, as few of them as can be, those that never change before others."""
+    def lacking(
+        self, claim: Claim, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]
+    ) -> Cause:
+        """Return what of the conditions for making a claim false can't be: as few as can be, unchanging ones before others."""
+        from confab.reasoner.validation.contradictions import clashing
+
+        if clash := clashing(conditions, self.problem, behavior.kinds):
+            text = f"{behavior.name} needs {self._all(clash, given, behavior.kinds)}, and no state has both"
+            return Cause(text, (behavior.name,), (), 2)
         core = self.core(conditions, given, behavior)
         if core is None:
             return self.out_of_bounds(behavior, conditions, given)
@@ -251,6 +258,8 @@ class _Causes:
             if word
         )
         claims = [Claim(fact) for fact in view.claimed]
+        if claims == [claim]:
+            return Cause(f"{behavior.name} needs that it holds already", (behavior.name, *names), (claim,))
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
             free = {term for term in (*first.arguments, first.value) if term.startswith("?")}
@@ -331,14 +340,15 @@ class _Causes:
                     return f"no {kinds[left]} {condition.relation} {term(right)}"
                 if right.startswith("?"):
                     return f"{left} {condition.relation} no {kinds[right]}"
-        all_ = " and ".join(said(self._spoken(condition, given, kinds)) for condition in core)
+        all_ = self._all(core, given, kinds)
         if len(core) > 1:
             return f"nothing satisfies {all_}"
         return f"{'not' if self.lowest.constant(core[0]) else 'never'} {all_}"
 
-    def _spoken(self, condition: Condition, given: dict[str, str], kinds: dict[str, str]) -> Condition:
-        free = {name: f"some {kind}" for name, kind in kinds.items() if name not in given}
-        return substituted(condition, {**given, **free})
+    def _all(self, conditions: Sequence[Condition], given: dict[str, str], kinds: Mapping[str, str]) -> str:
+        """Return a conjunction in words, variables without a value by their classes."""
+        named = {**given, **{name: f"some {kind}" for name, kind in kinds.items() if name not in given}}
+        return " and ".join(said(substituted(condition, named)) for condition in conditions)
 
 
 def variables_of(expression: Expression) -> set[str]:

@@ -119,6 +119,15 @@ def test_what_is_about_two_individuals_is_followed_too() -> None:
     assert why(reaching) == ""
 
 
+def test_preconditions_that_no_state_has_both_are_named_together() -> None:
+    never = behavior(
+        "RINSE", 1, "?c:Cup", [has("CLEAN", "?c", FALSE), has("CLEAN", "?c", TRUE)], [becomes("CLEAN", "?c", TRUE)]
+    )
+    assert why(kitchen({"CLEAN cup1": TRUE}, behaviors=[PUT, never])) == (
+        "cup1 CLEAN true can't be reached: RINSE needs cup1 CLEAN false and cup1 CLEAN true, and no state has both"
+    )
+
+
 def test_what_nothing_brings_about_is_said_so() -> None:
     assert why(kitchen({"DRY cup1": TRUE}, behaviors=[PUT, WASH])) == (
         "cup1 DRY true can't be reached: no behaviour of level 1 makes it so"
@@ -337,7 +346,7 @@ def test_a_long_chain_of_reasons_is_cut_and_what_needs_itself_is_told_once() -> 
     cause = "can't be reached: not cup1 CLEAN true, which LIGHT0 needs; so never"
     assert lamps(3) == f"cup1 L2 true {cause} cup1 L0 true, cup1 L1 true"
     assert lamps(10) == f"cup1 L9 true {cause} cup1 L0 true, cup1 L1 true, cup1 L2 true, cup1 L3 true and 5 more"
-    assert lamps(1, "L0") == "cup1 L0 true can't be reached: never cup1 L0 true, which LIGHT0 needs"
+    assert lamps(1, "L0") == "cup1 L0 true can't be reached: LIGHT0 needs that it holds already"
 
 
 # ------------------------------------------------------------------------------------------------ limits of grounding
