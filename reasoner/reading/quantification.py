@@ -2,7 +2,9 @@
 
 The query has one sub-select per parameter, which yields the individuals of its type in declared order; together they yield
 every assignment in the order that numbers them (PAPER.md section 4): behaviours in declared order, then parameters in theirs,
-then individuals in theirs. Whether a quantified behaviour can be done here is not asked: M counts them all.
+then individuals in theirs. `quantify` numbers the rows itself and leaves the order out of its query: the store then yields rows
+one after the other, ten times as fast, and a time limit ends the query. Whether a quantified behaviour can be done here is not
+asked: M counts them all.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     found: dict[int, GroundBehavior] = {}
     for behavior in problem.domain.at_level(level):
         kinds = [parameter.kind for parameter in behavior.parameters]
-        for count, row in enumerate(graph.solutions(query_for(reading, behavior), SCENE)):
+        for count, row in enumerate(graph.solutions(query_for(reading, behavior, ordered=False), SCENE)):
             if not count % 4096:
                 check(f"quantifying {behavior.name} ({len(found):,} so far)")
             arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(kinds)])
@@ -58,10 +60,10 @@ def behavior_named(reading: Reading, name: str) -> Behavior:
     return behaviors[name]
 
 
-def query_for(reading: Reading, behavior: Behavior) -> str:
+def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str:
     """Return the SPARQL 1.1 query that quantifies a behaviour: one column per parameter, one row per assignment.
 
-    The rows are in the order of IDs, but where individuals share an index, or have none and lie in several ontologies.
+    If ordered, the rows are in the order of IDs, but where individuals share an index, or have none and lie in several ontologies.
 
     If the reading isn't of the whole scene, its individuals are the only ones that are asked for.
 
@@ -71,7 +73,7 @@ def query_for(reading: Reading, behavior: Behavior) -> str:
         The type of a parameter has no IRI, as the union of several classes hasn't.
     """
     names = [parameter.name for parameter in behavior.parameters]
-    order = " ".join(f"{name}_index STR({name})" for name in names)
+    order = " ".join(f"{name}_index STR({name})" for name in names) if ordered else ""
     return "\n".join(
         [
             f"# {behavior.name}({', '.join(f'{p.name[1:]}: {p.kind}' for p in behavior.parameters)}), level {behavior.level}",
