@@ -263,11 +263,15 @@ def _check_files(call: Call, case: Path) -> None:
 
 def _check_plan(result: Result) -> None:
     """Raise AssertionError if a plan is none, or if there is one where the answer is that there is none."""
+    from confab.planner.certificate_checks import refusal
     from confab.planner.plan import Status
     from confab.planner.validation import validate
     from worlds.agreement import cheapest
 
     outcome, problem = result.outcome, result.problem
+    if outcome.status is Status.UNSOLVABLE:
+        assert outcome.certificate is not None, "unsolvable was said without a certificate"
+        assert refusal(problem, outcome.certificate) is None, "the certificate of unsolvable is refused"
     proved = outcome.status is Status.UNSOLVABLE or outcome.bound is not None
     if (
         proved
@@ -311,8 +315,8 @@ def _import_all() -> None:
     """Import what the cases need, once for all of them."""
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
-        "planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
-        "reasoner": "validation.validate graph.apart reading.affordance",
+        "confab.planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
+        "confab.reasoner": "validation.validate graph.apart reading.affordance",
     }
     for name in (
         *(f"{room}.{part}" for room, parts in rooms.items() for part in parts.split()),

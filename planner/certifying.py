@@ -5,16 +5,18 @@ goal, so that only what could matter is looked at; what is needed and can't be b
 
 Where the goal could be brought about in this way, few values are told apart, at first the goal's, and the cases are searched. A way
 to the goal through the cases is tried out on the task itself; the values on which it fails there are told apart, too, until there
-is no way left, or the way succeeds: then there is a plan.
+is no way left, or the way succeeds: then there is a plan. Last, all values are told apart: the cases are then the states. The
+number of cases may be infinite in one of these ways and small in another; so each is given little work first, and then more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
+from math import prod
 from operator import itemgetter
 from typing import TypeAlias
 
@@ -39,7 +41,7 @@ WORK = 3_000_000
 LITTLE = 2_000, 20_000
 """So many tests for each goal by itself, and then so many, before all of them are looked into to the end."""
 PAIR, SHARE = 100_000, 0.5
-"""So many tests for each pair of goals, and this share of all of them for all pairs."""
+"""Maximum number of tests for each pair of goals; each way to tell cases apart may take this share of the tests that are left."""
 FEW = 3
 """If more values of a symbol are to be told apart, all are."""
 Key: TypeAlias = "tuple[str, Symbol, str]"
@@ -60,8 +62,7 @@ def certify(problem: Problem, most: float = WORK) -> Certificate | None:
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
-            or _by_pairs(lowest, relaxed)
-            or _by_cases(lowest, relaxed, problem.goal)
+            or _in_stages(lowest, relaxed)
         )
     except (WorkLimitError, RecursionError):
         return None
@@ -299,9 +300,21 @@ def _number(effect: AmountEffect) -> bool:
 # -------------------------------------------------------------------------------------------------------------- by cases
 
 
+def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
+    """Return a certificate by cases of two goals, of all goals, or by all states, whichever takes the least work."""
+    for little in (LITTLE[1], lowest.most):
+        for find in (
+            partial(_by_pairs, lowest, relaxed),
+            partial(_by_cases, lowest, relaxed, lowest.problem.goal),
+            partial(_by_states, lowest),
+        ):
+            if (found := _with_little(lowest, min(little, SHARE * (lowest.most - lowest.work)), find)) is not None:
+                return found
+    return None
+
+
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     """Return a certificate for two goals about the same individual that can't hold together, with what has to be at rest."""
-    last = lowest.work + SHARE * (lowest.most - lowest.work)
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
         if a in other.arguments or b in one.arguments:  # one is about the value of the other: these come first
@@ -309,10 +322,9 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
         elif not {*one.arguments}.isdisjoint(other.arguments):
             pairs.append((1, {one: a, other: b}))
     for _, pair in sorted(pairs, key=itemgetter(0)):
-        little = min(PAIR, last - lowest.work)
-        if little <= 0:
+        if lowest.work >= lowest.most:
             break
-        if (found := _with_little(lowest, little, partial(_by_cases, lowest, relaxed, pair))) is not None:
+        if (found := _with_little(lowest, PAIR, partial(_by_cases, lowest, relaxed, pair))) is not None:
             return found
     return None
 
@@ -331,6 +343,43 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | No
         if refined is None or refined == certificate:
             return None
         certificate = refined
+
+
+def _by_states(lowest: Lowest) -> Certificate | None:
+    """Tell all values apart; each case is then a state, and in none of them the goal holds and what was touched is at rest."""
+    problem = lowest.problem
+    told_apart: dict[Symbol, tuple[str, ...]] = {}
+    for name in sorted(lowest.changing):
+        kind = problem.domain.situations[name]
+        stated = [symbol for symbol in problem.initial if symbol.situation == name]
+        of = [problem.classes.get(each, ()) for each in kind.arguments] if kind.boolean else []
+        lowest.spend(prod(map(len, of)))
+        unstated = (Symbol(name, arguments) for arguments in product(*of)) if of else ()
+        told_apart.update(dict.fromkeys((*stated, *unstated), ()))
+    rests = [
+        Fact(s, str(rest)) for s in told_apart if (rest := problem.domain.situations[s.situation].rest) is not None
+    ]
+    unmet = [Fact(symbol, wanted) for symbol, wanted in sorted(problem.goal.items())]
+    unmet += [fact for fact in sorted(rests) if fact.symbol not in problem.goal and wanted_in_the_end(problem, fact)]
+    cases = Cases(lowest, Certificate(told_apart=told_apart, unmet=tuple(unmet)))
+    cases.explore()
+    if cases.fault or cases.reached is not None:
+        return None
+    return replace(cases.certificate, unmet=_enough(cases, unmet), cases=len(cases.came_from))
+
+
+def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
+    """Return a few facts of which one at least is unmet in each case."""
+    failing = {
+        fact: {case for case in cases.came_from if not cases.met(Reading(cases.lowest, View(cases.claims, case)), fact)}
+        for fact in unmet
+    }
+    found: list[Fact] = []
+    left = set(cases.came_from)
+    while left:
+        found.append(max(unmet, key=lambda fact: len(failing[fact] & left)))
+        left -= failing[found[-1]]
+    return tuple(sorted(found))
 
 
 def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certificate | None:

@@ -11,19 +11,24 @@ from confab.reasoner.symbols import Rule
 Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
 
+def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]]:
+    """Return for each situation type that rules define those that depend on it and on which it depends."""
+    return {name: group for group in strata(rules) for name in group}
+
+
 class Definitions:
     """What is defined, asked one symbol at a time, and known until `forget`.
 
     Parameters
     ----------
-    rules : mapping of situation type to its rules
+    strata : mapping of situation type to its stratum
+        From `stratum_of`.
     given : function of a situation type and arguments to a truth value
         Whether one of the rules gives it; what rules ask for in turn they ask of `follows`.
     """
 
-    def __init__(self, rules: Mapping[str, Sequence[Rule]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
-        self._given = given
-        self._strata = {name: group for group in strata(rules) for name in group}
+    def __init__(self, strata: Mapping[str, tuple[str, ...]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
+        self._given, self._strata = given, strata
         self._asking: dict[tuple[str, ...], dict[Cell, bool]] = {}
         self._known: dict[Cell, bool] = {}
 

@@ -15,7 +15,7 @@ from functools import partial
 from time import perf_counter
 from typing import Protocol, TypeAlias
 
-from confab.planner.checked_definitions import Definitions
+from confab.planner.checked_definitions import Definitions, stratum_of
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds, situations_in, terms_of
 from confab.reasoner.limits import current
 from confab.reasoner.symbols import (
@@ -85,6 +85,7 @@ class Lowest:
         domain = problem.domain
         self.level = domain.levels[-1] if domain.levels else 1
         self.behaviors = domain.at_level(self.level)
+        self.strata = stratum_of(domain.rules)
         self.changing = frozenset[str]().union(*(behavior.changes for behavior in self.behaviors))
         self.effects: dict[str, list[tuple[Behavior, ValueEffect]]] = {}
         for behavior in self.behaviors:
@@ -204,10 +205,7 @@ class Reading:
 
     def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
         self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
-        rules = self.problem.domain.rules
-        self._defined = {
-            must: Definitions(rules, partial(self._given, must=must)) for must in ((True, False) if rules else ())
-        }
+        self._definitions: dict[bool, Definitions] = {}
 
     # ------------------------------------------------------------------------------------------------------- values
 
@@ -219,14 +217,19 @@ class Reading:
             return False
         if situation in self.problem.domain.rules:
             if value == TRUE:
-                return self._defined[must].follows((situation, arguments))
-            return value == FALSE and not self._defined[not must].follows((situation, arguments))
+                return self._defined(must).follows((situation, arguments))
+            return value == FALSE and not self._defined(not must).follows((situation, arguments))
         symbol = Symbol(situation, arguments)
         if situation not in lowest.changing:
             return lowest.initial(symbol) == value
         if lowest.quantity(situation) is not None:
             return self.amount_meets(symbol, value, must)
         return not self.knowledge.may_not(symbol, value) if must else self.knowledge.may(symbol, value)
+
+    def _defined(self, must: bool) -> Definitions:
+        if must not in self._definitions:
+            self._definitions[must] = Definitions(self.lowest.strata, partial(self._given, must=must))
+        return self._definitions[must]
 
     def _given(self, situation: str, arguments: tuple[str, ...], must: bool) -> bool:
         for rule in self.problem.domain.rules[situation]:

@@ -19,7 +19,7 @@ from typing import TypeAlias
 
 from confab.planner.checked_amounts import changed, worth
 from confab.planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
-from confab.planner.checked_definitions import Definitions
+from confab.planner.checked_definitions import Definitions, stratum_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import (
@@ -243,7 +243,7 @@ class Facts:
 
     @cached_property
     def _definitions(self) -> Definitions:
-        return Definitions(self.problem.domain.rules, lambda about, key: self.rules.follows(about, key, self))
+        return Definitions(self.rules.strata, lambda about, key: self.rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
         """Return what is stated now."""
@@ -299,6 +299,7 @@ class Rules:
     ) -> None:
         self.problem = problem
         self.lookups, self.lifted = lookups, lifted or {}
+        self.strata = stratum_of(problem.domain.rules)
         self._read: dict[str, _Behavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
         self._defined: dict[str, list[_Behavior]] = {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import signal
+import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -344,7 +345,8 @@ class Judge:
         from unified_planning.io import PDDLReader
 
         try:
-            PDDLReader().parse_problem_string(domain, problem)
+            with warnings.catch_warnings(action="ignore"):  # its own use of what pyparsing calls outdated
+                PDDLReader().parse_problem_string(domain, problem)
         except Exception as error:
             self.complain("unified-planning can't read the export", mode, f"{type(error).__name__}: {error}")
 

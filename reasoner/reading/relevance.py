@@ -288,11 +288,14 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
     if len(arguments) != 2:
         properties = frozenset()
     nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
+    unstated = (
+        situation is not None
+        and len(arguments) > len(situation.arguments)
+        and (situation.default in _constants(arguments[-1], scope, known))
+    )  # a symbol that has the default may not be stated: none of its arguments can be found by it
     for at, source in enumerate(arguments):
         kind = scope.kinds.get(source)
-        constants = frozenset({source} if kind is None else known.classes.get(kind, ()))
-        if situation is not None and at == len(situation.arguments) and situation.default in constants:
-            continue  # who has the default may not say so: it can't be found by it
+        constants = _constants(source, scope, known)
         if situation is None:
             cost = RELATION if properties or not at else BACKWARD
         elif not properties:
@@ -301,6 +304,8 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
             cost = FREE if not at else FROM_CONSTANT if kind is None else BACKWARD
         alone = situation is None or (not at and len(situation.arguments) == 1)
         for target in (other for other in arguments if other != source):
+            if unstated and target != arguments[-1]:
+                continue
             yield _Step(
                 source,
                 target,
@@ -310,6 +315,12 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
                 constants=constants,
                 looks_up=None if alone or situation is None else (situation.name, at),
             )
+
+
+def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
+    """Return the constants that a term may stand for."""
+    kind = scope.kinds.get(term)
+    return frozenset({term} if kind is None else known.classes.get(kind, ()))
 
 
 # ------------------------------------------------------------------------------------------------- 2. following it

@@ -83,3 +83,17 @@ def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_pat
     its = Judge(mixed(seed), tmp_path, every=True).judged()
     assert not its.complaints
     assert {its.status[mode] for mode in ("guarded", "optimal", "paper")} <= {"solved", "unsolvable"}
+
+
+@pytest.mark.parametrize("seed", [200_002_806, 200_004_245, 200_009_091])
+def test_few_states_are_certified_where_telling_fewer_values_apart_has_no_end(seed: int, tmp_path: Path) -> None:
+    its = Judge(mixed(seed), tmp_path, every=True).judged()
+    assert not its.complaints
+    assert {its.status[mode] for mode in ("guarded", "optimal", "paper")} == {"unsolvable"}
+
+
+def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Path) -> None:
+    """A fact of two objects with the default value leads from neither to the other: the class is looked through."""
+    its = Judge(mixed(200_012_855), tmp_path, every=True).judged()
+    assert not its.complaints
+    assert its.least == 1.0 and its.length == 1
