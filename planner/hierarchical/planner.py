@@ -20,14 +20,13 @@ flat search             the rest, solved or unsolvable, until a limit   `confab.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from confab.planner.hierarchical.concerns import Concern, concerns, put_aside
-from confab.planner.hierarchical.detours import AGAIN, without_detours
+from confab.planner.hierarchical.concerns import concerns, put_aside
+from confab.planner.hierarchical.detours import without_detours
 from confab.planner.hierarchical.postoptimization import Improver, length, worth_it
 from confab.planner.hierarchical.recovery import Recovery
 from confab.planner.hierarchical.refinement_cache import MUCH, RefinedStep
@@ -52,8 +51,6 @@ FLAT = 50_000_000
 """What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
 FLAT_ROWS = 30_000
 """The largest join of such a task, on the way to its operators."""
-REDONE = 2_000
-"""Steps that may be done again to find out which are needless: a table of a thousand took twice as long without a bound."""
 SEARCHING = 0.93
 """Of the time limit, the share to search in: giving back what was allocated takes the rest."""
 
@@ -220,9 +217,9 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
 
 def achieved(recovery: Recovery) -> bool:
     """Do steps after which all goals hold; whether there are some."""
-    call, levels = recovery.call, recovery.levels or ()
+    call = recovery.call
     call.segments.doubt = recovery.doubt
-    done = call.serialise(recovery.harder) or (recovery.anew(levels) and call.serialise(recovery.harder))
+    done = call.serialise(recovery.harder)
     recovery.solvable = recovery.solvable or done
     return done
 
@@ -280,11 +277,6 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     first, call.steps = call.steps, fewer(call)
     concerned = concerns(call.refiner, call.steps)
     aside = put_aside(concerned)
-    needed = without_needless(call, concerned, list(aside))
-    if len(needed) < len(call.steps):
-        call.steps = needed
-        concerned = concerns(call.refiner, call.steps)
-        aside = put_aside(concerned)
     before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
     if not leave_levels:
         return False
@@ -321,7 +313,7 @@ def beside(call: Call, problem: Problem, settled: bool = False) -> Call:
     """
     other = Call(problem, call.using, call.segments.deadline, call.segments.most)
     known = call.refiner
-    other.refiner.found, other.refiner.failed, other.refiner.long = known.found, known.failed, known.long
+    other.refiner.found, other.refiner.failed = known.found, known.failed
     if settled:
         from confab.planner.hierarchical.settling import settle
 
@@ -350,42 +342,6 @@ def fewer(call: Call) -> list[RefinedStep]:
     return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
 
 
-def without_needless(call: Call, concerned: Sequence[Concern], positions: Sequence[int]) -> list[RefinedStep]:
-    """Return a call's steps without those at some positions, each with what then can't be done, that the goals don't need.
-
-    That one is needed is seen as soon as the step can't be done that touched a goal last, and that goal isn't met.
-    """
-    refiner, table = call.refiner, call.table
-    if abstract(call, call.steps) < len(call.steps):
-        return call.steps  # where a level was left, what is put aside may be what brings something to rest
-    rest, kept = deque(enumerate(call.steps)), []
-    tried = set(sorted(positions)[: min(AGAIN, REDONE // max(1, len(rest)))])
-    last = {cell: number for number, one in enumerate(concerned) for cell in one.touched if cell in call.goal}
-
-    def without() -> Iterator[tuple[int, RefinedStep]]:
-        for number, step in rest:
-            again = refiner.again(step)
-            if again is not None:
-                yield number, again
-            elif any(last.get(cell) == number and not call.met(cell) for cell in concerned[number].touched):
-                return
-
-    table.undo(0)
-    while rest:
-        number, step = rest.popleft()
-        if number in tried:
-            mark, later = len(table.trail), list(without())
-            reached = all(map(call.met, call.goal))
-            table.undo(mark)
-            if reached:
-                rest = deque(later)
-                continue
-        refiner.redo(step)
-        kept.append(step)
-    table.undo(0)
-    return kept
-
-
 def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
 
@@ -398,12 +354,12 @@ def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
     first = call.program.levels[0]
     reversed_goal = dict(reversed(list(call.problem.goal.items())))
     left = max(call.segments.worked, MUCH)  # for both together
-    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True))[: 1 if call.at_once else 2]:
+    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
         other = beside(call, replace(call.problem, goal=goal), call.settled)
         other.segments.most_work = left
         advised(other)
         other.advice = None
-        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True, forward=True)
+        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True)
         with suppress(LimitError):
             done = recovery.together(first) if at_once else other.serialise(recovery.harder)
             if at_once and done and not all(map(other.met, other.goal)):  # what the first level doesn't see

@@ -1,4 +1,4 @@
-"""What is tried where goals in series get stuck: more steps, lower levels, all goals at once, going back to where it went astray.
+"""What is tried where goals in series get stuck: more steps, lower levels, all goals at once.
 
 Each attempt is dearer than the one before; those that nothing has changed for aren't made again. When all are made, no plan was
 found, and what is left is the lowest level alone (`confab.planner.hierarchical.planner`).
@@ -6,28 +6,25 @@ found, and what is left is the lowest level alone (`confab.planner.hierarchical.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.refinement_cache import MOST_OPERATORS, WHOLE, WIDER
 from confab.planner.hierarchical.serialization import ADVISED, LONGER, Asleep, Attempt, Before, Call
 from confab.planner.hierarchical.subplans import Effort
-from confab.planner.hierarchical.subproblem import MAKING
-from confab.planner.hierarchical.unsolvability import MOST_ROWS, PAIRS, TEST, closed, impossible, looked_at, proved
-from confab.planner.plan import Reason, UngroundableError
+from confab.planner.hierarchical.unsolvability import PAIRS, TEST, impossible, looked_at, proved
+from confab.planner.plan import Reason
 from confab.planner.transitions import Cell
-from confab.reasoner.symbols import State
 
 if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
-ALL = (WHOLE,)
-"""All goals at once in the whole world."""
+ALL, RESTART = (WHOLE,), Effort(depth=0)
+"""All goals at once in the whole world: from where the steps so far end, and from the beginning."""
 FEW = 1_000
 """So many states of the lowest level, at least, are worth looking at."""
-Done = TypeVar("Done")
 
 
 @dataclass
@@ -44,7 +41,7 @@ class Recovery:
     solvable : bool
         Whether it is known that there is a plan, so that nothing is to be proved.
     forward : bool
-        Whether what was done stays done: nothing is begun anew, nor gone back to.
+        Whether what was done stays done: nothing is begun again.
     """
 
     call: Call
@@ -72,7 +69,7 @@ class Recovery:
             found.append((self.call.program.levels[0], ADVISED))
         for level in self.call.program.levels if self.levels is None else self.levels:
             *small, large = self.call.refiner.worlds(level)
-            found += [(level, attempt) for attempt in (LONGER, (*small,), (large,), ALL)[: self.attempts]]
+            found += [(level, attempt) for attempt in (LONGER, (*small,), RESTART, (large,), ALL)[: self.attempts]]
         return found
 
     def harder(self, asleep: Asleep, before: Before) -> bool:
@@ -94,6 +91,10 @@ class Recovery:
             call.restarts += 1
             return True
         for level, attempt in self.ladder:
+            if attempt is RESTART:
+                if self.restart(level):
+                    return True
+                continue
             if attempt is ALL:
                 if self.together(level):
                     return True
@@ -110,29 +111,11 @@ class Recovery:
                 call.failed.setdefault(cell, set()).add((level, attempt))
                 if not isinstance(attempt, Effort) and not self.solvable:
                     self._prove()
-                if self._astray(not isinstance(attempt, Effort)):
-                    call.restarts += 1
-                    return True
         if call.progressed:  # something was done since some of these attempts failed
             call.failed.clear()
             call.progressed = False
             return self.harder(asleep, before)
         return False
-
-    def _astray(self, at_once: bool) -> bool:
-        """Go back to where steps led astray, if they did; as soon as as much was searched in vain as asking takes.
-
-        At once, and where all goals at once are planned anew, too, if asked to.
-        """
-        call = self.call
-        if self.forward or not (at_once or call.vain >= MAKING * call.program.size(call.program.levels[-1])):
-            return False
-        call.vain = 0
-        self.forward = self.retreat()
-        if at_once and not self.forward:
-            self.forward = True
-            return self.anew(call.program.levels[:1])
-        return self.forward
 
     def advised(self, cell: Cell) -> bool:
         """Achieve a goal as advised, if there is advice now that wasn't tried; whether that succeeded."""
@@ -191,48 +174,27 @@ class Recovery:
         call.kept.update(call.unseen)
         return True
 
-    def anew(self, levels: Sequence[int]) -> bool:
-        """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was."""
-        call = self.call
-        if not call.steps:
-            return False  # nothing has led anywhere
-        steps, given_up, kept, tried = call.steps, call.given_up, call.kept, self._tried
-        call.table.undo(0)
-        call.steps, call.given_up, self._tried = [], [], {}
-        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        if any(self.together(level) for level in levels):
-            call.at_once = True
-            return True
-        call.redo(steps)
-        call.steps, call.given_up, call.kept, self._tried = steps, given_up, kept, tried
-        return False
+    def restart(self, level: int) -> bool:
+        """Achieve all goals at once from the beginning, where taking them in series has led astray; else all is as it was.
 
-    def retreat(self) -> bool:
-        """Go back to where all goals could still be reached, and do the step that led astray so that they can be from there, too.
-
-        A key that lies in the room that it unlocks: no level above sees that. Whether all can be reached from there on; else all
-        is as it was.
+        Refinements then leave as it was what no level above sees, if they can: so that no goal gets out of reach unseen.
         """
-        call = self.call
-        if not call.refiner.drifting or not call.steps or hopeful(call):
+        call, refiner = self.call, self.call.refiner
+        if not call.steps or self.forward or level != call.program.levels[0]:
             return False
-        steps = call.steps
-        low, high = 0, len(steps)
-        while high - low > 1:
-            middle = (low + high) // 2
-            call.redo(steps[:middle])
-            low, high = (middle, high) if hopeful(call) else (low, middle)
-        call.redo(steps[:low])
-        mark = len(call.table.trail)
-        call.refiner.again(steps[low])
-        step = tidily(call, mark, lambda: call.refiner.do(*steps[low][:3]))
-        if step is None:
-            call.redo(steps)
-            return False
-        call.wary = lambda done, mark, do: done if hopeful(call) else tidily(call, mark, do)
-        call.steps = [*steps[:low], step]
+        self.forward = True
+        steps, given_up, kept = call.steps, call.given_up, call.kept
+        call.redo(())
+        call.steps, call.given_up = [], []
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        return True
+        refiner.careful = True
+        if self.together(level):
+            call.restarts += 1
+            return True
+        refiner.careful = False
+        call.redo(steps)
+        call.steps, call.given_up, call.kept = steps, given_up, kept
+        return False
 
     def together(self, level: int) -> bool:
         """Achieve all goals at once on a level, from here; whether that succeeded, and not tried twice from one state."""
@@ -241,62 +203,3 @@ class Recovery:
             return False
         self._tried[level] = len(call.steps)
         return call.reach(level, {c: v for c, v in call.goal.items() if not call.met(c)}, ALL)
-
-
-# ------------------------------------------------------------------------------------ whether all can still be reached
-
-
-def hopeful(call: Call) -> bool:
-    """Whether every goal could be reached from here on the lowest level if nothing ever became false."""
-    initial = {**call.problem.initial, **call.table.state()}
-    if any(s.quantity is not None for s in call.problem.domain.situations.values()):
-        return sufficient(call, initial)
-    try:
-        reached = closed(call.problem, call.program.levels[-1], call.segments.deadline, initial)
-    except UngroundableError:
-        return True
-    return all(reached.possible(symbol, value) for symbol, value in call.problem.goal.items())
-
-
-def sufficient(call: Call, initial: State) -> bool:
-    """Whether every goal could be reached from a state if nothing became false and no amount were in the way of another."""
-    from confab.planner.grounded.grounding import ground
-    from confab.planner.grounded.hff_amounts import heuristic
-
-    level, deadline = call.program.levels[-1], call.segments.deadline
-    try:
-        task = ground(call.problem, level, initial, most=MOST_ROWS, deadline=deadline)
-    except UngroundableError:
-        return True
-    if isinstance(task, Reason) or task.amounts is None:
-        return not isinstance(task, Reason)
-    return heuristic(task)(task.initial) is not None
-
-
-def tidily(call: Call, mark: int, do: Callable[[], Done | None]) -> Done | None:
-    """Do once more what was done since a mark, so that all goals can be reached; None, and the table as at the mark, if not.
-
-    Of what was left in another state than at the mark, and might be anything, only that is left as it was which has to be.
-    """
-    table = call.table
-    after = table.since(mark)
-    table.undo(mark)
-    free = [cell for cell in after if not call.segments.visible(call.program.levels[0], cell)]
-    needed = set(free)
-    for cell in free:
-        table_mark = len(table.trail)
-        for other, value in after.items():
-            if other == cell or other not in needed:
-                table.put(*other, value)
-        if hopeful(call):
-            needed.discard(cell)
-        table.undo(table_mark)
-    call.segments.tidy = frozenset(needed)
-    try:
-        done = do()
-    finally:
-        call.segments.tidy = frozenset()
-    if done is None or hopeful(call):
-        return done
-    table.undo(mark)
-    return None

@@ -25,7 +25,7 @@ SHORT = Effort(depth=4)
 MUCH = 1_500_000
 """What a search in a large world may cost, in states times operators."""
 NEAR, WIDER = Width(10, 0, 50_000), Width(20)
-WIDE, WHOLE = Width(160, 4, MUCH, patient=True), Width(None, work=MUCH, patient=True)
+WIDE, WHOLE = Width(160, 4, MUCH), Width(None, work=MUCH)
 """The worlds that are looked at one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""
@@ -90,16 +90,12 @@ class Refiner:
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.besides: dict[Cell, str] = {}
         """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
-        self.failed: dict[object, list[tuple[int, list[tuple[Cell, str]]]]] = {}
-        """Of what was asked, in how many worlds a refinement was searched in vain, and what held there."""
+        self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
+        """Nogoods: of each step that couldn't be refined, what held in the world in which that was found out."""
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
         """What search found, by the state: steps after which another can't be refined are done again on the next way."""
-        self.long: set[str] = set()
-        """Behaviours whose last refinement was too long for a few relevant steps, which are tried last then."""
-        self.vain: set[str] = set()
-        """Behaviours for a refinement of which a large world was searched in vain, and long."""
-        self.thorough = True
-        """Whether a large world is searched for a refinement of these, too."""
+        self.careful = False
+        """Whether refinements leave as it was what the level above doesn't see, if they can."""
         self.advice: Advice | None = None
         self.at: Ground | None = None
         """The behaviour of the most abstract level that is being refined, or couldn't be."""
@@ -113,7 +109,9 @@ class Refiner:
         if level == self.levels[-1]:
             self.segments.apply(changes)
             return RefinedStep(level, name, arguments, bindings, ())
-        children = self._refine(level, name, arguments, bindings, changes)
+        children = None
+        for careful in (True, False) if self.careful else (False,):
+            children = children or self._refine(level, name, arguments, bindings, changes, careful)
         return None if children is None else RefinedStep(level, name, arguments, bindings, children)
 
     def targets(self, changes: Sequence[Change]) -> dict[Cell, str]:
@@ -171,9 +169,15 @@ class Refiner:
     # -------------------------------------------------------------------------------------------------------- refining
 
     def _refine(
-        self, level: int, name: str, arguments: tuple[str, ...], bindings: tuple[str, ...], changes: Sequence[Change]
+        self,
+        level: int,
+        name: str,
+        arguments: tuple[str, ...],
+        bindings: tuple[str, ...],
+        changes: Sequence[Change],
+        careful: bool,
     ) -> tuple[RefinedStep, ...] | None:
-        targets, keep = self.targets(changes), self.segments.refining(level)
+        targets, keep = self.targets(changes), self.segments.refining(level, careful)
         if level == self.levels[0]:
             targets |= self.besides
         below = self.levels[self.levels.index(level) + 1]
@@ -188,34 +192,30 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         now = self.table.now
-        widths = self.worlds(below)[: None if self.thorough or name not in self.vain else -1]
-        question = name, arguments, self.segments.tidy, tuple(self.besides)
+        widths = self.worlds(below)
+        question = name, arguments, careful, tuple(self.besides)
         here = question, frozenset(self.table.since(0).items())
         if here in self.found:
             for step in self.found[here]:
                 self.redo(step)
             self.hits += 1
             return self.found[here]
-        for tried, facts in self.failed.get(question, ()):
-            if tried >= len(widths) and all(now[situation].get(key) == value for (situation, key), value in facts):
+        for facts in self.failed.get(question, ()):
+            if all(now[situation].get(key) == value for (situation, key), value in facts):
                 return None
         self.misses += 1
         self.at = (name, arguments) if level == self.levels[0] else self.at
-        worked = self.segments.worked
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
-            attempts: list[Effort | Sequence[Width]] = [SHORT, widths]
-            for attempt in reversed(attempts) if name in self.long else attempts:
-                found = self.achieve(below, targets, keep, attempt) if found is None else found
+            found = self.achieve(below, targets, keep, SHORT)
+        if found is None:
+            found = self.achieve(below, targets, keep, widths)
         if found is None:
             around = problem_of(self.segments, below, focus(self.segments, below, targets, widths[-1]))
             facts = [((s.situation, key_of(s.arguments)), value) for s, value in around.initial.items()]
-            self.failed.setdefault(question, []).append((len(widths), facts))
-            if self.segments.worked - worked > NEAR.work + WIDER.work:
-                self.vain.add(name)
+            self.failed.setdefault(question, []).append(facts)
             return None
         self.at = None if level == self.levels[0] else self.at
-        (self.long.add if len(found) > SHORT.depth else self.long.discard)(name)
         self.found[here] = tuple(found)
         known.append(self.template([(step.behavior, step.arguments) for step in found], individuals))
         known.sort(key=lambda template: len(template.steps))
@@ -279,9 +279,7 @@ class Refiner:
         for _ in range(ATTEMPTS):
             found = world.search()
             if found is None:
-                if not self.drifting or not world.by_other_ways():
-                    return None
-                continue
+                return None
             steps: list[RefinedStep] = []
             for position, (name, arguments) in enumerate(found):
                 step = self.do(level, name, arguments)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 from confab.planner.hierarchical.operators import Achiever, Program
-from confab.planner.hierarchical.refinement_cache import MUCH, Advice, RefinedStep, Refiner, Template
+from confab.planner.hierarchical.refinement_cache import Advice, RefinedStep, Refiner, Template
 from confab.planner.hierarchical.subplans import Effort, Segments
 from confab.planner.hierarchical.subproblem import Width
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
@@ -36,8 +36,6 @@ Before: TypeAlias = "Mapping[Cell, Sequence[Cell]]"
 """For each goal those that must come before it."""
 Harder: TypeAlias = "Callable[[Asleep, Before], bool]"
 """Achieves one of the goals that are asleep by more effort; whether that succeeded."""
-Again: TypeAlias = "Callable[[], list[RefinedStep] | None]"
-"""Does steps anew and returns them; None, and nothing done, without any."""
 
 
 @dataclass
@@ -97,17 +95,11 @@ class Call:
         """The goals that were aimed at last."""
         self.failed: dict[Cell, set[tuple[int, Attempt]]] = {}
         self.progressed = False
-        self.vain = 0
-        """Work of small worlds that came to nothing since it was last asked whether steps led astray."""
         self.restarts = 0
         self.redone = 0
         """How often steps were done from the beginning."""
         self.settled = False
         """Whether the first steps bring to rest what isn't in the beginning."""
-        self.at_once = False
-        """Whether the first steps are to all goals at once."""
-        self.wary: Callable[[list[RefinedStep], int, Again], list[RefinedStep] | None] | None = None
-        """Looks whether steps done since a mark have led astray, and does them again then."""
 
     def advise(self, advice: GoalAdvice) -> None:
         """Take advice before any search, for goals and for refinements."""
@@ -206,17 +198,11 @@ class Call:
         hidden = self.unseen if first else {}  # seldom any: no copy of all goals for each of them
         kept = {c: v for c, v in self.kept.items() if c not in hidden} if hidden else self.kept
         keep = self.segments.keeping(kept)
-        mark, worked = len(self.table.trail), self.segments.worked
-        self.refiner.thorough = not isinstance(attempt, Effort) and attempt[-1].work >= MUCH
         if attempt is ADVISED:
             steps = self.advice.follow(level, targets, keep) if self.advice is not None else None
         else:
             steps = self.refiner.achieve(level, targets, keep, attempt)
-        if steps is not None and self.wary is not None:
-            steps = self.wary(steps, mark, lambda: self.refiner.achieve(level, targets, keep, attempt))
-        self.refiner.thorough = True
         if steps is None:
-            self.vain += self.segments.worked - worked
             return False
         self.steps.extend(steps)
         self.progressed = True

@@ -91,10 +91,6 @@ class Segments:
             self.deadline = Limits().end()
         self.enough = math.inf
         """The work of all attempts to find a first plan."""
-        self.in_vain = 0
-        """Searches of large worlds that ended at their limit."""
-        self.tidy: frozenset[Cell] = frozenset()
-        """What refinements leave as it was, though it might be anything in the end."""
         bound = self.program.bind(self.table)
         self.forward, self.achieve = bound.forward, bound.achieve
         self.wants = Wants(self.program, self.table, self.goal)
@@ -255,10 +251,13 @@ class Segments:
             not levels or all(levels.get(argument, 1) <= level for argument in arguments_of(cell[1]))
         )
 
-    def refining(self, level: int) -> Keep:
-        """Return what refining a behaviour of `level` keeps: all that this level knows as it was, the rest at rest."""
-        tidy, rest = self.tidy, self.rest
-        return lambda cell, first: first if cell in tidy or self.visible(level, cell) else rest.get(cell[0])
+    def refining(self, level: int, careful: bool = False) -> Keep:
+        """Return what refining a behaviour of `level` keeps: all that this level knows as it was, the rest at rest.
+
+        If `careful`, also as it was what has no rest value, so that it might be anything.
+        """
+        rest = self.rest
+        return lambda cell, first: first if self.visible(level, cell) else rest.get(cell[0], first if careful else None)
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
         """Return what steps towards a goal keep: the goals reached before, the rest at rest."""

@@ -55,27 +55,13 @@ class Width:
     """How much of the world is looked at, and how long.
 
     `questions` is the most values that chains towards one target may lead through, None takes the whole world; `spares` how many
-    values there are beside these of each sort that they belong to. `work` bounds one search, in states times operators; a `patient`
-    one of a call may take twice or four times as long where others came to nothing, as in `luby`.
+    values there are beside these of each sort that they belong to.
+    `work` bounds one search, in states times operators.
     """
 
     questions: int | None
     spares: int = 1
     work: int = 200_000
-    patient: bool = False
-
-
-def luby(number: int) -> int:
-    """Return how long the n-th try may be: whatever length is needed, no other order is sooner there by more than a log factor.
-
-    Luby, Sinclair and Zuckerman, "Optimal speedup of Las Vegas algorithms", Information Processing Letters 47 (1993).
-
-    >>> [luby(number) for number in range(1, 16)]
-    [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]
-    """
-    while number & (number + 1):
-        number -= (1 << number.bit_length() - 1) - 1
-    return (number + 1) // 2
 
 
 class World:
@@ -84,9 +70,6 @@ class World:
     def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
         self.segments, self.level, self.width = segments, level, width
         self.plan: tuple[int, ...] = ()
-        self.ways: set[tuple[int, int]] = set()
-        """The step before each that was forbidden, or itself where it was the first, with the state in which it stands."""
-        self.other_ways = False
         self.task: Task | None = None
         with suppress(UngroundableError, OutOfTimeError, MemoryError):
             task = self._grounded(targets, keep, width)
@@ -119,44 +102,23 @@ class World:
             self.segments.spend(self.level, Counts(), MAKING * LEAST)
             return None
         size = max(len(self.task.owners), LEAST)
-        times = luby(self.segments.in_vain + 1) if self.width.patient else 1
-        limits, most = Limits(times * self.width.work // LEAST), BITS * times * self.width.work
+        limits, most = Limits(self.width.work // LEAST), BITS * self.width.work
         found = search(self.task, limits, self.segments.deadline, most_work=most, portfolio=WORLD)
         work = max(LEAST * found.counts.expanded, found.work // BITS)
         self.segments.spend(self.level, found.counts, MAKING * size + work)
         self.plan = found.plan
         if found.status is not Status.SOLVED:
-            self.segments.in_vain += self.width.patient and found.status is Status.GAVE_UP
             return None
         return [self.task.describe(operator)[:2] for operator in found.plan]
 
     def forbid(self, position: int) -> None:
         """Take back the plan that was found last because of one of its steps, which can't be refined where it stands."""
         assert self.task is not None
-        before = self._same(max(position - 1, 0))
-        self.task.barred.update(before if self.other_ways else self._same(position))
-        self.ways |= before
-
-    def by_other_ways(self) -> bool:
-        """Allow what was forbidden, but for the steps that led to where it stood; whether that wasn't done before.
-
-        Whether a step can be refined may depend on what its level doesn't see, which is otherwise where another step leads there.
-        """
-        if self.task is None or self.other_ways or self.ways <= self.task.barred:
-            return False
-        self.other_ways = True
-        self.task.barred.clear()
-        self.task.barred.update(self.ways)
-        return True
-
-    def _same(self, position: int) -> set[tuple[int, int]]:
-        """Return the operators that are a step of the plan that was found last, with the state in which it stands."""
-        assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:
             state = self.task.applied(state, operator) or state
         name = self.task.describe(self.plan[position])[:2]
-        return {(state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name}
+        self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 
 
 def focus(segments: Segments, level: int, targets: Mapping[Cell, str], width: Width) -> set[str] | None:

@@ -16,10 +16,7 @@ from confab.planner.grounded.grounding import ground as grounded
 from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import bounds as optimal
-from confab.planner.hierarchical import subproblem
 from confab.planner.hierarchical.planner import compiled, plan
-from confab.planner.hierarchical.serialization import Call
-from confab.planner.hierarchical.subproblem import LEAST, Width
 from confab.planner.paper.transitions import Model, ground
 from confab.planner.plan import Limits, Status
 from confab.planner.validation import validate
@@ -329,19 +326,3 @@ def test_the_benchmarks_truth_and_exhaustion_agree_though_they_share_no_code() -
             continue
         steps = steps_of(problem, 3)
         assert (math.inf if truth.shortest is None else truth.shortest) == steps, seed
-
-
-def test_a_large_world_may_cost_more_after_others_came_to_nothing_and_a_small_one_may_not() -> None:
-    problem = family("swap", 8)
-    call = Call(problem, compiled(problem), None, 10_000)
-    goal = {cell: value for cell, value in call.goal.items() if not call.met(cell)}
-    world = subproblem.World(call.segments, 1, goal, call.segments.keeping({}), Width(None))
-
-    def found(work: int, patient: bool = False) -> bool:
-        world.width = Width(None, work=work, patient=patient)
-        return world.search() is not None
-
-    least = next(work for work in range(LEAST, 100 * LEAST, LEAST) if found(work))
-    assert least > LEAST
-    assert not any(found(least - LEAST) for _ in range(4))
-    assert [found(least - LEAST, patient=True) for _ in range(3)] == [False, False, True]
