@@ -83,7 +83,8 @@ def __getattr__(name: str) -> object:
 
         if name.startswith("_") or find_spec(f"confab.{name}"):  # `from confab import module` asks here first
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
-        from confab.hints import MODULE, wrong_name
+        from confab.hints import MODULE
+        from confab.reasoner.names import wrong_name
 
         wrong_name("the module confab", name, _sys.modules[__name__], MODULE)
     from importlib import import_module

@@ -14,6 +14,7 @@ import pyoxigraph as ox
 from confab import ontology
 from confab.memory import Memory
 from confab.planner.paper.transitions import ground
+from confab.planner.solve import Mode
 from confab.reasoner.files import alone, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.memory.experience_file import Lines
@@ -171,7 +172,7 @@ class Difference:
         )
 
 
-def difference(old: Scene, new: Scene, mode: str) -> Difference:
+def difference(old: Scene, new: Scene, mode: Mode) -> Difference:
     """Return what an edit changed: objects, behaviours and quantified behaviours, and the plan."""
     before, after = _inventory(old), _inventory(new)
     return Difference(
@@ -193,7 +194,7 @@ def _inventory(scene: Scene) -> dict[str, list[str]]:
     }
 
 
-def _lines(scene: Scene, mode: str) -> tuple[str, ...]:
+def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
     """Return a scene's plan, one line per step, or the reason why there is none."""
     result = scene.plan(mode=mode)
     if not result.solved:

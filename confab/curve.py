@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from confab.planner.plan import Status
+from confab.planner.solve import Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.names import local_name
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from confab.scene import Scene
 
 KINDS = (".png", ".svg", ".pdf")
-MODES = {"guarded": "by default", "paper": "the paper's mode"}
+MODES: dict[Mode, str] = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
 """Time limit in seconds of a planning call; the picture leaves out calls that exceed it."""
 MANY = 12
@@ -51,8 +52,8 @@ class Curve:
     """Expansions per episode and mode, with the memory before that episode and without memory; None where planning gave up."""
 
     scenes: list[str] = field(default_factory=list)
-    with_memory: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
-    without: dict[str, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
+    with_memory: dict[Mode, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
+    without: dict[Mode, list[int | None]] = field(default_factory=lambda: {mode: [] for mode in MODES})
 
     def measure(self, name: str, scene: Scene, memory: Memory) -> None:
         """Add an episode: plan in a scene with the present memory and without memory."""
@@ -122,7 +123,7 @@ def require_drawable(path: Path) -> None:
         raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {', '.join(KINDS)}")
 
 
-def _expansions(scene: Scene, memory: Memory | None, mode: str) -> int | None:
+def _expansions(scene: Scene, memory: Memory | None, mode: Mode) -> int | None:
     """Return the number of expansions of planning, or None if it finds no plan in time."""
     try:
         outcome = scene.plan(memory=memory, mode=mode, time_limit=SECONDS, engine="none").outcome

@@ -16,7 +16,7 @@ from pkgutil import iter_modules
 from subprocess import DEVNULL, TimeoutExpired
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.levels import levels_left
@@ -27,6 +27,9 @@ from confab.reasoner.limits import Deadline, within
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.symbols import Problem, Symbol
 from confab.reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
+
+if TYPE_CHECKING:
+    import unified_planning.model
 
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
@@ -94,6 +97,26 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
         if not faults:
             return outcome(Status.SOLVED, plan)
     return outcome(Status.GAVE_UP, reason=f"its plan is none here: {faults[0].text}")
+
+
+def unified(domain: str, problem: str) -> unified_planning.model.Problem:
+    """Return a PDDL domain and problem as unified-planning reads them.
+
+    Raises
+    ------
+    KnowledgeError
+        unified-planning isn't installed, or doesn't read them.
+    """
+    try:
+        from unified_planning.io import PDDLReader
+    except ImportError:
+        raise KnowledgeError("this needs unified-planning: pip install unified-planning") from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # its own use of what pyparsing calls outdated
+            return PDDLReader().parse_problem_string(domain, problem)
+    except Exception as error:  # of many kinds, for what it doesn't know
+        raise KnowledgeError(f"unified-planning can't read this level: {error}") from error
 
 
 def some_installed(problem: Problem) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
@@ -17,16 +17,18 @@ from confab.planner.acting.executive import Moment, Patience, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.plan import Plan, Planner, Step, renumbered
-from confab.planner.solve import DEFAULT_MODE
+from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import nearest
+from confab.reasoner.names import nearest, right_names
 from confab.reasoner.possible import refuse_impossible
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import networkx
 
     from confab.known import Known
@@ -229,6 +231,7 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> dict[str, An
 # ------------------------------------------------------------------------------------------------------------- at the front desk
 
 
+@right_names("an execution", "confab.hints", "EXECUTION")
 @dataclass(frozen=True)
 class Execution:
     """What came of carrying a task out: an episode, and the scene in which it happened."""
@@ -321,6 +324,16 @@ class Execution:
         return styled(tag("p", self.summary()), timeline(course, labels), shown)
 
 
+class Options(TypedDict, total=False):
+    """What else `execute` takes."""
+
+    prepare: Callable[[Any], None] | None
+    patience: Patience
+    caution: Caution | None
+    perturb: bool
+    both_hands: bool
+
+
 def carry_out(
     scene: Known,
     plan: AnyPlan | None = None,
@@ -328,12 +341,12 @@ def carry_out(
     world: str | World = "symbolic",
     goals: Facts = (),
     memory: Memory | Links | str | Path | None = None,
-    mode: str = DEFAULT_MODE,
+    mode: Mode = DEFAULT_MODE,
     seed: int = 0,
     tell: Callable[[Moment], None] | None = None,
     watch: bool = False,
     time_limit: float | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Execution:
     """Carry a task out with what a caller may hand over: see `confab.scene.Scene.execute`."""
     from confab.live import spectator
@@ -358,7 +371,7 @@ def carry_out(
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 
 
-def planner_of(mode: str, memory: Links | None = None) -> Planner | None:
+def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
     """Return what plans from scratch in a mode; None stands for the fast planner.
 
     Raises

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NoReturn
-
-from confab.reasoner.names import nearest
-
 MODULE = {
     "confab.load(SCENE)": "open read read_scene load_scene load_file load_ontology from_file parse World Ontology",
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples",
@@ -30,11 +25,14 @@ SCENE = {
     "facts": "state initial initial_state init current_state get_state observe values",
     "goals": "goal_state get_goals task tasks",
     "picture": "draw show plot render image visualise visualize to_png",
-    "problem.domain.behaviors": "behaviors behaviours actions operators skills get_actions",
+    "behaviors": "behaviours actions operators skills get_actions",
     "problem.domain.situations": "situations situation_types predicates fluents",
     "problem.classes": "classes types sorts user_types",
     "problem.domain": "domain",
-    "export": "to_pddl pddl write_pddl as_pddl",
+    "to_pddl()": "pddl as_pddl get_pddl",
+    "export": "write_pddl save_pddl",
+    "to_unified_planning()": "unified_planning to_up",
+    "read_plan(FILE)": "load_plan open_plan parse_plan",
     "affordances": "afforded afford possible_actions applicable applicable_actions",
     "graph()": "triples rdf to_rdf to_graph rdflib as_graph serialize serialise",
     "owl()": "owlready ontology onto world get_ontology to_owl owlready2",
@@ -51,12 +49,14 @@ RESULT = {
     "solved": "success succeeded is_solved ok found is_solvable has_plan",
     "outcome.status": "status state result",
     "outcome.reason": "reason failure error message",
-    "outcome.cost": "cost metric value price",
+    "cost": "metric value price total_cost",
     "outcome.bound": "bound lower_bound",
     "seconds": "time duration runtime elapsed",
     "json": "to_json to_dict as_dict dict dumps serialize serialise",
     "save": "dump write to_file store export",
-    "graph": "to_networkx networkx to_graph nx digraph tree",
+    "plan.to_networkx()": "to_networkx networkx to_graph nx digraph tree graph",
+    "plan.to_dot()": "to_dot dot graphviz",
+    "plan.to_dataframe()": "to_dataframe dataframe to_pandas df to_csv",
     "why": "why_step reasons justify explain_step because",
     "why_not": "whynot contrast alternatives why_isnt",
     "verify": "simulate check validate physics rollout",
@@ -64,24 +64,34 @@ RESULT = {
     "report": "html show page to_html render",
     "outcome.search": "statistics stats search expansions nodes metrics log_messages",
 }
-
-
-def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) -> NoReturn:
-    """Raise the error for a name that `there` lacks: with the name that does what it means, or the most similar one.
-
-    Parameters
-    ----------
-    kind : str
-        What lacks it, e.g. ``a scene``.
-    name : str
-    there : object
-        Its public names are those that `dir` lists.
-    hints : mapping of str to str
-        A right name to the words that mean it.
-    """
-    text = f"{kind} has no '{name}'"
-    if not name.startswith("_"):
-        meant = next((right for right, wrong in hints.items() if name in wrong.split()), "")
-        similar = nearest(name, [each for each in dir(there) if not each.startswith("_")])
-        text += f"; use {meant}" if meant else similar
-    raise AttributeError(text)
+EXECUTION = {
+    "reached": "success succeeded ok solved done is_done finished goal_reached",
+    "plan": "steps actions executed done_plan trace",
+    "episode": "history log result trajectory record",
+    "episode.events": "events observations",
+    "episode.replans": "replans repairs changes",
+    "episode.failures": "failures errors faults",
+    "episode.status": "status state outcome",
+    "json": "to_json to_dict as_dict dict dumps serialize serialise",
+    "report": "html show page to_html render plot",
+    "save": "dump write to_file store export",
+    "summary()": "describe explain message text",
+}
+REPORT = {
+    "verified": "success succeeded ok passed valid is_valid result",
+    "rollouts": "runs trials simulations episodes",
+    "shown.failure": "failure error first_failure failed why reason",
+    "rate()": "success_rate accuracy score probability",
+    "good": "successes n_success count",
+    "trusted": "assumed unverified unchecked",
+    "json": "to_json to_dict as_dict dict dumps serialize serialise",
+    "table()": "to_dataframe dataframe steps details",
+    "video": "film movie mp4 save_video animation",
+    "summary()": "describe message text",
+}
+MEMORY = {
+    "Memory.load(FILE)": "open read from_file",
+    "save(FILE)": "write dump store to_file export persist",
+    "learn(SCENE, PLAN)": "add train update fit record remember append observe",
+    "teach(SCENE, PLAN)": "demonstrate show_plan imitate demonstration",
+}

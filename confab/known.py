@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import pyoxigraph as ox
 
@@ -16,10 +16,10 @@ from confab.accepting import sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import within
-from confab.reasoner.names import Names, nearest
+from confab.reasoner.names import Names, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.reading.problem import Reading, read, read_names
-from confab.reasoner.symbols import Fact, Problem
+from confab.reasoner.symbols import Behavior, Fact, Problem
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Known")
 
 
+@right_names("a scene", "confab.hints", "SCENE")
 @dataclass
 class Known:
     """What is known of a scene: read, asked in SPARQL, edited and changed; `confab.scene.Scene` adds what is done in it.
@@ -54,19 +55,16 @@ class Known:
                 f"a scene is made of a knowledge graph; got {self.knowledge!r}: use confab.load({self.knowledge!r})"
             )
 
-    if not TYPE_CHECKING:  # a type checker reports wrong names by itself
-
-        def __getattr__(self, name: str) -> NoReturn:
-            """Say which name does what a wrong one means."""
-            from confab.hints import SCENE, wrong_name
-
-            wrong_name("a scene", name, type(self), SCENE)
-
     seconds: dict[str, float] = field(default_factory=dict)
 
     _edited: bool = field(default=False, init=False, repr=False, compare=False)
 
     _told: bool = field(default=False, init=False, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what pickling and copying keep: the knowledge as it is now; what was read from it is read again."""
+        self.settle()
+        return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
     @cached_property
     def reading(self) -> Reading:
@@ -119,6 +117,19 @@ class Known:
         above = {name: {sup for kind in of for sup in problem.parents.get(kind, ())} for name, of in kinds.items()}
         own = {name: " ".join(k for k in of if k not in above[name] and "|" not in k) for name, of in kinds.items()}
         return dict(sorted(own.items(), key=lambda pair: pair[1]))
+
+    @property
+    def behaviors(self) -> dict[str, Behavior]:
+        """The behaviours by name, in declared order, with their parameters, conditions and effects; `update_of` writes one out.
+
+        Examples
+        --------
+        >>> import confab
+        >>> [*confab.load("beverage-serving").behaviors][:2]
+        ['B1_MOVE', 'B1_POUR']
+        """
+        self.settle()
+        return dict(self.problem.domain.behaviors)
 
     @property
     def facts(self) -> list[str]:

@@ -25,7 +25,7 @@ from confab.reasoner.memory.experience import ITSELF, Experience, Fact, GoalKind
 from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
-from confab.reasoner.names import Names
+from confab.reasoner.names import Names, right_names
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ SHOWN = 3
 """So many are said of whom a method took lately."""
 
 
+@right_names("a memory", "confab.hints", "MEMORY")
 @dataclass
 class Memory:
     """A confabulation memory.

@@ -16,7 +16,7 @@ from confab.reasoner.files import check_replaceable, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.pddl.exporting import plan_of, to_pddl
+from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import PddlError, parse_files
 from confab.reasoner.pddl.turtle import turtle
@@ -58,13 +58,13 @@ def _check_turtle(file: Path) -> None:
         pass
 
 
-def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:
-    """Write one level of a scene, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder.
+def exported(problem: Problem, level: int | None) -> Exported:
+    """Return one level of a scene in PDDL, the lowest if none is given.
 
     Raises
     ------
     KnowledgeError
-        There is no such level, or none at all, or the folder can't be written.
+        There is no such level, or none at all.
     """
     levels = problem.domain.levels
     if not levels:
@@ -73,9 +73,20 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
         )
     if level is not None and level not in levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}")
-    exported = to_pddl(problem, level)
+    return to_pddl(problem, level)
+
+
+def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:
+    """Write one level of a scene, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder.
+
+    Raises
+    ------
+    KnowledgeError
+        There is no such level, or none at all, or the folder can't be written.
+    """
+    found = exported(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"
-    files = tuple(zip(paths, (DOMAIN, PROBLEM), (exported.domain, exported.problem), strict=True))
+    files = tuple(zip(paths, (DOMAIN, PROBLEM), (found.domain, found.problem), strict=True))
     for path, kind, _ in files:
         check_replaceable(path, kind)
     for path, kind, text in files:

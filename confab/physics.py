@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import number
 from confab.labels import Labels, labels_of
@@ -14,6 +14,7 @@ from confab.planner.plan import Plan
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
+from confab.reasoner.names import right_names
 from confab.reasoner.symbols import Fact, State
 from confab.sim.engine import Engine
 from confab.sim.rollouts import Done, Trial, wilson
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from confab.show import PlanTree
 
 
+@right_names("a report", "confab.hints", "REPORT")
 @dataclass(frozen=True)
 class Report:
     """The report of a verification: one or more rollouts of a plan, and the film of the first.
@@ -161,6 +163,20 @@ class Report:
         course = of_rollout(problem, self.plan, self.shown)
         shown = tree(self.plan, labels, self.notes(), None, course)
         return styled(tag("p", self.summary()), film, timeline(course, labels), shown)
+
+
+class Options(TypedDict, total=False):
+    """What else `verify` takes."""
+
+    perturb: bool
+    video: str | Path | None
+    prepare: Callable[[World], None] | None
+    progress: Callable[[int, PrimitiveStep], None] | None
+    workers: int | str
+    done: Done | None
+    goal: State | None
+    gui: bool
+    time_limit: float | None
 
 
 def verify(

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 from confab.accepting import Facts, check_goal, number, several
 from confab.checking import refused
@@ -18,11 +17,12 @@ from confab.interchange import outcome_json
 from confab.known import Known
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step, paused_collection, renumbered
-from confab.planner.solve import DEFAULT_MODE, MODES, Request, solve
+from confab.planner.solve import DEFAULT_MODE, MODES, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
+from confab.reasoner.names import right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
@@ -30,8 +30,9 @@ from confab.reasoner.refining import never_done
 from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
-    import networkx
+    from typing import Unpack
 
+    from confab import execution, physics
     from confab.execution import Execution
     from confab.labels import Labels
     from confab.memory import Memory
@@ -51,25 +52,40 @@ OPTIMAL_SECONDS = 10.0
 """Where the search for the best plan stops if no time limit is given."""
 
 
+class Options(TypedDict, total=False):
+    """What `plan` takes besides goals."""
+
+    memory: Memory | Links | str | Path | None
+    mode: Mode
+    time_limit: float | Deadline | None
+    optimal: bool
+    observed: str | Path | None
+    engine: str | None
+    level: int | None
+    leave_levels: bool
+
+
 def plan(
     scene: Known,
     goals: Facts = (),
     memory: Memory | Links | str | Path | None = None,
-    mode: str = DEFAULT_MODE,
+    mode: Mode = DEFAULT_MODE,
     time_limit: float | Deadline | None = None,
     optimal: bool = False,
     observed: str | Path | None = None,
     engine: str | None = None,
     level: int | None = None,
     leave_levels: bool = True,
+    *,
+    goal: Facts = (),
 ) -> Result:
     """Plan in a scene; as a method of `confab.scene.Scene`, in this one.
 
     Parameters
     ----------
     scene : Scene
-    goals : str or iterable of str
-        Each like ``cup2 LOCATION location8``; replaces the goal of that symbol.
+    goals, goal : str or iterable of str
+        Each like ``cup2 LOCATION location8``; replaces the goal of that symbol. One may be given by either name.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
         What was learned before; none if left out.
     mode : str
@@ -127,7 +143,9 @@ def plan(
 
             memory = Memory.load(memory, scene)
         how = "optimal" if optimal else mode
-        return _plan(scene, several(goals), memory, how, deadline, observed, engine, level, leave_levels)
+        return _plan(
+            scene, [*several(goals), *several(goal)], memory, how, deadline, observed, engine, level, leave_levels
+        )
 
 
 def _plan(
@@ -231,6 +249,7 @@ AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 """What a step of a plan is asked for by; see `Result.why`."""
 
 
+@right_names("a result", "confab.hints", "RESULT")
 @dataclass
 class Result:
     """What came of planning: the outcome, and the scene in which it holds.
@@ -288,14 +307,15 @@ class Result:
             raise KnowledgeError(f"the plan can't be done in that order: {faults[0].text}")
         return plan
 
-    def verify(self, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+    def verify(self, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
         """Carry out the plan in PyBullet: see `confab.physics.verify`."""
         from confab.physics import verify
 
         self.scene.settle()
-        return verify(self.scene, self.plan, rollouts, seed, **{"goal": self.problem.goal, **options})
+        options.setdefault("goal", self.problem.goal)
+        return verify(self.scene, self.plan, rollouts, seed, **options)
 
-    def execute(self, interventions: Facts = (), **options: Any) -> Execution:
+    def execute(self, interventions: Facts = (), **options: Unpack[execution.Options]) -> Execution:
         """Carry the task out in a closed loop, beginning with this plan: see `Scene.execute`."""
         from confab.execution import carry_out
 
@@ -381,18 +401,24 @@ class Result:
             return account(self.plan, self.purposes, self.labels, headline)
         return Account(headline, proof=() if self.certificate is None else proved(self.certificate, self.labels))
 
-    if not TYPE_CHECKING:  # a type checker reports wrong names by itself
-
-        def __getattr__(self, name: str) -> NoReturn:
-            """Say which name does what a wrong one means."""
-            from confab.hints import RESULT, wrong_name
-
-            wrong_name("a result", name, type(self), RESULT)
-
     @property
     def certificate(self) -> Certificate | None:
         """What proves that there is no plan, verified by `confab.planner.certificate_checks`; None unless it is unsolvable."""
         return self.outcome.certificate
+
+    @property
+    def cost(self) -> float:
+        """What the plan costs on its lowest level: the sum of the costs of its primitives.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("beverage-serving").plan().cost
+        32.0
+        """
+        from confab.planner.plan_costs import cost_of
+
+        return float(cost_of(self.problem, self.plan))
 
     @property
     def solved(self) -> bool:
@@ -402,18 +428,6 @@ class Result:
     def json(self) -> dict[str, Any]:
         """Return the result as JSON data (docs/command-line.md)."""
         return {**outcome_json(self.scene.iri, self.outcome, self.seconds), "queries": self.queries}
-
-    def graph(self) -> networkx.DiGraph[tuple[int, ...]]:
-        """Return the plan as a directed graph: a node per step (by path), edges to sub-steps and to what follows."""
-        import networkx
-
-        graph: networkx.DiGraph[tuple[int, ...]] = networkx.DiGraph()
-        for step in self.plan.walk():
-            graph.add_node(step.path, label=str(step), level=step.level, id=step.id)
-            graph.add_edges_from(((step.path, below.path) for below in step.steps), kind="refines")
-            graph.add_edges_from(((a.path, b.path) for a, b in pairwise(step.steps)), kind="then")
-        graph.add_edges_from(((a.path, b.path) for a, b in pairwise(self.plan.steps)), kind="then")
-        return graph
 
     def save(self, path: str | Path) -> Path:
         """Write the result as JSON and return where."""

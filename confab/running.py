@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from confab.memory import Memory, undisturbed
 from confab.planner.plan import Status
+from confab.planner.solve import Mode
 from confab.planning import Result
 from confab.progress import progress, tell
 from confab.reaching import has_robot, unreached, with_reach
@@ -30,7 +31,7 @@ TOLD = 8
 """After so many primitives it is said how far the plan is, where there is no progress bar."""
 
 
-def run(name: str, memory: Path | None, mode: str, seed: int, out: Path, film: bool, gui: bool = False) -> int:
+def run(name: str, memory: Path | None, mode: Mode, seed: int, out: Path, film: bool, gui: bool = False) -> int:
     """Do the main job on a scene and say on stdout what came of it; files go to `out`, what was learned to `memory` alone.
 
     A scene without a robot's body is planned in, and the plan is checked; physics has no say then.

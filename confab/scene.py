@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, overload
 
 from confab import ontology, planning
 from confab.accepting import AnyPlan, Facts, number, plan_of
 from confab.known import Known
 from confab.planner.plan import Plan
-from confab.planner.solve import DEFAULT_MODE
+from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planning import Result
 from confab.reasoner.graph.inference import infer
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.graph.knowledge import load as load_graph
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.symbols import FALSE, Fact
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
+    import anywidget
+    import rdflib
+    import unified_planning.model
+    from PIL.Image import Image
+
+    from confab import execution, physics
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
@@ -44,7 +53,15 @@ class Scene(Known):
 
     plan = planning.plan
 
-    def picture(self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False) -> Any:
+    @overload
+    def picture(self, path: None = None, behavior: str | None = None, classes: bool = False) -> Image: ...
+
+    @overload
+    def picture(self, path: str | Path, behavior: str | None = None, classes: bool = False) -> Path: ...
+
+    def picture(
+        self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False
+    ) -> Path | Image:
         """Draw the table with its places, a behaviour, or the classes: into a file, or as an image that a notebook shows.
 
         Returns
@@ -64,15 +81,12 @@ class Scene(Known):
             return draw(self, Path(path), behavior, classes)
         from tempfile import TemporaryDirectory
 
-        from PIL import Image
+        from PIL.Image import open as read
 
-        with (
-            TemporaryDirectory() as folder,
-            Image.open(draw(self, Path(folder, "scene.png"), behavior, classes)) as image,
-        ):
+        with TemporaryDirectory() as folder, read(draw(self, Path(folder, "scene.png"), behavior, classes)) as image:
             return image.copy()
 
-    def board(self) -> Any:
+    def board(self) -> anywidget.AnyWidget:
         """Return a board for a notebook, on which one turns facts, goals and interventions by hand and sees the plan change.
 
         Raises
@@ -83,15 +97,16 @@ class Scene(Known):
         from confab.board import board
 
         self.settle()
-        return board(self)
+        shown: anywidget.AnyWidget = board(self)
+        return shown
 
-    def verify(self, plan: AnyPlan, rollouts: int = 1, seed: int = 0, **options: Any) -> Report:
+    def verify(self, plan: AnyPlan, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
         """Carry out the primitives of a plan, or of what has one in it, in PyBullet: see `confab.physics.verify`."""
         from confab.physics import verify
 
         self.settle()
         if isinstance(plan, Result):
-            options = {"goal": plan.problem.goal, **options}
+            options.setdefault("goal", plan.problem.goal)
         return verify(self, plan_of(plan, self.problem), rollouts, seed, **options)
 
     def execute(
@@ -101,12 +116,12 @@ class Scene(Known):
         world: str | World = "symbolic",
         goals: Facts = (),
         memory: Memory | Links | str | Path | None = None,
-        mode: str = DEFAULT_MODE,
+        mode: Mode = DEFAULT_MODE,
         seed: int = 0,
         tell: Callable[[Moment], None] | None = None,
         watch: bool = False,
         time_limit: float | None = None,
-        **options: Any,
+        **options: Unpack[execution.Options],
     ) -> Execution:
         """Carry the task out in a closed loop: see `confab.execution.execute`.
 
@@ -146,6 +161,41 @@ class Scene(Known):
         with serving(self, port, limits) as server:
             yield f"{server.url}sparql"
 
+    def read_plan(self, path: str | Path) -> Plan:
+        """Return the plan in a file that `Result.save` or ``confab plan --json`` wrote, read for this scene.
+
+        Raises
+        ------
+        KnowledgeError
+            The file holds no plan, or a step names what this scene doesn't have.
+        """
+        return plan_of(path, self.problem)
+
+    def to_pddl(self, level: int | None = None) -> tuple[str, str]:
+        """Return one level, the lowest if none is given, as the texts of a PDDL domain and problem; `export` writes them.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no such level, or it says what PDDL can't say.
+        """
+        from confab.pddl_commands import exported
+
+        found = exported(self.problem, level)
+        return found.domain, found.problem
+
+    def to_unified_planning(self, level: int | None = None) -> unified_planning.model.Problem:
+        """Return one level, the lowest if none is given, as a problem of unified-planning (the extra `pddl` brings it).
+
+        Raises
+        ------
+        KnowledgeError
+            unified-planning isn't installed, or reads no such problem: it knows no derived predicates.
+        """
+        from confab.engines import unified
+
+        return unified(*self.to_pddl(level))
+
     def export(self, folder: str | Path, level: int | None = None) -> tuple[Path, Path]:
         """Write one level, the lowest if none is given, as ``domain.pddl`` and ``problem.pddl`` in a folder, and return where.
 
@@ -158,7 +208,7 @@ class Scene(Known):
 
         return export_pddl(self.problem, level, Path(folder))
 
-    def explain(self, goals: Facts = (), **options: Any) -> Account:
+    def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[planning.Options]) -> Account:
         """Plan, and return why each step is there; or, where there is no plan, why. Takes what `plan` takes.
 
         Raises
@@ -170,7 +220,9 @@ class Scene(Known):
         if not isinstance(limit, Deadline):
             number("time_limit", limit, "seconds as a number, e.g. 5")
         with within(limit) as deadline:
-            return self.plan(goals, **options | ({} if limit is None else {"time_limit": deadline})).explain()
+            if limit is not None:
+                options["time_limit"] = deadline
+            return self.plan(goals, goal=goal, **options).explain()
 
     def _repr_html_(self) -> str:
         from confab.labels import labels_of
@@ -194,12 +246,13 @@ class Scene(Known):
         )
 
 
-def load(source: str | Path, scene: str | None = None) -> Scene:
-    """Load a scene: a shipped name, a file of RDF, or the URL of a SPARQL 1.1 endpoint.
+def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | None = None) -> Scene:
+    """Load a scene: a shipped name, a file of RDF or several, a graph of rdflib, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
     ----------
-    source : str or Path
+    source : str, Path, rdflib.Graph, or sequence of str or Path
+        Of several files, the scene is the first that no other imports. A graph is copied; what it imports are shipped ontologies.
     scene : str, optional
         IRI of the scene in an endpoint that holds several.
 
@@ -215,16 +268,45 @@ def load(source: str | Path, scene: str | None = None) -> Scene:
     ('bottle1', 'location4')
     """
     begin = perf_counter()
-    if str(source).startswith(("http://", "https://")):
+    if isinstance(source, str) and source.startswith(("http://", "https://")):
         from confab.reasoner.graph.stores import connect
 
-        return Scene(connect(str(source), scene), {"load": perf_counter() - begin})
-    graph = load_graph(source, tolerant=True)
+        return Scene(connect(source, scene), {"load": perf_counter() - begin})
+    graph = _read(source)
     try:
         infer(graph)
     except KnowledgeError as error:
         graph.faults.append(str(error))
     return Scene(graph, {"load": perf_counter() - begin})
+
+
+def _read(source: object) -> KnowledgeGraph:
+    """Return what files hold, or a graph of rdflib."""
+    if isinstance(source, str | PathLike):
+        return load_graph(_local(source), tolerant=True)
+    if isinstance(source, Sequence) and all(isinstance(one, str | PathLike) for one in source):
+        return load_graph([_local(one) for one in source], tolerant=True)
+    if not hasattr(source, "serialize"):
+        wanted = "the name of a shipped scene, a file or several, a graph of rdflib, or the URL of an endpoint"
+        raise KnowledgeError(f"got {type(source).__name__}; wanted {wanted}")
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "scene.ttl")
+        source.serialize(file, format="turtle", encoding="utf-8")
+        graph = load_graph(file, tolerant=True)
+    graph.files.pop(graph.scene, None)
+    return graph
+
+
+def _local(address: str | PathLike[str]) -> str | Path:
+    """Return a file's path for its address, ``file:///…``; anything else as it is."""
+    if not isinstance(address, str) or not address.startswith("file:"):
+        return address if isinstance(address, str) else Path(address)
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
+    return Path(url2pathname(urlsplit(address).path))
 
 
 def scenes() -> list[str]:

@@ -9,11 +9,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from time import perf_counter
-from typing import Protocol, overload
+from typing import TYPE_CHECKING, Protocol, overload
 
 from confab.planner.certificates import Certificate
 from confab.reasoner.limits import current
+from confab.reasoner.names import right_names
 from confab.reasoner.symbols import Condition, Fact, Problem, State
+
+if TYPE_CHECKING:
+    import networkx
+    import pandas
+
+    from confab.planner.forms import Node
 
 
 class Status(Enum):
@@ -24,6 +31,7 @@ class Status(Enum):
     GAVE_UP = "gave-up"  # a limit came first
 
 
+@right_names("a step", "confab.planner.forms", "STEP")
 @dataclass(frozen=True)
 class Step:
     """One behaviour of a plan, with the steps of the next level that refine it.
@@ -53,6 +61,7 @@ class Step:
         return " ".join((str(self.id), self.behavior, *self.arguments))
 
 
+@right_names("a plan", "confab.planner.forms", "PLAN")
 @dataclass(frozen=True, repr=False)
 class Plan(Sequence[Step]):
     """A tree of steps that leads from one state to the goal; as a sequence, the steps of its first level.
@@ -117,6 +126,51 @@ class Plan(Sequence[Step]):
         """Number of steps per level."""
         levels = [step.level for step in self.walk()]
         return {level: levels.count(level) for level in sorted(set(levels))}
+
+    def to_networkx(self) -> networkx.DiGraph[tuple[int, ...]]:
+        """Return the plan as a directed graph: a node for each step, by its path; edges to its sub-steps and to what follows.
+
+        Nodes have ``label``, ``level`` and ``id``; an edge has a ``kind``, ``refines`` or ``then``.
+        """
+        from confab.planner.forms import digraph
+
+        return digraph(self._nodes())
+
+    def to_dot(self) -> str:
+        """Return the plan in Graphviz' language: sub-steps below their step, dashed arrows to the step that follows."""
+        from confab.planner.forms import dot
+
+        return dot(self._nodes())
+
+    def to_records(self) -> list[dict[str, object]]:
+        """Return a mapping for each step, each before its sub-steps: path, level, id, behavior, arguments, bindings."""
+        return [
+            {
+                "path": ".".join(map(str, step.path)),
+                "level": step.level,
+                "id": step.id,
+                "behavior": step.behavior,
+                "arguments": " ".join(step.arguments),
+                "bindings": " ".join(f"{variable}={individual}" for variable, individual in step.bindings.items()),
+            }
+            for step in self.walk()
+        ]
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a pandas DataFrame with a row for each step, as `to_records` has them (the extra `notebook` brings pandas)."""
+        import pandas
+
+        return pandas.DataFrame(self.to_records())
+
+    def _nodes(self) -> list[Node]:
+        from confab.planner.forms import Node
+
+        return [Node(step.path, str(step), step.level, step.id) for step in self.walk()]
+
+    def _repr_html_(self) -> str:
+        from confab.planner.forms import html
+
+        return html(repr(self).splitlines()[0], self._nodes())
 
 
 @dataclass

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from confab.planner.certified import certified
 from confab.planner.levels import levels_left
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from confab.planner.experience.advice import Memory
     from confab.reasoner.memory.links import Links
 
-DEFAULT_MODE = "guarded"
+Mode: TypeAlias = Literal["guarded", "leading", "strict", "optimal", "paper"]
+"""The keys of `MODES`."""
+DEFAULT_MODE: Mode = "guarded"
 
 
 class RejectedPlanError(Exception):
@@ -156,8 +158,7 @@ def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableE
     return None
 
 
-Mode: TypeAlias = "Callable[[Request], Outcome]"
-MODES: Mapping[str, Mode] = {
+MODES: Mapping[str, Callable[[Request], Outcome]] = {
     "guarded": _with_experience,
     "leading": _with_experience,
     "strict": _with_experience,

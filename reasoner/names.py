@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
+from importlib import import_module
+from typing import NoReturn, TypeVar
+
+C = TypeVar("C", bound=type)
 
 
 class Names:
@@ -68,3 +72,46 @@ def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
 
 def _ontology_name(iri: str) -> str:
     return local_name(iri.partition("#")[0] if "#" in iri else iri.rpartition("/")[0])
+
+
+def right_names(kind: str, module: str, table: str) -> Callable[[C], C]:
+    """Return a decorator of a class: the error for an attribute that it lacks names the one that does what is meant.
+
+    Parameters
+    ----------
+    kind : str
+        What lacks it, e.g. ``a scene``.
+    module, table : str
+        Where the mapping of a right name to the words that mean it stands; it is imported when a name is wrong.
+    """
+
+    def decorated(cls: C) -> C:
+        def lacking(self: object, name: str) -> NoReturn:
+            hints = {} if name.startswith("_") else getattr(import_module(module), table)
+            wrong_name(kind, name, type(self), hints)
+
+        type.__setattr__(cls, "__getattr__", lacking)  # unseen by type checkers, which report wrong names by themselves
+        return cls
+
+    return decorated
+
+
+def wrong_name(kind: str, name: str, there: object, hints: Mapping[str, str]) -> NoReturn:
+    """Raise the error for a name that `there` lacks: with the name that does what it means, or the most similar one.
+
+    Parameters
+    ----------
+    kind : str
+        What lacks it, e.g. ``a scene``.
+    name : str
+    there : object
+        Its public names are those that `dir` lists.
+    hints : mapping of str to str
+        A right name to the words that mean it.
+    """
+    text = f"{kind} has no '{name}'"
+    if not name.startswith("_"):
+        meant = next((right for right, wrong in hints.items() if name in wrong.split()), "")
+        similar = nearest(name, [each for each in dir(there) if not each.startswith("_")])
+        text += f"; use {meant}" if meant else similar
+    raise AttributeError(text)

@@ -345,7 +345,8 @@ class Judge:
         from unified_planning.io import PDDLReader
 
         try:
-            with warnings.catch_warnings(action="ignore"):  # its own use of what pyparsing calls outdated
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # its own use of what pyparsing calls outdated
                 PDDLReader().parse_problem_string(domain, problem)
         except Exception as error:
             self.complain("unified-planning can't read the export", mode, f"{type(error).__name__}: {error}")
@@ -361,7 +362,7 @@ class Judge:
             if fact := self.fact():
                 texts = [f"after={after} {fact}"]
         mode = "execute"
-        run = self.call(mode, lambda: read.execute(interventions=texts))
+        run = self.call(mode, lambda: read.execute(interventions=texts, time_limit=SECONDS))
         if run is None:
             return
         episode = run.episode

@@ -30,6 +30,7 @@ from confab.commands.options import (
     scene_names,
 )
 from confab.examples import examples
+from confab.planner.solve import Mode
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
@@ -75,7 +76,7 @@ def plan(
     goal: tuple[str, ...],
     memory: Path | None,
     no_memory: bool,
-    mode: str,
+    mode: Mode,
     time_limit: float | None,
     optimal: bool,
     levels: str,
@@ -141,7 +142,7 @@ def plan(
 def run(
     scene: str,
     memory: Path | None,
-    mode: str,
+    mode: Mode,
     seed: int,
     out: Path,
     no_video: bool,
@@ -251,7 +252,7 @@ def execute(
     goal: tuple[str, ...],
     memory: Path | None,
     no_memory: bool,
-    mode: str,
+    mode: Mode,
     seed: int,
     save: Path | None,
     report: Path | None,

@@ -15,7 +15,7 @@ from functools import cached_property
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 from urllib.parse import unquote
 
 import pyoxigraph as ox
@@ -24,7 +24,7 @@ from confab import ontology
 from confab.reasoner.graph.documents import DocumentError, document
 from confab.reasoner.limits import check
 from confab.reasoner.names import nearest
-from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
+from confab.reasoner.vocabulary import CORE, OWL, PREFIXES, TYPE
 
 if TYPE_CHECKING:
     from confab.reasoner.updates.compiling import Fault
@@ -109,6 +109,16 @@ class KnowledgeGraph:
     written: dict[str, Place] = field(default_factory=dict)
     remote: Remote | None = None
     round_trips: int = 0
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what pickling and copying keep: the store as N-Quads."""
+        return {**self.__dict__, "store": self.store.dump(format=ox.RdfFormat.N_QUADS) or b""}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Fill a store of its own, blank nodes under their names."""
+        store = ox.Store()
+        store.bulk_extend(ox.parse(state["store"], format=ox.RdfFormat.N_QUADS, rename_blank_nodes=False))
+        self.__dict__.update(state, store=store)
 
     @property
     def spoken(self) -> dict[str, str]:
@@ -198,7 +208,7 @@ class KnowledgeGraph:
 
 
 def load(
-    source: str | Path,
+    source: str | Path | Sequence[str | Path],
     store: ox.Store | None = None,
     tolerant: bool = False,
     faults: list[Fault] | None = None,
@@ -207,8 +217,9 @@ def load(
 
     Parameters
     ----------
-    source : str or Path
-        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads.
+    source : str, Path or sequence of them
+        Name of a shipped scene, or a file in Turtle, N-Triples, RDF/XML, JSON-LD, TriG or N-Quads. Of several, the scene is the
+        first that no other imports; all of them are read.
     store : pyoxigraph.Store, optional
         An empty store to load into; one in memory if left out.
     tolerant : bool
@@ -221,9 +232,10 @@ def load(
     KnowledgeError
         No such scene or file; syntax error with line and column; an import that no catalog knows.
     """
-    path = scene_file(source)
+    given = [source] if isinstance(source, str | Path) else source
+    path, *others = _scene_first([scene_file(one) for one in given])
     graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
-    _load(graph, path, tolerant)
+    _load(graph, path, others, tolerant)
     found = write_out(graph)
     if faults is not None:
         faults += found
@@ -262,7 +274,36 @@ def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
     return prefixes
 
 
-def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
+def _scene_first(files: Sequence[Path]) -> list[Path]:
+    """Return files with the scene before the others: the first that none of the others imports."""
+    if not files:
+        raise KnowledgeError("no file is given; wanted the name of a shipped scene, or files of RDF")
+    if len(files) == 1:
+        return [*files]
+    imported = {file: _said(file, "imports") for file in files}
+    scene = next(
+        (
+            file
+            for file in files
+            if not any(_said(file, "Ontology") & imported[other] for other in files if other != file)
+        ),
+        files[0],
+    )
+    return [scene, *(file for file in dict.fromkeys(files) if file != scene)]
+
+
+def _said(file: Path, what: str) -> set[str]:
+    """Return the IRIs of the ontologies that a file declares, or imports."""
+    with readable(file) as (content, form):
+        quads = list(ox.parse(content, format=form, base_iri=file.resolve().as_uri()))
+    if what == "imports":
+        found = (quad.object for quad in quads if quad.predicate.value == OWL + what)
+    else:
+        found = (q.subject for q in quads if q.predicate.value == TYPE and q.object == ox.NamedNode(OWL + what))
+    return {term.value for term in found if isinstance(term, ox.NamedNode)}
+
+
+def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: bool) -> None:
     @contextmanager
     def forgiven() -> Iterator[None]:
         try:
@@ -276,7 +317,8 @@ def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
     graph.scene = path.as_uri()
     with forgiven():
         graph.scene = _only_ontology(graph, path)
-    waiting = [(graph.scene, path)]
+    given = {iri: file for file in others for iri in sorted(_said(file, "Ontology") or {file.as_uri()})}
+    waiting = [(graph.scene, path), *given.items()]
     places: dict[Path, Mapping[str, Path]] = {}
     while waiting:
         iri, file = waiting.pop(0)
@@ -289,7 +331,7 @@ def _load(graph: KnowledgeGraph, path: Path, tolerant: bool) -> None:
         for imported in _imports(graph, iri):
             if imported not in graph.files:
                 with forgiven():
-                    waiting.append((imported, _locate(imported, file, places)))
+                    waiting.append((imported, given.get(imported) or _locate(imported, file, places)))
     reach = path.with_name(f"{path.stem}.reach.ttl")
     if reach.is_file():
         read_into(graph, reach, "reach")

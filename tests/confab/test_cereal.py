@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.planner.solve import Mode
 from confab.reaching import with_reach
 from confab.scene import Scene
 
@@ -15,7 +16,7 @@ def scene() -> Scene:
 
 
 @pytest.mark.parametrize("mode", ["paper", "guarded"])
-def test_the_bowl_is_moved_then_gets_cereal_then_milk(scene: Scene, mode: str) -> None:
+def test_the_bowl_is_moved_then_gets_cereal_then_milk(scene: Scene, mode: Mode) -> None:
     found = scene.plan(mode=mode).json()
     behaviors = [step["behavior"] for step in found["steps"]]
     assert sorted(behaviors) == ["B1_MOVE", "B1_POUR_CEREAL", "B1_POUR_MILK"]

@@ -1,7 +1,7 @@
 """Planning from what was seen, and planning with a proved bound."""
 
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 import pytest
 
@@ -9,7 +9,7 @@ import confab
 from confab import cli
 from confab.authoring import new_domain
 from confab.planner.plan import Outcome, Plan, Status
-from confab.planner.solve import MODES
+from confab.planner.solve import MODES, Mode
 from confab.reasoner.generate import write_scene
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.observed import save_observed
@@ -65,7 +65,7 @@ def test_a_plan_that_the_checker_rejects_never_leaves_the_command_line(
 
 def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_path: Path) -> None:
     write_scene(tmp_path / "table.ttl", "unsolvable")
-    for mode in MODES:
+    for mode in get_args(Mode):
         outcome = confab.load(tmp_path / "table.ttl").plan(mode=mode).outcome
         assert outcome.status is Status.UNSOLVABLE, mode
         assert outcome.reason is not None

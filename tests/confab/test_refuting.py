@@ -9,6 +9,7 @@ import pytest
 import confab
 from confab import ontology
 from confab.physics import Report
+from confab.planner.solve import Mode
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Fact, Symbol
 from confab.refuting import keep, knowing, refuted_in
@@ -36,7 +37,7 @@ def own(folder: Path) -> Path:
     return folder / f"{BLOCKED}.ttl"
 
 
-def done(scene: Scene, mode: str = "guarded") -> list[tuple[str, ...]]:
+def done(scene: Scene, mode: Mode = "guarded") -> list[tuple[str, ...]]:
     return [(step.behavior, *step.arguments) for step in scene.plan(mode=mode).plan.primitives]
 
 
@@ -79,7 +80,7 @@ def test_what_stands_elsewhere_is_not_in_the_way_of_a_swing() -> None:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: str) -> None:
+def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: Mode) -> None:
     scene, report = first()
     steps = done(knowing(scene, refuted_in(scene, report)), mode)
     before = steps[: steps.index(("F3_OPEN", "left_hand", "door"))]

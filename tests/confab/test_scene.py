@@ -7,6 +7,7 @@ import pytest
 
 import confab
 from confab.interchange import read_plan
+from confab.planner.solve import Mode
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +36,14 @@ def test_the_graph_is_an_rdflib_graph_with_the_scenes_triples(scene: confab.Scen
 def test_a_result_shows_as_a_tree_and_is_a_networkx_graph(result: confab.Result) -> None:
     assert "solved: 4 / 10 / 32" in repr(result)
     assert "B3_GRASP" in result._repr_html_()
-    graph = result.graph()
+    graph = result.plan.to_networkx()
     assert graph.number_of_nodes() == 4 + 10 + 32
     refines = [edge for edge in graph.edges if graph.edges[edge]["kind"] == "refines"]
     assert len(refines) == 10 + 32
 
 
 @pytest.mark.parametrize("mode", ["guarded", "strict", "paper"])
-def test_every_mode_refines_as_the_paper_does(scene: confab.Scene, mode: str) -> None:
+def test_every_mode_refines_as_the_paper_does(scene: confab.Scene, mode: Mode) -> None:
     plan = scene.plan(mode=mode).plan
     by_id = {step.id: [below.id for below in step.steps] for step in plan.steps}
     assert by_id == {22: [2, 22], 34: [4, 14, 27], 28: [3, 20], 39: [1, 11, 18]}

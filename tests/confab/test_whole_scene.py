@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import confab
 from confab.checking import refused
 from confab.planner.plan import Plan, Status, Step
+from confab.planner.solve import Mode
 from confab.planner.validation import Fault, carried_out, successor, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
@@ -26,19 +27,19 @@ MODES = ("guarded", "strict", "optimal", "paper")
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_an_effect_on_a_class_asks_the_bounds_of_each_of_its_amounts(mode: str) -> None:
+def test_an_effect_on_a_class_asks_the_bounds_of_each_of_its_amounts(mode: Mode) -> None:
     result = confab.load(CASES / "lamps.ttl").plan(mode=mode)
     assert [step.behavior for step in result.plan.steps] == ["FILL", "BURN"]
     assert result.outcome.bound in (None, 2)
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: str) -> None:
+def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: Mode) -> None:
     assert confab.load(CASES / "lamps-without-oil.ttl").plan(mode=mode).outcome.status is Status.UNSOLVABLE
 
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
-def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: str) -> None:
+def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: Mode) -> None:
     """The goal wants one of the class not at rest; the others, which the effect touches as well, nothing brings back."""
     scene = confab.load(CASES / "rest-of-a-class.ttl")
     assert scene.plan(mode=mode).outcome.status is Status.UNSOLVABLE

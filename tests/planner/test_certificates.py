@@ -17,7 +17,7 @@ from confab.planner.certificates import Certificate, certificate_from, certifica
 from confab.planner.certified import certified
 from confab.planner.certifying import certify
 from confab.planner.plan import Outcome, Reason, Status
-from confab.planner.solve import MODES, Request, solve
+from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
 from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy
@@ -28,7 +28,7 @@ from worlds.writing import becomes, behavior, world
 CASES = Path(__file__).with_name("cases")
 
 
-def answered(case: str, mode: str) -> Outcome:
+def answered(case: str, mode: Mode) -> Outcome:
     return confab.load(CASES / case).plan(mode=mode, time_limit=20.0).outcome
 
 
@@ -36,13 +36,13 @@ def answered(case: str, mode: str) -> Outcome:
 @pytest.mark.parametrize(
     "case", ["false-unsolvable-1", "false-unsolvable-2", "no-operators-solvable", "equal-to-itself"]
 )
-def test_what_a_few_steps_solve_is_not_called_unsolvable(case: str, mode: str) -> None:
+def test_what_a_few_steps_solve_is_not_called_unsolvable(case: str, mode: Mode) -> None:
     outcome = answered(f"{case}.ttl", mode)
     assert outcome.plan is not None and len(outcome.plan.primitives) <= 2
 
 
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "leading"])
-def test_a_task_whose_behaviours_change_nothing_is_unsolvable(mode: str) -> None:
+def test_a_task_whose_behaviours_change_nothing_is_unsolvable(mode: Mode) -> None:
     outcome = answered("no-operators.ttl", mode)
     assert outcome.certificate is not None and outcome.reason is not None
     assert outcome.reason.text == (
@@ -51,7 +51,7 @@ def test_a_task_whose_behaviours_change_nothing_is_unsolvable(mode: str) -> None
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: str) -> None:
+def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: Mode) -> None:
     outcome = answered("reason-key-opens-nothing/ward-small.ttl", mode)
     assert outcome.certificate is not None and outcome.reason is not None
     assert "no Key opens cabinet0, which L2_UNLOCK needs; so never cabinet0 LOCK unlocked" in outcome.reason.text
@@ -71,7 +71,7 @@ def test_a_search_among_few_states_ends() -> None:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_the_reason_names_the_bound_that_an_amount_would_exceed(mode: str) -> None:
+def test_the_reason_names_the_bound_that_an_amount_would_exceed(mode: Mode) -> None:
     outcome = answered("reason-wrong-sign/depot-small.ttl", mode)
     assert outcome.certificate is not None and outcome.reason is not None
     assert "L3_ROLL would take robot0 BATTERY to 13, more than its most, 12; so never robot0" in outcome.reason.text

@@ -13,6 +13,7 @@ from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.grounded.joins import Table
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Status
+from confab.planner.solve import Mode
 from confab.reasoner.limits import OutOfTimeError, check, current, within
 from confab.reasoner.symbols import TRUE, RelationCondition, SituationType
 from worlds.writing import becomes, behavior, has, world
@@ -22,7 +23,7 @@ CASES = Path(__file__).parent / "cases"
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal"])
 @pytest.mark.parametrize("name", ["h2", "full", "202470", "202991"])
-def test_goals_in_series_notice_what_changed_after_the_steps_were_done_again(name: str, mode: str) -> None:
+def test_goals_in_series_notice_what_changed_after_the_steps_were_done_again(name: str, mode: Mode) -> None:
     result = confab.load(CASES / f"endless-{name}.ttl").plan(mode=mode)
     assert result.outcome.status is Status.SOLVED
     assert len(result.plan.primitives) == 2

@@ -6,6 +6,7 @@ import pytest
 
 import confab
 from confab.planner.plan import Plan, Status
+from confab.planner.solve import Mode
 from confab.planner.validation import successor, validate
 from confab.reasoner.symbols import Problem
 
@@ -54,7 +55,7 @@ def cases() -> list[object]:
 
 
 @pytest.mark.parametrize(("scene", "mode"), cases())
-def test_a_world_is_planned_without_giving_a_level_up_and_left_at_rest(scene: str, mode: str) -> None:
+def test_a_world_is_planned_without_giving_a_level_up_and_left_at_rest(scene: str, mode: Mode) -> None:
     result = confab.load(scene).plan(mode=mode, time_limit=SECONDS)
     assert result.outcome.status is Status.SOLVED, result.outcome.reason
     assert validate(result.problem, result.plan) == []

@@ -1,0 +1,99 @@
+"""A plan in the forms of other libraries: a graph of networkx, Graphviz' language, HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    import networkx
+
+Path: TypeAlias = "tuple[int, ...]"
+
+
+class Node(NamedTuple):
+    """A step in a plan: where it is in the tree, what it is called, its level and its ID."""
+
+    path: Path
+    label: str
+    level: int
+    id: int
+
+
+PLAN = {
+    "steps": "actions action_list sequence get_steps children nodes",
+    "primitives": "leaves low_level atoms primitive_actions",
+    "at_level(LEVEL)": "level levels by_level flatten flat",
+    "length": "size n_steps count depth makespan",
+    "walk()": "iter traverse all_steps visit",
+    "to_networkx()": "graph networkx to_graph nx digraph tree",
+    "to_dot()": "dot graphviz to_graphviz draw plot",
+    "to_dataframe()": "dataframe df to_pandas table",
+    "to_records()": "json to_json to_dict as_dict dict to_list to_csv",
+}
+"""Right names of a plan, and the words that mean them."""
+STEP = {
+    "behavior": "name action operator action_name behaviour label",
+    "arguments": "args parameters params objects actual_parameters",
+    "steps": "children substeps sub_steps refinement actions",
+    "bindings": "variables binding",
+    "walk()": "iter traverse descendants",
+    "id": "number index key",
+}
+"""Right names of a step, and the words that mean them."""
+
+
+def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
+    """Return a directed graph of paths with ``label``, ``level`` and ``id``; edges have a ``kind``, ``refines`` or ``then``."""
+    import networkx
+
+    graph: networkx.DiGraph[Path] = networkx.DiGraph()
+    for node in nodes:
+        graph.add_node(node.path, label=node.label, level=node.level, id=node.id)
+    for one, other, kind in edges(nodes):
+        graph.add_edge(one, other, kind=kind)
+    return graph
+
+
+def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
+    """Yield which step is refined by which, and which is followed by which."""
+    paths = {node.path for node in nodes}
+    for *above, place in sorted(paths):
+        path = (*above, place)
+        if above:
+            yield (*above,), path, "refines"
+        if (following := (*above, place + 1)) in paths:
+            yield path, following, "then"
+
+
+def dot(nodes: Sequence[Node]) -> str:
+    """Return Graphviz' text of a plan: sub-steps below their step, dashed arrows to the step that follows."""
+    lines = ["digraph plan {", "  node [shape=box, style=rounded];"]
+    lines += [f"  {_named(node.path)} [label={_quoted(node.label)}];" for node in nodes]
+    style = {"refines": "", "then": " [style=dashed, constraint=false]"}
+    lines += [f"  {_named(one)} -> {_named(other)}{style[kind]};" for one, other, kind in edges(nodes)]
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def _named(path: Path) -> str:
+    return _quoted(".".join(map(str, path)))
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def html(headline: str, nodes: Sequence[Node]) -> str:
+    """Return a plan as HTML: its steps, each before its sub-steps, of which each can be opened."""
+    above = {node.path[:-1] for node in nodes}
+    parts, depth = [f"<div>{escape(headline)}"], 1
+    for node in nodes:
+        parts.append("</details>" * (depth - len(node.path)))
+        depth = len(node.path)
+        own = escape(node.label)
+        if node.path in above:
+            parts.append(f"<details style='margin-left: 1.2em'><summary>{own}</summary>")
+        else:
+            parts.append(f"<div style='margin-left: 1.2em'>{own}</div>")
+    return "".join([*parts, "</details>" * (depth - 1), "</div>"])

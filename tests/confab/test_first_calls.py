@@ -1,0 +1,165 @@
+"""What a newcomer calls first works, or its error names what does; written down before it was built."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import rdflib
+
+import confab
+from confab import ontology
+from confab.reasoner.graph.knowledge import KnowledgeError
+
+SCENE = "beverage-serving-moved"
+GOAL = "cup2 LOCATION location8"
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load(SCENE)
+
+
+@pytest.fixture(scope="module")
+def result(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
+
+
+@pytest.fixture
+def domain(tmp_path: Path) -> tuple[Path, Path]:
+    """Two files of one's own that no catalog names: a domain, and a scene that imports it."""
+    confab.new_domain("errands", tmp_path)
+    files = sorted(tmp_path.glob("*.ttl"))
+    scene = next(file for file in files if "scene" in file.stem)
+    return next(file for file in files if file != scene), scene
+
+
+CALLS: dict[str, Callable[[confab.Scene, confab.Result], object]] = {
+    "a path": lambda scene, result: confab.load(ontology.scenes()[SCENE]).plan().plan == result.plan,
+    "the text of a path": lambda scene, result: confab.load(str(ontology.scenes()[SCENE])).goals == scene.goals,
+    "an address of a file": lambda scene, result: confab.load(ontology.scenes()[SCENE].as_uri()).goals == scene.goals,
+    "a list of files": lambda scene, result: confab.load([ontology.scenes()[SCENE]]).goals == scene.goals,
+    "a graph of rdflib": lambda scene, result: (
+        confab.load(rdflib.Graph().parse(ontology.scenes()[SCENE])).goals == scene.goals
+    ),
+    "steps in a loop": lambda scene, result: [step.behavior for step in result.plan],
+    "the number of steps": lambda scene, result: len(result.plan) == result.plan.length[1],
+    "the first step, the last, some": lambda scene, result: (result.plan[0], result.plan[-1], result.plan[1:3]),
+    "one goal": lambda scene, result: scene.plan(goal=GOAL).solved,
+    "goals": lambda scene, result: scene.plan(goals=[GOAL]).solved,
+    "a goal in place": lambda scene, result: scene.plan(GOAL).solved,
+    "the cost": lambda scene, result: result.cost == len(result.plan.primitives),
+    "whether it is solved": lambda scene, result: result.solved,
+    "why a step": lambda scene, result: result.why(result.plan[0]),
+    "why not something else": lambda scene, result: result.why_not(GOAL),
+    "the text of a result": lambda scene, result: "solved" in str(result),
+    "HTML of a plan": lambda scene, result: result.plan[0].behavior in result.plan._repr_html_(),
+    "networkx": lambda scene, result: result.plan.to_networkx().number_of_nodes() == sum(result.plan.length.values()),
+    "Graphviz": lambda scene, result: result.plan.to_dot().startswith("digraph"),
+    "rows": lambda scene, result: [row["behavior"] for row in result.plan.to_records()],
+    "a DataFrame": lambda scene, result: pytest.importorskip("pandas") and len(result.plan.to_dataframe()),
+    "PDDL": lambda scene, result: scene.to_pddl()[0].lstrip("; ").count("(define"),
+    "unified-planning": lambda scene, result: (
+        pytest.importorskip("unified_planning") and len(scene.to_unified_planning().actions)
+    ),
+    "behaviours": lambda scene, result: scene.behaviors["B1_MOVE"].parameters,
+    "objects, facts, goals": lambda scene, result: scene.objects and scene.facts and scene.goals,
+    "a fact more": lambda scene, result: scene.with_fact("cup1 LOCATION location7").plan().solved,
+    "a copy": lambda scene, result: copy.deepcopy(scene).plan().plan == result.plan,
+    "a pickled scene": lambda scene, result: pickle.loads(pickle.dumps(scene)).plan().plan == result.plan,
+    "a pickled result": lambda scene, result: pickle.loads(pickle.dumps(result)).why(0) == result.why(0),
+    "a query": lambda scene, result: len(scene.query("SELECT ?o { ?o k:location ?l }")) > 1,
+}
+
+
+def test_thirty_first_calls_are_written_down() -> None:
+    assert len(CALLS) == 30
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+def test_a_first_call_works(
+    scene: confab.Scene, result: confab.Result, call: Callable[[confab.Scene, confab.Result], object]
+) -> None:
+    assert call(scene, result)
+
+
+def test_a_plan_that_was_saved_is_read(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
+    assert scene.read_plan(result.save(tmp_path / "plan.json")) == result.plan
+
+
+def test_files_of_ones_own_are_read_together_in_any_order(domain: tuple[Path, Path], tmp_path: Path) -> None:
+    apart = [tmp_path / "a" / domain[0].name, tmp_path / "b" / domain[1].name]
+    for file, to in zip(domain, apart, strict=True):
+        to.parent.mkdir()
+        file.rename(to)
+    goals = confab.load(apart).goals
+    assert goals == confab.load(apart[::-1]).goals
+    assert confab.load(apart).plan().solved
+
+
+def test_what_is_no_source_of_a_scene_is_told(scene: confab.Scene) -> None:
+    with pytest.raises(KnowledgeError, match="got int; wanted the name of a shipped scene, a file or several"):
+        confab.load(3)  # type: ignore[arg-type]
+    with pytest.raises(KnowledgeError, match="no file is given"):
+        confab.load([])
+
+
+def test_a_scene_is_planned_in_by_another_process_as_here(result: confab.Result, tmp_path: Path) -> None:
+    (tmp_path / "scene.pickle").write_bytes(pickle.dumps(result.scene))
+    code = "import pickle, sys, json; print(json.dumps([str(s) for s in pickle.load(open(sys.argv[1], 'rb')).plan().plan.walk()]))"
+    said = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "scene.pickle")], capture_output=True, text=True, check=True
+    )
+    assert json.loads(said.stdout) == [str(step) for step in result.plan.walk()]
+
+
+def test_an_edit_of_the_graph_is_in_the_copy(scene: confab.Scene) -> None:
+    edited = scene.with_fact("cup1 LOCATION location7")
+    assert "cup1 LOCATION location7" in copy.deepcopy(edited).facts
+    assert copy.deepcopy(edited) is not edited
+
+
+WRONG: dict[str, dict[str, str]] = {
+    "module": {
+        "read": "load", "open": "load", "parse": "load", "load_scene": "load", "Graph": "load", "from_file": "load",
+        "solve": "plan", "plan": "plan", "Planner": "plan", "OneshotPlanner": "plan", "simulate": "verify",
+        "list_scenes": "scenes", "check": "validate", "list_examples": "scenes",
+    },
+    "scene": {
+        "ask": "query", "sparql": "query", "add_fact": "with_fact", "add": "with_fact", "set_fact": "with_fact",
+        "add_goal": "with_goal", "set_goal": "with_goal", "goal": "goals", "individuals": "objects", "state": "facts",
+        "initial_state": "facts", "actions": "behaviors", "behaviours": "behaviors", "operators": "behaviors",
+        "predicates": "situations", "types": "classes", "solve": "plan", "search": "plan", "simulate": "verify",
+        "run": "execute", "serialize": "graph", "triples": "graph", "rdf": "graph", "draw": "picture", "show": "picture",
+        "write_pddl": "export", "applicable_actions": "affordances", "robot": "embodiment",
+    },
+    "result": {
+        "steps": "plan.steps", "actions": "plan.steps", "status": "outcome.status", "success": "solved",
+        "to_dict": "json", "to_json": "json", "graph": "to_networkx", "runtime": "seconds", "statistics": "outcome.search",
+        "to_dataframe": "plan.to_dataframe",
+    },
+    "plan": {"actions": "steps", "to_json": "to_records", "graph": "to_networkx", "leaves": "primitives"},
+    "step": {"name": "behavior", "action": "behavior", "parameters": "arguments", "children": "steps"},
+}  # fmt: skip
+"""Sixty names as users of rdflib, owlready2, unified-planning, pyperplan and pandas would guess them, and what does it here."""
+
+
+def test_of_sixty_wrong_names_all_but_five_at_most_name_what_does_it(
+    scene: confab.Scene, result: confab.Result
+) -> None:
+    of = {"module": confab, "scene": scene, "result": result, "plan": result.plan, "step": result.plan[0]}
+    assert sum(map(len, WRONG.values())) == 60
+    missed = []
+    for kind, names in WRONG.items():
+        for name, right in names.items():
+            with pytest.raises(AttributeError) as told:
+                getattr(of[kind], name)
+            if right not in str(told.value).partition("'; ")[2]:
+                missed.append((kind, name, str(told.value)))
+    assert len(missed) <= 5, missed
