@@ -373,7 +373,6 @@ class Result:
         from confab.why import find_step, why_not
 
         number("seconds", seconds, "seconds as a number, e.g. 5")
-        labels = self.labels
 
         def ask(problem: Problem) -> Outcome:
             return solve(Request(problem, DEFAULT_MODE))
@@ -382,8 +381,9 @@ class Result:
             other = plan(self.scene, goals)
             return other.problem, other.outcome, other.labels
 
-        place = None if instead is None else find_step(self.plan, instead, labels)
         with within(seconds):
+            labels = self.labels
+            place = None if instead is None else find_step(self.plan, instead, labels)
             told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
             own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors  # `replan` checks the others
             if not own or self.part is None or told.plan is None or not self.faults(told.plan):

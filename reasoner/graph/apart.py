@@ -14,19 +14,23 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from subprocess import PIPE, Popen
 from threading import Event, Lock, Timer
 from types import TracebackType
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeError, KnowledgeGraph, Row
-from confab.reasoner.limits import LimitError, current
+from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.names import nearest
 from confab.reasoner.vocabulary import CORE
 from confab.reasoner.workers import end, kill, start
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
 
 UNION = tuple(BASE + name for name in (*GRAPHS, DERIVED))
 PROCESS = Path(__file__).with_name("asked_apart.py")
@@ -84,6 +88,21 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
         return _checked(graph, query, limits, _remotely(graph, allowed(query, limits), limits))
     with QueryWorker(graph, limits) as worker:
         return worker.ask(query)
+
+
+class _Checked(BytesIO):
+    """What a store is written into piece by piece, so that it can be stopped at a deadline."""
+
+    def write(self, content: Buffer, /) -> int:
+        """Take the next bytes, or raise `LimitError`."""
+        check("handing the scene to a query")
+        return super().write(content)
+
+
+def _dumped(graph: KnowledgeGraph) -> bytes:
+    written = _Checked()
+    graph.store.dump(written, format=ox.RdfFormat.N_QUADS)
+    return written.getvalue()
 
 
 class QueryWorker:
@@ -144,10 +163,12 @@ class QueryWorker:
         return _checked(self.graph, query, self.limits, found)
 
     def _answer(self, query: str, dataset: Dataset) -> Answer:
-        late = Event()
+        late, starting, deadline = Event(), self._process is None, current()
 
         def interrupt() -> None:
             late.set()
+            if starting and deadline.left == 0:  # it reads the graph, and no query yet
+                kill(process)
             self.interrupt()
 
         with self._sending:
@@ -156,7 +177,7 @@ class QueryWorker:
                 self._process = start(command, math.inf, stdin=PIPE, stdout=PIPE, stderr=PIPE)  # it limits each query
                 self._send(self._setup())
             self._send((query, *dataset))
-        left, process = current().left, self._process
+        left, process = deadline.left, self._process
         assert process.stdout is not None
         timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), interrupt)
         timer.start()
@@ -166,10 +187,14 @@ class QueryWorker:
             self._process = None
             kill(process)
             said = process.communicate()[1].decode("utf-8", "replace")
+            if deadline.left == 0:
+                deadline.check("answering a query")
             raise self._why(process.returncode, said, late.is_set()) from None
         finally:
             timer.cancel()
         if found[0] == "ended":
+            if late.is_set() and deadline.left == 0:
+                deadline.check("answering a query")
             raise self._why(found[1], found[2], late.is_set())
         answer: Answer = found
         return answer
@@ -177,7 +202,7 @@ class QueryWorker:
     def _setup(self) -> dict[str, object]:
         return {
             "prefixes": self.graph.spoken,
-            "quads": self.graph.store.dump(format=ox.RdfFormat.N_QUADS),
+            "quads": _dumped(self.graph),
             "seconds": self.limits.seconds,
             "memory": self.limits.megabytes * 1_000_000,
             "rows": self.limits.rows,

@@ -186,7 +186,9 @@ def _members(graph: KnowledgeGraph) -> list[Member]:
 def read_schema(graph: KnowledgeGraph) -> Schema:
     """Read what doesn't depend on how many individuals there are, in one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
-    for part, *row in graph.solutions(SCHEMA, SCENE):
+    for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
+        if not count % 4096:
+            check("reading the scene")
         parts[text(part)].append(core_triple(row))
     written = [triple for triple in parts["node"] if graph.remote and triple[1] in (CORE + "update", CORE + "extends")]
     if written:  # a store elsewhere has the text alone
