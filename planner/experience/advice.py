@@ -148,7 +148,7 @@ def plan(
     mode: str = "guarded",
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: Compiled | None = None,
-    improve: int = fast.IMPROVEMENTS,
+    improve: int = fast.ORDERS,
     leave_levels: bool = True,
 ) -> Outcome:
     """Plan with experience.

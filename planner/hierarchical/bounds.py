@@ -20,16 +20,20 @@ from time import perf_counter
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.shortest import Bound, shortest, ways
 from confab.planner.grounded.task import Task
-from confab.planner.hierarchical.flattened import shortened
-from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
+from confab.planner.hierarchical.planner import SEARCHING, Call, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
+from confab.planner.hierarchical.shortening import ORDERS
 from confab.planner.hierarchical.unsolvability import closed, refusal
+from confab.planner.hierarchical.windows import refined, windowed
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, OutOfTimeError
 from confab.reasoner.symbols import Problem
+
+WORK = 1_000_000
+"""Operators that are looked at to shorten the best plan on the lowest level: its length against CPU time."""
 
 
 def plan(
@@ -74,21 +78,23 @@ def plan(
 
 
 def _shortened(problem: Problem, best: Outcome, limits: Limits, using: Compiled, deadline: float | None) -> Outcome:
-    """Improve a plan by ever more clusters, until that stops helping or half of the time is gone."""
+    """Improve a plan by ever more orders of the goals, until that stops helping or half of the time is gone."""
     begin = perf_counter()
-    shapes = 8
-    while best.plan is not None and shapes <= 512:
+    improve = 2 * ORDERS
+    while best.plan is not None and improve <= 64 * ORDERS:
         if deadline is not None and perf_counter() - begin > (deadline - begin) / 4 - best.seconds:
             break
-        again = fast_plan(problem, limits=limits.until(deadline), using=using, improve=shapes)
-        shapes *= 4
+        again = fast_plan(problem, limits=limits.until(deadline), using=using, improve=improve)
+        improve *= 4
         if again.plan is not None and cost_of(problem, again.plan) < cost_of(problem, best.plan):
             best = again
     if best.plan is not None:
         now = perf_counter()
+        call = Call(problem, using, None if deadline is None else now + (deadline - now) / 4, limits.expansions)
+        call.steps = refined(call, best.plan.steps)
         with suppress(LimitError):
-            flat = shortened(problem, best.plan, None if deadline is None else now + (deadline - now) / 4)
-            best = replace(best, plan=min(best.plan, flat, key=lambda plan: cost_of(problem, plan)))
+            windowed(call, call.program.levels[-1], WORK)
+            best = replace(best, plan=min(best.plan, call.tree(), key=lambda plan: cost_of(problem, plan)))
     return best
 
 

@@ -20,33 +20,25 @@ flat search             the rest, solved or unsolvable, until a limit   `confab.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
-from confab.planner.hierarchical.concerns import concerns, put_aside
-from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.postoptimization import Improver, length, worth_it
 from confab.planner.hierarchical.recovery import Recovery
-from confab.planner.hierarchical.refinement_cache import MUCH, RefinedStep
+from confab.planner.hierarchical.refinement_cache import MUCH
 from confab.planner.hierarchical.serialization import Call, Compiled, compiled
+from confab.planner.hierarchical.settling import fresh_call
+from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.subproblem import BITS
-from confab.planner.levels import levels_left
+from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
-from confab.reasoner.amounts import meets
+from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, within
-from confab.reasoner.symbols import FALSE, Problem, Symbol
+from confab.reasoner.symbols import Problem, Symbol
 
-__all__ = ["Call", "Compiled", "compiled", "plan"]
+__all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
 
-IMPROVEMENTS = 2
-"""So many shapes of clusters are planned anew by default."""
-DETOURS = 1.25
-"""A plan with so many more steps of the most abstract level than goals to achieve may have needless ones."""
-KEPT = 1.5
-"""Steps of the most abstract level are kept though, by primitives that come to nothing, the plan is up to so many times as long."""
 FLAT = 50_000_000
 """What a task of one level may cost as a whole before its goals are taken in series, in bits of relaxed plans: some seconds."""
 FLAT_ROWS = 30_000
@@ -63,7 +55,7 @@ def plan(
     problem: Problem,
     *,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-    improve: int = IMPROVEMENTS,
+    improve: int = ORDERS,
     using: Compiled | None = None,
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
@@ -75,7 +67,7 @@ def plan(
     problem : Problem
     limits : Limits
     improve : int
-        How many shapes of clusters of steps may be planned anew to shorten the first plan; none leaves it as it is.
+        How many other orders of the goals are tried to shorten the first plan, and how much work that is; none leaves it as it is.
     using : Compiled, optional
         From `compiled`, for a problem with the same domain, individuals and static facts; saves compiling again.
     leave_levels : bool
@@ -162,10 +154,11 @@ def _plan(
     if recovery.too_large is not None:
         text = f"goals in series found no plan, and {recovery.too_large.text}"
         return outcome(Status.GAVE_UP, reason=gave_up(call, text))
-    from confab.planner.hierarchical.flattened import regrouped
-
     flat = lowest_alone(call, limits, BITS * limits.work)
-    found = flat.plan if flat.plan is None else regrouped(problem, flat.plan)
+    found = None
+    if flat.plan is not None:
+        plans = regroupings(problem, flat.plan, call.program.levels[-1])
+        found = next(plan for plan in plans if plan is flat.plan or not validate(problem, plan))
     if found and upper and all(step.level == upper[0] for step in found.steps):
         call.given_up.clear()  # there are steps of it after all
     gone = flat.status is Status.GAVE_UP and flat.reason is not None
@@ -192,7 +185,6 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     """Plan the lowest level from the beginning; so that all comes to rest, if else something is touched and left not at rest."""
     from confab.planner.grounded.best_first import plan_level
-    from confab.planner.validation import validate
 
     problem, deadline, lowest = call.problem, call.segments.deadline, call.program.levels[-1]
     call.table.undo(0)
@@ -241,130 +233,10 @@ def rested(call: Call, advised: Callable[[Call], None]) -> Call:
 
     An object in a hand is at no place that the first level knows, so that none of its steps may begin there.
     """
-    other = beside(call, call.problem, settled=True)
+    other = fresh_call(call, call.problem, settled=True)
     other.segments.expanded += call.segments.expanded
     other.segments.enough = call.segments.enough
     other.aim, other.refiner.at = call.aim, call.refiner.at
     other.segments.counts = call.segments.counts
     advised(other)
     return other
-
-
-def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
-    """Return the plan of a call, made shorter; by steps of a lower level only where nothing breaks that a level above asks.
-
-    A plan that left a level, has only one, or had primitives that came to nothing, is made shorter on the lowest level, too.
-    """
-    levels, idle = call.program.levels, False
-    with suppress(LimitError):  # then the first plan is what there is
-        if len(levels) > 1:
-            idle = shorten(call, improve, leave_levels, advised)
-    plan = call.tree()
-    if len(levels) > 1 and not call.given_up and not idle:
-        return plan
-    from confab.planner.hierarchical import flattened
-
-    with suppress(LimitError):
-        led = len(levels) == 1 and call.advice is not None and call.advice.expects
-        plan = flattened.shortened(call.problem, plan, call.segments.deadline, soon=led)
-    if all(step.level == levels[0] for step in plan.steps):
-        call.given_up.clear()  # there are steps of it after all
-    return plan
-
-
-def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> bool:
-    """Make the steps of a call shorter; whether some were left out that came to nothing, so that there may be more."""
-    first, call.steps = call.steps, fewer(call)
-    concerned = concerns(call.refiner, call.steps)
-    aside = put_aside(concerned)
-    before, call.steps = call.steps, reordered(call, advised) if aside else call.steps
-    if not leave_levels:
-        return False
-    kept = call.steps
-    if aside:
-        improver = Improver(call.refiner, call.using.shapes, improve if kept is first else (improve + 1) // 2)
-        call.steps = improver.improve(kept, concerned if kept is before else ())
-        without = without_detours(call.refiner, call.steps, call.program.levels[-2])
-        call.steps = without if worth_it(call.steps, without) else call.steps
-    without = without_detours(call.refiner, call.steps, call.program.levels[-1])
-    price = KEPT if abstract(call, without) < abstract(call, call.steps) else 1.0
-    idle = length(call.steps) > price * length(without)
-    call.steps = without if idle else call.steps
-    if length(call.steps) < length(kept) and any(left.broken for left in levels_left(call.problem, call.tree())):
-        call.steps, idle = kept, False
-    return idle
-
-
-def abstract(call: Call, steps: Sequence[RefinedStep]) -> int:
-    """Return how many of a plan's steps are of the most abstract level."""
-    return sum(step.level == call.program.levels[0] for step in steps)
-
-
-def unmet(call: Call) -> int:
-    """Return how many goals don't hold in the beginning."""
-    initial = call.problem.initial
-    return sum(not meets(initial.get(symbol, FALSE), value) for symbol, value in call.problem.goal.items())
-
-
-def beside(call: Call, problem: Problem, settled: bool = False) -> Call:
-    """Return a call from the beginning once more, that knows which refinements were found and which weren't.
-
-    If `settled`, what isn't at rest is brought to rest first.
-    """
-    other = Call(problem, call.using, call.segments.deadline, call.segments.most)
-    known = call.refiner
-    other.refiner.found, other.refiner.failed = known.found, known.failed
-    if settled:
-        from confab.planner.hierarchical.settling import settle
-
-        settle(other)
-        other.settled = bool(other.steps)
-    return other
-
-
-def fewer(call: Call) -> list[RefinedStep]:
-    """Return a call's steps with fewer of the most abstract level, where that level is small and has more steps than goals."""
-    if len(call.steps) <= unmet(call):
-        return call.steps
-    from confab.planner.hierarchical.flattened import shortest_known
-
-    found = shortest_known(call.problem, call.steps, call.segments.deadline)
-    if len(found) == len(call.steps):
-        return call.steps
-    other = beside(call, call.problem, call.settled)
-    for step in found:
-        done = other.refiner.do(call.program.levels[0], *step)
-        if done is None:
-            return call.steps
-        other.steps.append(done)
-    if not all(map(other.met, other.goal)):  # what the first level doesn't see
-        Recovery(other, solvable=True).finish()
-    return other.steps if all(map(other.met, other.goal)) and length(other.steps) < length(call.steps) else call.steps
-
-
-def reordered(call: Call, advised: Callable[[Call], None]) -> list[RefinedStep]:
-    """Return the shortest of a call's steps, those with the goals in reverse order, and those to all goals at once.
-
-    Which goal comes first decides what has to be put aside. Nothing is tried where there is hardly a step too many; what is
-    tried uses the most abstract level alone, and advice for refinements: for goals it would lead to the same steps.
-    """
-    if len(call.steps) < DETOURS * unmet(call):
-        return call.steps
-    best = call.steps
-    first = call.program.levels[0]
-    reversed_goal = dict(reversed(list(call.problem.goal.items())))
-    left = max(call.segments.worked, MUCH)  # for both together
-    for goal, at_once in ((reversed_goal, False), (call.problem.goal, True)):
-        other = beside(call, replace(call.problem, goal=goal), call.settled)
-        other.segments.most_work = left
-        advised(other)
-        other.advice = None
-        recovery = Recovery(other, levels=(first,), attempts=2, solvable=True)
-        with suppress(LimitError):
-            done = recovery.together(first) if at_once else other.serialise(recovery.harder)
-            if at_once and done and not all(map(other.met, other.goal)):  # what the first level doesn't see
-                done = recovery.finish() and all(map(other.met, other.goal))
-            if done and length(other.steps) < length(best):
-                best = other.steps
-        left = max(left - other.segments.worked, 0)
-    return best

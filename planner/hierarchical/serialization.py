@@ -44,7 +44,6 @@ class Compiled:
 
     program: Program
     templates: dict[str, list[Template]] = field(default_factory=dict)
-    shapes: dict[object, Template | None] = field(default_factory=dict)
 
 
 def compiled(problem: Problem) -> Compiled:

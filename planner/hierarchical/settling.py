@@ -7,9 +7,23 @@ from __future__ import annotations
 
 from confab.planner.hierarchical.serialization import Call
 from confab.planner.hierarchical.subplans import Effort
+from confab.reasoner.symbols import Problem
 
 RESTING = Effort(depth=6)
 """To bring what isn't at rest there."""
+
+
+def fresh_call(call: Call, problem: Problem, settled: bool = False) -> Call:
+    """Return a call from the beginning once more, that knows which refinements were found and which weren't.
+
+    If `settled`, what isn't at rest is brought to rest first.
+    """
+    other = Call(problem, call.using, call.segments.deadline, call.segments.most)
+    other.refiner.found, other.refiner.failed = call.refiner.found, call.refiner.failed
+    if settled:
+        settle(other)
+        other.settled = bool(other.steps)
+    return other
 
 
 def settle(call: Call) -> bool:

@@ -1,7 +1,8 @@
 """Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
 
-from confab.planner.hierarchical.planner import beside, plan
+from confab.planner.hierarchical.planner import plan
 from confab.planner.hierarchical.serialization import Call, compiled
+from confab.planner.hierarchical.settling import fresh_call
 from confab.planner.plan import Status
 from confab.planner.validation import validate
 from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
@@ -131,7 +132,7 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     assert first is not None
     assert second is None  # one rode down
     call.using.templates.clear()
-    other = beside(call, problem)
+    other = fresh_call(call, problem)
     assert other.refiner.do(1, "SEND", ("item0",)) == first
     assert other.refiner.do(1, "SEND", ("item1",)) is None
     assert other.refiner.misses == 0

@@ -9,7 +9,7 @@ import pytest
 
 import confab
 from benchmarks.following import scene
-from confab.planner.hierarchical import flattened
+from confab.planner.grounded import plan_windows
 from confab.planner.hierarchical.planner import plan as default_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.hierarchical.serialization import Call
@@ -94,7 +94,7 @@ def test_a_plan_of_few_steps_is_not_shortened_on_a_level_of_thousands_of_operato
 
     path = tmp_path / "cups.ttl"
     path.write_text(scene(66, defined=True), encoding="utf-8")
-    monkeypatch.setattr(flattened, "shorter", never)
+    monkeypatch.setattr(plan_windows, "shorter", never)
     problem = confab.load(path).problem
     found = solve(Request(problem))
     assert found.plan is not None

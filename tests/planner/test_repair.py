@@ -263,10 +263,10 @@ def after_somebody(problem: Problem, draw: random.Random) -> Problem:
     ("name", "n", "many", "kept", "cost", "changed", "asked"),
     [
         ("served", 4, 40, 33, 690, 334, 29),
-        ("swap", 6, 12, 5, 315, 250, 9),
+        ("swap", 6, 12, 5, 315, 252, 9),
         ("full", 4, 40, 36, 355, 148, 18),
         ("handover", 5, 12, 10, 245, 54, 6),
-        ("blocked", 5, 24, 23, 476, 66, 10),
+        ("blocked", 5, 24, 23, 520, 66, 11),
     ],
 )
 def test_whatever_happens_whenever_little_is_done_otherwise(

@@ -1,0 +1,127 @@
+"""Steps of a level in a row, replaced by fewer: the level is grounded, if it is small, and its plan's windows are searched.
+
+What the levels above ask of a change is asked of these steps, too (`confab.planner.hierarchical.inherited_preconditions`). What is
+found is refined on the table and put under the levels above again wherever one of their behaviours says what a run of steps does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from confab.planner.hierarchical.detours import parts
+from confab.planner.hierarchical.inherited_preconditions import binding
+from confab.planner.hierarchical.recovery import Recovery
+from confab.planner.hierarchical.refinement_cache import RefinedStep
+from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.settling import fresh_call
+from confab.planner.hierarchical.subplans import Ground
+from confab.planner.levels import levels_left
+from confab.planner.plan import Plan, Step, UngroundableError
+from confab.planner.validation import validate
+from confab.reasoner.symbols import Problem
+
+if TYPE_CHECKING:
+    from confab.planner.grounded.task import Task
+
+PER_PRIMITIVE = 3
+"""Level-1 steps that are given up for each primitive saved, at most: they say what the primitives are for."""
+MOST_ROWS, OF_A_STEP = 20_000, 500
+"""The largest level that is grounded to shorten a plan, in rows of a join, at all and per step: length against CPU time."""
+
+
+def windowed(call: Call, level: int, work: int) -> None:
+    """Replace steps of a level in a call's plan by fewer, if that makes the plan shorter and breaks no more than before."""
+    new = fewer(call, level, work)
+    if new is None:
+        return
+    other = fresh_call(call, call.problem)
+    for name, arguments in new:
+        step = other.refiner.do(level, name, arguments)
+        if step is None:
+            return
+        other.steps.append(step)
+    if not all(map(other.met, other.goal)):  # what the level doesn't see
+        Recovery(other, solvable=True).finish()
+    problem, old = call.problem, call.tree()
+    for plan in regroupings(problem, other.tree(), level):
+        lost = abstract(problem, old) - abstract(problem, plan)
+        shorter = worth(len(old.primitives) - len(plan.primitives), lost)
+        if shorter and not validate(problem, plan) and broken(problem, plan) <= broken(problem, old):
+            call.steps = refined(call, plan.steps)
+            return
+
+
+def fewer(call: Call, level: int, work: int) -> list[Ground] | None:
+    """Return fewer steps of a level than a call's plan has, not refined; None if none are found, or the level is large."""
+    steps = [part for step in call.steps for part in parts(step, level)]
+    if any(step.level != level for step in steps):
+        return None
+    from confab.planner.grounded.plan_windows import shorter
+
+    between = level not in (call.program.levels[0], call.program.levels[-1])
+    problem = replace(call.problem, domain=binding(call.problem, level)) if between else call.problem
+    task = small(problem, level, call.segments.deadline, OF_A_STEP * len(steps))
+    operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
+    if task is None or operators is None:
+        return None
+    found = shorter(task, operators, work, call.segments.deadline)
+    return [task.describe(operator)[:2] for operator in found] if len(found) < len(operators) else None
+
+
+def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
+    """Return the task of a level, with what it sees of the goal and of what is at rest; None if it is large."""
+    from confab.planner.grounded.grounding import ground
+    from confab.planner.grounded.task import Task
+
+    goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
+    try:
+        task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=deadline)
+    except UngroundableError:
+        return None
+    return task if isinstance(task, Task) else None
+
+
+def regroupings(problem: Problem, plan: Plan, level: int) -> tuple[Plan, ...]:
+    """Return a plan of a level under the levels above, and as it is."""
+    if level == problem.domain.levels[0]:
+        return (plan,)
+    from confab.planner.hierarchical.regrouping import under_the_levels_above
+
+    return under_the_levels_above(problem, plan), plan
+
+
+def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
+    """Return steps of a plan as a call has them."""
+    names = call.program.variables
+    return [
+        RefinedStep(
+            step.level,
+            step.behavior,
+            step.arguments,
+            tuple(step.bindings[name] for name in names[step.behavior]) if step.bindings else (),
+            tuple(refined(call, step.steps)),
+        )
+        for step in steps
+    ]
+
+
+def length(steps: Sequence[RefinedStep]) -> int:
+    """Return the number of primitives."""
+    return sum(length(step.steps) if step.steps else 1 for step in steps)
+
+
+def abstract(problem: Problem, plan: Plan) -> int:
+    """Return how many of a plan's steps are of the most abstract level."""
+    return sum(step.level == problem.domain.levels[0] for step in plan.steps)
+
+
+def worth(saved: int, given_up: int) -> bool:
+    """Whether primitives that are saved are worth the steps of the most abstract level that are given up for them."""
+    return saved > max(given_up, 0) / PER_PRIMITIVE
+
+
+def broken(problem: Problem, plan: Plan) -> int:
+    """Return how many changes of a plan break what a level above asks."""
+    return sum(len(left.broken) for left in levels_left(problem, plan))
