@@ -94,6 +94,7 @@ def _link(facts: BodyFacts, node: str, mechanism: str, names: Callable[[str], st
         facts.number(node, "spring", 0.0),
         facts.text(node, "latches", "false") == "true",
         facts.text(node, "urdf_link", ""),
+        tuple(names(part) for part in facts.linked(node, "touches_part")),
     )
 
 

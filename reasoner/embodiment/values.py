@@ -153,6 +153,7 @@ class Link:
     spring: float = 0.0
     latches: bool = False
     urdf_link: str = ""
+    touches: tuple[str, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)

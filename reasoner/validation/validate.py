@@ -9,6 +9,7 @@ our own rules       `confab.reasoner.validation.rules.RULES`, for what a query c
 measures of bodies  `confab.reasoner.embodiment.measures.RULES`, where there is a robot
 joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, likewise
 skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, likewise
+solids              `confab.reasoner.embodiment.solid_checks`, likewise: one through another, overlapping at first
 logic (`deep`)      HermiT: consistency, empty classes, preconditions that nothing satisfies
 ==================  ========================================================================
 """
@@ -26,7 +27,7 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 from confab import ontology
-from confab.reasoner.embodiment import joint_checks, measures, skill_checks
+from confab.reasoner.embodiment import joint_checks, measures, skill_checks, solid_checks
 from confab.reasoner.embodiment.facts import EmbodimentError
 from confab.reasoner.embodiment.reading import read_embodiment
 from confab.reasoner.files import silent_about_numbers
@@ -69,6 +70,9 @@ FROM_FACTS = {"unreachable", "amount-out-of-reach"}
 """Rules that ask what comes of the initial situation: they wait until its facts are right."""
 NEEDS_ALL_BEHAVIORS = {"changed-below-only", "level-gap", "rest-value-out-of-reach"}
 """What isn't said as long as the update of some behaviour can't be read."""
+
+MEASURES = measures.RULES | joint_checks.RULES | skill_checks.RULES | solid_checks.RULES
+"""Rules on an embodiment."""
 
 STAGES = 4
 """Of the validation of a file."""
@@ -216,8 +220,10 @@ def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) ->
         why = "physics reads the file in the same way"
         yield places.finding("unreadable-body", error.node or graph.scene, str(error), why, "see the message")
         return
-    for rule, faults in (measures.RULES | joint_checks.RULES | skill_checks.RULES).items():
-        for name, what, why, remedy in faults(embodiment):
+    flaws = {rule: faults(embodiment) for rule, faults in MEASURES.items()}
+    flaws |= {rule: faults(embodiment, reading.problem.initial) for rule, faults in solid_checks.FIRST_RULES.items()}
+    for rule, found in flaws.items():
+        for name, what, why, remedy in found:
             yield places.finding(rule, name if "://" in name else reading.names.iri(name), what, why, remedy)
 
 
