@@ -202,10 +202,10 @@ class Engine:
 
     def _contacts(self, body: int) -> set[str]:
         """Return the names of the bodies and links that press against a body."""
-        found = {self._name(contact[2], contact[4]) for contact in self.contacts(body) if contact[9] > 0.5}
+        found = {self.name_of(contact[2], contact[4]) for contact in self.contacts(body) if contact[9] > 0.5}
         return found - {""}
 
-    def _name(self, body: int, part: int) -> str:
+    def name_of(self, body: int, part: int) -> str:
         """Return the name of a body, or of its link `part` if that moves; an empty string if it has no name."""
         links = (name for name, one in self.links.items() if (one.body, one.joints.get(name)) == (body, part))
         return next(links, self.names.get(body, ""))

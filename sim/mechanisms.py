@@ -1,15 +1,18 @@
 """Mechanisms, which are furniture with moving links, in a physics world.
 
-Joints resist by friction and damping; springs push back and latches hold.
+Joints resist by friction and damping; springs push back and latches hold. Links are solid to each other and to their base, but for
+those that are stated to touch, or touch before anything has moved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import pybullet
 
+from confab.reasoner.embodiment.solid_checks import DEEP
 from confab.reasoner.embodiment.values import Link, Mechanism
 from confab.sim.bodies import load_written
 from confab.sim.collision import Solid
@@ -18,6 +21,10 @@ from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
 """Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which it is then held."""
+
+
+SLIGHT = 0.0002
+"""Metres of overlap at rest from which on the friction between two links would jam the joint."""
 
 
 @dataclass
@@ -92,7 +99,8 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
     if mechanism.urdf:
         body = pybullet.loadURDF(mechanism.urdf, position, orientation, useFixedBase=True, physicsClientId=client)
     else:
-        body = load_written(written(mechanism), position, orientation, useFixedBase=True, physicsClientId=client)
+        solid = {"useFixedBase": True, "flags": pybullet.URDF_USE_SELF_COLLISION}
+        body = load_written(written(mechanism), position, orientation, **solid, physicsClientId=client)
     numbers = {}
     for i in range(pybullet.getNumJoints(body, physicsClientId=client)):
         numbers[pybullet.getJointInfo(body, i, physicsClientId=client)[12].decode()] = i
@@ -102,7 +110,43 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
     for link in mechanism.links:
         pybullet.changeDynamics(body, joints[link.name], jointDamping=link.damping, physicsClientId=client)
         _resist(client, body, joints[link.name], link, False)
-    return Mechanic(client, int(body), mechanism, read_mechanism(mechanism), joints)
+    mechanic = Mechanic(client, int(body), mechanism, read_mechanism(mechanism), joints)
+    if not mechanism.urdf:
+        _let_touch(mechanic)
+    return mechanic
+
+
+def _let_touch(mechanic: Mechanic) -> None:
+    """Let links pass each other or their base where that is stated, or where they touch before anything has moved.
+
+    Raises
+    ------
+    ValueError
+        Two of them are deeper in each other than a touch; the message names both and the millimetres.
+    """
+    owners: dict[str, tuple[int, Mechanism | Link]] = {mechanic.mechanism.name: (-1, mechanic.mechanism)}
+    owners |= {link.name: (mechanic.joints[link.name], link) for link in mechanic.mechanism.links}
+    for (one, (i, first)), (other, (j, second)) in combinations(owners.items(), 2):
+        depth = overlap_of(mechanic.client, (mechanic.body, i), (mechanic.body, j))
+        stated = _touches(first, second) or _touches(second, first)
+        if depth > DEEP and not stated:
+            raise ValueError(
+                f"{other} is {depth * 1000:.0f} mm inside {one} while the joints of {mechanic.mechanism.name} are at 0; "
+                "run confab validate, which names the parts"
+            )
+        if stated or depth > SLIGHT:
+            pybullet.setCollisionFilterPair(mechanic.body, mechanic.body, i, j, 0, physicsClientId=mechanic.client)
+
+
+def _touches(one: Mechanism | Link, other: Mechanism | Link) -> bool:
+    return isinstance(one, Link) and any(part.name in one.touches for part in other.parts)
+
+
+def overlap_of(client: int, one: tuple[int, int], other: tuple[int, int]) -> float:
+    """Return by how many metres two links (body, number) of a physics world overlap; 0 if they don't."""
+    (body, i), (second, j) = one, other
+    points = pybullet.getClosestPoints(body, second, 0.001, i, j, physicsClientId=client)
+    return max((-float(point[8]) for point in points if point[8] < 0), default=0.0)
 
 
 def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:

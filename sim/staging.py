@@ -8,18 +8,22 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from confab.reasoner.embodiment.solid_checks import DEEP
 from confab.reasoner.embodiment.values import Fixture, Mechanism, Shape
 from confab.sim.base import read_base
 from confab.sim.bodies import KINDS, packed
 from confab.sim.driving import update_kinematics
 from confab.sim.engine import Bead, Engine, Thing
-from confab.sim.mechanisms import load_mechanism
+from confab.sim.mechanisms import load_mechanism, overlap_of
 from confab.sim.perception import Draft
 from confab.sim.robot import load_robot
 from confab.sim.urdf import Array
 
 SETTLING = 120
 """Simulation steps in which bodies and beads come to rest before the first primitive."""
+
+DRAWS = 20
+"""Number of times that deviations are drawn for an object, until it is inside nothing else."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
 """An invisibly small triangle, the visual shape of beads: `confab.sim.picture` draws them, since PyBullet would be slow."""
@@ -96,11 +100,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
             )
         if name not in engine.embodiment.bodies:
             raise ValueError(f"object '{name}' has no shape: give its class one")
-        shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)
-        orientation = np.array([0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)])
-        body = KINDS[shape.kind].make(engine.client, shape, position, orientation)
-        engine.names[body] = name
-        engine.bodies[name] = Thing(body, shape)
+        _put(engine, name, place, perturb)
     engine.contents = {name: list(fillings) for name, fillings in draft.contents.items()}
     engine.filled = dict(draft.servings)
     if beads:
@@ -109,6 +109,39 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
     engine.run(SETTLING)
     put_to_sleep(engine)
     engine.steps = 0
+
+
+def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) -> None:
+    """Make an object at a place; deviations that take it into another one are drawn anew.
+
+    Raises
+    ------
+    ValueError
+        It is inside something else that is already there; the message names both and the millimetres.
+    """
+    for _ in range(DRAWS if perturb is not None else 1):
+        shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)
+        orientation = np.array([0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)])
+        body = KINDS[shape.kind].make(engine.client, shape, position, orientation)
+        depth, inside = _deepest(engine, body)
+        if depth <= DEEP:
+            engine.names[body] = name
+            engine.bodies[name] = Thing(body, shape)
+            return
+        pybullet.removeBody(body, physicsClientId=engine.client)
+    raise ValueError(
+        f"{name} is {depth * 1000:.0f} mm inside {inside} at first, at {place}; move one of the two (confab validate finds them)"
+    )
+
+
+def _deepest(engine: Engine, body: int) -> tuple[float, str]:
+    """Return how deep a body is in something else, and the name of that."""
+    found = [(0.0, "")]
+    for other in engine.names:
+        for link in range(-1, pybullet.getNumJoints(other, physicsClientId=engine.client)):
+            depth = overlap_of(engine.client, (body, -1), (other, link))
+            found.append((depth, engine.name_of(other, link)))
+    return max(found)
 
 
 def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None) -> tuple[Shape, Array, float]:

@@ -1,14 +1,18 @@
 """Mechanisms and objects are solid: what is in one place with something else is found before physics moves it."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import pybullet
 import pytest
 
 import confab
 from confab.reasoner.embodiment.solid_checks import through_a_solid
-from confab.reasoner.embodiment.values import Embodiment, Link, Mechanism
+from confab.reasoner.embodiment.values import Embodiment, Link, Mechanism, Part
 from confab.reasoner.validation.validate import validate
+from confab.sim.staging import Perturbation
+from confab.sim.world import World
 
 WRONG = Path(__file__).parent / "wrong"
 
@@ -69,3 +73,47 @@ def test_a_link_behind_a_shut_neighbour_is_no_fault_since_the_neighbour_opens() 
         case = replace(cupboard, links=(replace(door, upper=upper), tray))
         found = [what for _, what, _, _ in through_a_solid(replace(embodiment, mechanisms=(case,)))]
         assert bool(found) == (upper < 0.2), found
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("through.ttl", "tray is 29 mm inside cab while the joints of cab are at 0"),
+        ("overlap.ttl", "b is 25 mm inside a at first, at p2"),
+    ],
+)
+def test_a_world_in_which_solids_overlap_at_first_is_not_begun(file: str, said: str) -> None:
+    scene = confab.load(WRONG / file)
+    with pytest.raises(ValueError, match=re.escape(said)):
+        World(scene.embodiment, scene.problem.initial)
+
+
+def test_perturbed_objects_do_not_overlap_at_first() -> None:
+    scene = confab.load(WRONG / "overlap.ttl")
+    p2 = replace(scene.embodiment.places["p2"], position=(0.42, 0.135, 0.7))  # 5 mm beside the other, which may turn
+    embodiment = replace(scene.embodiment, places={**scene.embodiment.places, "p2": p2})
+    for seed in range(5):
+        with World(embodiment, scene.problem.initial, seed, Perturbation()) as world:
+            apart = pybullet.getClosestPoints(
+                world.bodies["a"].body, world.bodies["b"].body, 0.05, physicsClientId=world.client
+            )
+            assert min(point[8] for point in apart) > -0.002
+
+
+def test_a_drawer_does_not_slide_through_a_shut_door() -> None:
+    scene = confab.load("kitchen-corner")
+    cupboard = next(one for one in scene.embodiment.mechanisms if one.name == "cupboard")
+    tray = Link("tray", "prismatic", (Part("tray.floor", "box", (0.12, 0.2, 0.01)),), upper=0.15, opened=0.12)
+    tray = replace(tray, position=(0.0, 0.0, 0.1), axis=(-1.0, 0.0, 0.0))
+    embodiment = replace(scene.embodiment, mechanisms=(replace(cupboard, links=(*cupboard.links, tray)),), places={})
+    for opened in (False, True):
+        with World(replace(embodiment, perceivers={}), {}) as world:
+            world.links["door"].set("door", opened)
+            pull = {"controlMode": pybullet.VELOCITY_CONTROL, "targetVelocity": 0.3, "force": 5.0}
+            joints, body = world.links["tray"].joints, world.links["tray"].body
+            hold = {"controlMode": pybullet.VELOCITY_CONTROL, "targetVelocity": 0.0, "force": 50.0}
+            pybullet.setJointMotorControl2(body, joints["door"], **hold, physicsClientId=world.client)
+            pybullet.setJointMotorControl2(body, joints["tray"], **pull, physicsClientId=world.client)
+            world.run(240)
+            value = world.links["tray"].values()["tray"]
+            assert (value > 0.1) == opened, value
