@@ -25,8 +25,8 @@ from benchmarks.execution import KINDS, Trial, after_intervention, random_interv
 from confab.planner.acting.repair import mend
 from confab.planner.experience import advice
 from confab.planner.grounded.best_first import plan_level
+from confab.planner.hierarchical.call import compiled
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.serialization import compiled
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.plan import Limits, Outcome

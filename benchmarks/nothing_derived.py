@@ -35,10 +35,10 @@ PART = re.compile(
 )
 """A part of the query for the schema that serves only what is derived or counted."""
 COMPARING = (
-    "confab.planner.hierarchical.subplans",
-    "confab.planner.hierarchical.refinement_cache",
-    "confab.planner.hierarchical.subproblem",
-    "confab.planner.hierarchical.serialization",
+    "confab.planner.hierarchical.chains",
+    "confab.planner.hierarchical.refinement",
+    "confab.planner.hierarchical.scope",
+    "confab.planner.hierarchical.call",
     "confab.planner.hierarchical.planner",
     "confab.planner.validation",
 )

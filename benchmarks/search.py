@@ -39,10 +39,10 @@ from confab.planner.experience.advice import Memory
 from confab.planner.experience.advice import plan as guided
 from confab.planner.experience.lessons import teach
 from confab.planner.grounded.best_first import plan_level
-from confab.planner.hierarchical import serialization as serialise
+from confab.planner.hierarchical import call as serialise
+from confab.planner.hierarchical.chains import Ground, Segments
 from confab.planner.hierarchical.planner import Compiled, compiled, plan
-from confab.planner.hierarchical.refinement_cache import Template
-from confab.planner.hierarchical.subplans import Ground, Segments
+from confab.planner.hierarchical.refinement import Template
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.validation import validate
 from confab.reasoner.generate import write_scene

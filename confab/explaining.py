@@ -13,7 +13,7 @@ from confab.planner.experience.advice import Memory as Advisor
 from confab.planner.experience.chaining import Candidate
 from confab.planner.experience.evidence import View
 from confab.planner.experience.leading import Guide
-from confab.planner.hierarchical.serialization import Call, compiled
+from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally
 from confab.reasoner.symbols import Problem

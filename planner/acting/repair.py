@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
 from confab.planner.certified import certified
+from confab.planner.hierarchical.agenda import Agenda, order
+from confab.planner.hierarchical.call import Call, Compiled, compiled, settle
+from confab.planner.hierarchical.chains import ONE_STEP
 from confab.planner.hierarchical.planner import plan as fast_plan
-from confab.planner.hierarchical.recovery import Recovery
-from confab.planner.hierarchical.refinement_cache import RefinedStep
-from confab.planner.hierarchical.serialization import EASY, Call, Compiled, compiled
-from confab.planner.hierarchical.settling import settle
+from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps
@@ -115,7 +115,7 @@ def repair(
     touched = changed_individuals(planned, problem)
     call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
     # What is impossible is proved by replanning; nor is anything kept undone here: beginning anew is replanning, too.
-    recovery = Recovery(call, solvable=True, forward=True)
+    agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
         if not call.at_rest():
@@ -132,7 +132,7 @@ def repair(
         kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
         settle(call)
         now = replace(problem, initial={**problem.initial, **call.table.state()})
-        solved = not impossible(now) and call.serialise(recovery.harder)
+        solved = not impossible(now) and agenda.achieve_all()
     except (LimitError, UnsolvableError):
         solved = False
     if not solved:
@@ -240,10 +240,10 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
     """Achieve first, where one step does it, the open goals that no pending step is for: something happened to them."""
     planned = {cell for step in pending for cell in _effects(call, step.behavior, step.arguments, step.bindings)}
     orphans = [cell for cell in call.goal if cell not in planned and not call.met(cell)]
-    before = call.order() if orphans else {}
+    before = order(call) if orphans else {}
     for cell in orphans:
         if not any(other in orphans for other in before.get(cell, ())):
-            call.achieve(call.program.levels[0], cell, EASY)
+            call.achieve(call.program.levels[0], cell, ONE_STEP)
 
 
 def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
@@ -308,7 +308,7 @@ def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
     """Where another value is wanted now than the one that a step gives, give that, if one step does it."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
-            call.achieve(call.program.levels[0], cell, EASY)
+            call.achieve(call.program.levels[0], cell, ONE_STEP)
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:

@@ -23,8 +23,8 @@ from confab.planner.experience.evidence import Judge, View, fillers
 from confab.planner.experience.leading import Guide, rules_in, usable
 from confab.planner.experience.matching import Bind
 from confab.planner.hierarchical import planner as fast
-from confab.planner.hierarchical.refinement_cache import Roles, Template
-from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.hierarchical.call import Call, Compiled
+from confab.planner.hierarchical.refinement import Roles, Template
 from confab.planner.plan import Limits, Outcome, paused_collection
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally

@@ -19,9 +19,9 @@ from math import inf
 from typing import NamedTuple, TypeAlias
 
 from confab.planner.experience.matching import Bind, Find, finder, soft
+from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.operators import FEW, Achiever
-from confab.planner.hierarchical.refinement_cache import RefinedStep
-from confab.planner.hierarchical.serialization import Call
+from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.symmetry import representatives
 from confab.planner.transitions import Cell, Key, arguments_of, key_of
 from confab.reasoner.amounts import meets, number, towards

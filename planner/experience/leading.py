@@ -19,10 +19,10 @@ from typing import TypeAlias, TypeVar
 
 from confab.planner.experience.chaining import Budget, Candidate, Chains, TooMuchError, fact
 from confab.planner.experience.matching import Bind, known
+from confab.planner.hierarchical.call import Call
+from confab.planner.hierarchical.chains import Keep
 from confab.planner.hierarchical.operators import Program
-from confab.planner.hierarchical.refinement_cache import RefinedStep, Roles, Template
-from confab.planner.hierarchical.serialization import Call
-from confab.planner.hierarchical.subplans import Keep
+from confab.planner.hierarchical.refinement import RefinedStep, Roles, Template
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally

@@ -19,9 +19,9 @@ from confab.planner.experience.evidence import View, fillers
 from confab.planner.experience.leading import by_rules, rules_in
 from confab.planner.experience.regression import Course
 from confab.planner.hierarchical import planner as fast
-from confab.planner.hierarchical.refinement_cache import Refiner, Roles, Template
-from confab.planner.hierarchical.serialization import Call, Compiled, compiled
-from confab.planner.hierarchical.subplans import Keep
+from confab.planner.hierarchical.call import Call, Compiled, compiled
+from confab.planner.hierarchical.chains import Keep
+from confab.planner.hierarchical.refinement import Refiner, Roles, Template
 from confab.planner.paper.learning import LearningError
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.transitions import Cell, Change, arguments_of

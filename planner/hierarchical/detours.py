@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from confab.planner.hierarchical.refinement_cache import RefinedStep, Refiner
+from confab.planner.hierarchical.refinement import RefinedStep, Refiner
 from confab.planner.transitions import Cell, Changes
 
 AGAIN = 30

@@ -1,20 +1,18 @@
-"""The default planner: goals in series, proofs and more effort where these get stuck, then flat search; what is found is shortened.
+"""The default planner: an agenda of goals, each achieved on its level and refined at once; then the plan is shortened.
 
-Each stage is cheaper than the next and hands on only what it can't decide. What is concluded from a level above the lowest is
-never that there is no plan.
+======  =========================================================================  =========================================
+word    what is done                                                               module
+======  =========================================================================  =========================================
+agenda  goals one after the other, with more effort where these get stuck          `confab.planner.hierarchical.agenda`
+call    achieve a goal: its steps are done on the table and kept                   `confab.planner.hierarchical.call`
+chains  what is relevant to a value, and a few relevant steps                      `confab.planner.hierarchical.chains`
+scope   a part of the world is cut out, grounded and searched flat                 `confab.planner.hierarchical.scope`
+refine  each step is done by steps of the level below: a method, a chain, a scope  `confab.planner.hierarchical.refinement`
+prove   where the agenda gets stuck: that there is no plan                         `confab.planner.hierarchical.unsolvability`
+shorten other orders of the goals, windows of steps, no detours                    `confab.planner.hierarchical.shortening`
+======  =========================================================================  =========================================
 
-======================  ==============================================  ==============================
-stage                   decides                                         module
-======================  ==============================================  ==============================
-flat search             of one level alone, a bounded while             `confab.planner.grounded.best_first`
-goals in series         most problems, in time linear in their size     `confab.planner.hierarchical.serialization`
-static proofs           where these get stuck: that a goal lacks a      `confab.planner.hierarchical.unsolvability`
-                        static fact, or two goals want one value
-more effort             where nothing is proved                         `confab.planner.hierarchical.recovery`
-relaxed reachability    in between, that a goal can't be reached, or    `confab.planner.grounded.reachability`
-                        that none of a few states fulfils all
-flat search             the rest, solved or unsolvable, until a limit   `confab.planner.grounded.best_first`
-======================  ==============================================  ==============================
+What is concluded from a level above the lowest is never that there is no plan.
 """
 
 from __future__ import annotations
@@ -24,14 +22,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
-from confab.planner.hierarchical.recovery import Recovery
-from confab.planner.hierarchical.refinement_cache import MUCH
-from confab.planner.hierarchical.serialization import Call, Compiled, compiled
-from confab.planner.hierarchical.settling import fresh_call
+from confab.planner.hierarchical.agenda import Agenda
+from confab.planner.hierarchical.call import Call, Compiled, compiled, fresh_call
+from confab.planner.hierarchical.refinement import MUCH
+from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.subproblem import BITS
 from confab.planner.hierarchical.windows import regroupings
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
+from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, within
@@ -79,8 +76,10 @@ def plan(
     -------
     Outcome
     """
+    begin = perf_counter()
     with within(limits.seconds), paused_collection():
-        return _plan(problem, limits, improve, using, leave_levels, advised)
+        outcome = _plan(problem, limits, improve, using, leave_levels, advised)
+    return replace(outcome, seconds=perf_counter() - begin)
 
 
 def _plan(
@@ -91,83 +90,77 @@ def _plan(
     leave_levels: bool,
     advised: Callable[[Call], None],
 ) -> Outcome:
-    begin = perf_counter()
     deadline = limits.end(SEARCHING)
+    one_level = improve > 0 and len(problem.domain.levels) == 1
     flat = None
-    if improve and len(problem.domain.levels) == 1 and advised is alone:
+    if one_level and advised is alone:
         flat = flat_first(problem, limits, deadline)  # compiling thousands of conditional effects would take longer
         if flat.status is Status.SOLVED:
-            return replace(flat, seconds=perf_counter() - begin)
-    using = using or compiled(problem)
-
-    call = Call(problem, using, deadline, limits.expansions)
+            return flat
+    call = Call(problem, using or compiled(problem), deadline, limits.expansions)
     call.segments.enough = limits.work
     advised(call)
-
-    def outcome(status: Status, plan: Plan | None = None, reason: Reason | None = None) -> Outcome:
-        return call.outcome(status, plan, reason, perf_counter() - begin)
-
+    levels = call.program.levels if leave_levels else call.program.levels[:1]
+    agenda = Agenda(call, levels)
     try:
-        levels = call.program.levels if leave_levels else call.program.levels[:1]
-        solved = False
-        if improve and len(call.program.levels) == 1:
-            solved = by_rules_alone(call)
-            if not solved:
-                flat = flat or flat_first(problem, limits, deadline)
-                for level, counts in flat.search.items():
-                    call.segments.counts[level].add(counts)
-                if flat.status is Status.UNSOLVABLE:
-                    return outcome(flat.status, None, flat.reason)
-                if flat.status is Status.SOLVED:
-                    return outcome(flat.status, flat.plan)
-            call = call if solved else rested(call, advised)
-        recovery = Recovery(call, levels)
-        if len(levels) > 1 and not call.at_rest():
-            solved = soon(recovery)
-            if not solved:
-                call = rested(call, advised)
-                recovery = Recovery(call, levels)
-        if solved or achieved(recovery):
+        done = one_level and by_rules_alone(call)
+        if one_level and not done:
+            flat = flat or flat_first(problem, limits, deadline)
+            call.count(flat)
+            if flat.status is not Status.GAVE_UP:
+                return call.outcome(flat.status, flat.plan, flat.reason)
+        if not done and (one_level or not (call.at_rest() or (done := soon(agenda)))):
+            call = rested(call, advised)
+            agenda = Agenda(call, levels)
+        if done or agenda.achieve_all():
             call.segments.enough = math.inf
-            made = shortened(call, improve, leave_levels, advised) if improve else call.tree()
-            if call.settled and made.steps and made.steps[0].level != call.program.levels[0]:
+            plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
+            if call.settled and plan.steps and plan.steps[0].level != levels[0]:
                 call.given_up.insert(
                     0, "steps of a lower level come first: they bring to rest what isn't in the beginning"
                 )
-            return outcome(Status.SOLVED, made)
+            return call.outcome(Status.SOLVED, plan)
+        return last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
-        return replace(outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
+        return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
-        from confab.planner.hierarchical.stuck import gave_up
+        return given_up(call, f"stopped at the limit: {limit}")
 
-        return outcome(Status.GAVE_UP, reason=gave_up(call, f"stopped at the limit: {limit}"))
-    from confab.planner.hierarchical.stuck import gave_up
 
-    upper = [level for level in call.program.levels if level != call.program.levels[-1]]
-    if not leave_levels and upper:
-        text = f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
-        return outcome(Status.GAVE_UP, reason=gave_up(call, text))
+def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
+    """Plan the lowest level alone, flat, unless levels aren't to be left or it is too large."""
+    call, problem = agenda.call, agenda.call.problem
+    *upper, lowest = call.program.levels
+    if upper and not leave_levels:
+        return given_up(
+            call, f"no plan of level {upper[0]} was found that can be refined, and levels aren't to be left"
+        )
     if upper:
         call.given_up.append(
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} were given up for the whole task"
         )
-    if recovery.too_large is not None:
-        text = f"goals in series found no plan, and {recovery.too_large.text}"
-        return outcome(Status.GAVE_UP, reason=gave_up(call, text))
+    if agenda.too_large is not None:
+        return given_up(call, f"goals in series found no plan, and {agenda.too_large.text}")
     flat = lowest_alone(call, limits, BITS * limits.work)
-    found = None
-    if flat.plan is not None:
-        plans = regroupings(problem, flat.plan, call.program.levels[-1])
-        found = next(plan for plan in plans if plan is flat.plan or not validate(problem, plan))
-    if found and upper and all(step.level == upper[0] for step in found.steps):
+    if flat.status is Status.GAVE_UP and flat.reason is not None:
+        return given_up(call, flat.reason.text)
+    plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest)
+    plan = next((plan for plan in plans if plan is flat.plan or not validate(problem, plan)), None)
+    if plan and upper and all(step.level == upper[0] for step in plan.steps):
         call.given_up.clear()  # there are steps of it after all
-    gone = flat.status is Status.GAVE_UP and flat.reason is not None
-    return outcome(flat.status, found, gave_up(call, flat.reason.text) if gone and flat.reason else flat.reason)
+    return call.outcome(flat.status, plan, flat.reason)
+
+
+def given_up(call: Call, why: str) -> Outcome:
+    """Return that planning gave up, with where it was."""
+    from confab.planner.hierarchical.stuck import gave_up
+
+    return call.outcome(Status.GAVE_UP, reason=gave_up(call, why))
 
 
 def by_rules_alone(call: Call) -> bool:
     """Achieve the goals one after the other as rules advise, if they know all kinds of them; whether that succeeded."""
-    return call.advice is not None and call.advice.expects and call.serialise(Recovery(call, (), solvable=True).harder)
+    return call.advice is not None and call.advice.expects and Agenda(call, (), solvable=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
@@ -194,8 +187,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     for wanted in (goal, {**rests, **goal}):
         left = None if deadline is None else max(deadline - perf_counter(), 0.0)
         flat = plan_level(problem, lowest, None, wanted, Limits(limits.expansions, left), most_work)
-        for level, counts in flat.search.items():
-            call.segments.counts[level].add(counts)
+        call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break
     if (
@@ -207,21 +199,12 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     return flat
 
 
-def achieved(recovery: Recovery) -> bool:
-    """Do steps after which all goals hold; whether there are some."""
-    call = recovery.call
-    call.segments.doubt = recovery.doubt
-    done = call.serialise(recovery.harder)
-    recovery.solvable = recovery.solvable or done
-    return done
-
-
-def soon(recovery: Recovery) -> bool:
-    """Do steps after which all goals hold by no more work than one large world; whether there are some."""
-    segments = recovery.call.segments
+def soon(agenda: Agenda) -> bool:
+    """Do steps after which all goals hold by no more work than one large scope; whether there are some."""
+    segments = agenda.call.segments
     segments.most_work = MUCH
     try:
-        return achieved(recovery)
+        return agenda.achieve_all()
     except LimitError:
         return False
     finally:

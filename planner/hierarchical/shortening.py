@@ -15,11 +15,10 @@ from contextlib import suppress
 from dataclasses import replace
 from random import Random
 
+from confab.planner.hierarchical.agenda import Agenda
+from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.recovery import Recovery
-from confab.planner.hierarchical.refinement_cache import RefinedStep
-from confab.planner.hierarchical.serialization import Call
-from confab.planner.hierarchical.settling import fresh_call
+from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.windows import abstract, broken, length, windowed, worth
 from confab.planner.plan import Plan
 from confab.planner.transitions import Cell, key_of
@@ -107,9 +106,9 @@ def reordered(call: Call, number: int, work: int, advised: Callable[[Call], None
         other.segments.most_work = work
         advised(other)
         other.advice = None
-        recovery = Recovery(other, levels=call.program.levels[:1], attempts=2, solvable=True, forward=True)
+        agenda = Agenda(other, levels=call.program.levels[:1], attempts=2, solvable=True, forward=True)
         with suppress(LimitError):
-            if other.serialise(recovery.harder) and length(other.steps) < length(call.steps):
+            if agenda.achieve_all() and length(other.steps) < length(call.steps):
                 call.steps = other.steps
         work -= other.segments.effort + DOING * length(other.steps)
         if work <= 0:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 
-from confab.planner.hierarchical.serialization import Call
-from confab.planner.hierarchical.subplans import Asked
+from confab.planner.hierarchical.call import Call
+from confab.planner.hierarchical.chains import Asked
 from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import bounds_written

@@ -11,8 +11,8 @@ import math
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.subplans import Segments
-from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.hierarchical.chains import Segments
+from confab.planner.hierarchical.scope import LEAST
 from confab.planner.plan import OUT_OF_MEMORY, Reason, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State

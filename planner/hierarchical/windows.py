@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from confab.planner.hierarchical.agenda import Agenda
+from confab.planner.hierarchical.call import Call, fresh_call
+from confab.planner.hierarchical.chains import Ground
 from confab.planner.hierarchical.detours import parts
 from confab.planner.hierarchical.inherited_preconditions import binding
-from confab.planner.hierarchical.recovery import Recovery
-from confab.planner.hierarchical.refinement_cache import RefinedStep
-from confab.planner.hierarchical.serialization import Call
-from confab.planner.hierarchical.settling import fresh_call
-from confab.planner.hierarchical.subplans import Ground
+from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, Step, UngroundableError
 from confab.planner.validation import validate
@@ -43,7 +42,7 @@ def windowed(call: Call, level: int, work: int) -> None:
             return
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # what the level doesn't see
-        Recovery(other, solvable=True).finish()
+        Agenda(other, solvable=True).finish()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level):
         lost = abstract(problem, old) - abstract(problem, plan)

@@ -1,8 +1,7 @@
 """Goals taken one after the other lead astray where what one of them leaves can't be undone: level 1 is kept all the same."""
 
+from confab.planner.hierarchical.call import Call, compiled, fresh_call
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.serialization import Call, compiled
-from confab.planner.hierarchical.settling import fresh_call
 from confab.planner.plan import Status
 from confab.planner.validation import validate
 from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness

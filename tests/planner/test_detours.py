@@ -2,9 +2,9 @@
 
 import pytest
 
+from confab.planner.hierarchical.call import Call, compiled
 from confab.planner.hierarchical.detours import without_detours
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.serialization import Call, compiled
 from confab.planner.levels import levels_left
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem, SituationType

@@ -21,7 +21,8 @@ from confab.planner.grounded.novelty import Seen, by_novelty
 from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import planner as fast
-from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.hierarchical.agenda import Agenda
+from confab.planner.hierarchical.call import Compiled
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, UngroundableError
 from confab.planner.solve import MODES, Request, solve
 from confab.planner.validation import validate
@@ -411,7 +412,7 @@ def test_a_problem_of_one_level_is_planned_as_a_whole_and_in_series_only_where_t
     def series(*_: object) -> bool:
         raise AssertionError("goals in series")
 
-    monkeypatch.setattr(Call, "serialise", series)
+    monkeypatch.setattr(Agenda, "achieve_all", series)
     lift = carrier(8)
     outcome = fast.plan(lift)
     assert outcome.plan is not None

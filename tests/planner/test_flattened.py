@@ -10,9 +10,9 @@ import pytest
 import confab
 from benchmarks.following import scene
 from confab.planner.grounded import plan_windows
+from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.planner import plan as default_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
-from confab.planner.hierarchical.serialization import Call
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.plan import Limits, Plan
 from confab.planner.solve import Request, solve
@@ -71,7 +71,7 @@ def test_primitives_stand_under_the_levels_above_wherever_these_say_what_a_run_o
 
 
 def test_what_the_last_resort_finds_keeps_the_levels_where_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Call, "serialise", lambda call, harder: False)
+    monkeypatch.setattr(Agenda, "achieve_all", lambda agenda: False)
     tops = []
     for seed in range(700_000, 700_030):
         problem = hierarchy(seed)

@@ -11,7 +11,7 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.planner import plan as default
-from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.hierarchical.scope import LEAST
 from confab.planner.hierarchical.unsolvability import exhausted, looked_at
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT

@@ -11,7 +11,7 @@ from confab.planner.certifying import certify
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import Call, compiled
-from confab.planner.hierarchical.subproblem import LEAST
+from confab.planner.hierarchical.scope import LEAST
 from confab.planner.hierarchical.unsolvability import LOOKING, closed, exhausted, impossible, looked_at, proved, refusal
 from confab.planner.plan import OUT_OF_MEMORY, Reason, UnsolvableError
 from confab.reasoner.amounts import Quantity

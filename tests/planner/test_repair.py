@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.execution import Trial, rest_after
 from confab.planner.acting.repair import CLOSE, changed_individuals, difference, mend, rejected, replan, vanished
+from confab.planner.hierarchical.call import Compiled, compiled
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.serialization import Compiled, compiled
 from confab.planner.plan import Limits, Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import successor

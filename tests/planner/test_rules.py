@@ -17,11 +17,11 @@ from confab.planner.experience.leading import FREE, Guide, rules_in
 from confab.planner.experience.lessons import compared, live, teach
 from confab.planner.experience.regression import Course
 from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import agenda
 from confab.planner.hierarchical import planner as fast
-from confab.planner.hierarchical import recovery
+from confab.planner.hierarchical.call import Call, Compiled, compiled
+from confab.planner.hierarchical.chains import EXPANSION
 from confab.planner.hierarchical.operators import Program
-from confab.planner.hierarchical.serialization import Call, Compiled, compiled
-from confab.planner.hierarchical.subplans import EXPANSION
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell
 from confab.planner.validation import validate
@@ -467,7 +467,7 @@ def test_what_was_reached_before_is_not_doubted_soon(monkeypatch: pytest.MonkeyP
     small, large = (confab.load(f"gallery-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
-    monkeypatch.setattr(recovery, "proved", proved)
+    monkeypatch.setattr(agenda, "proved", proved)
     assert plan(large, Memory(experience)).plan is not None
     with pytest.raises(AssertionError, match="looked for a proof"):
         fast.plan(large, improve=0)  # its goals in series

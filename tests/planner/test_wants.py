@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
+from confab.planner.hierarchical.call import Call, Compiled
 from confab.planner.hierarchical.operators import Achiever, Program
 from confab.planner.hierarchical.planner import plan
-from confab.planner.hierarchical.refinement_cache import WIDER
-from confab.planner.hierarchical.serialization import Call, Compiled
+from confab.planner.hierarchical.refinement import WIDER
+from confab.planner.hierarchical.scope import focus
 from confab.planner.hierarchical.subgoals import Env, Wants
-from confab.planner.hierarchical.subproblem import focus
 from confab.planner.plan import Limits, Status
 from confab.planner.transitions import Cell
 from confab.reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness

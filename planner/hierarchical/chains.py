@@ -9,7 +9,7 @@ changed   the symbols that differ from the start of the segment, with their valu
 Only relevant behaviours are tried: those that give a symbol that is off its value, or that give an unmet precondition of such
 a behaviour its value, and so on. A chain of k of them takes at least k steps, so that longer chains than `depth` aren't looked
 at. `find` deepens iteratively and returns a shortest segment of those that relevance admits. What relevance doesn't admit, and
-what is too long for that, is left to a search over a small world (`confab.planner.hierarchical.subproblem`).
+what is too long for that, is left to a search over a small world (`confab.planner.hierarchical.scope`).
 """
 
 from __future__ import annotations
@@ -52,6 +52,10 @@ class Effort:
     """How hard to try: `depth` is the most steps of a segment or a chain."""
 
     depth: int
+
+
+ONE_STEP, CHAIN, REFINING = Effort(depth=1), Effort(depth=3), Effort(depth=4)
+"""One step, and the longest chains towards goals and in refinements: what longer ones cost against searches of scopes."""
 
 
 @dataclass

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from itertools import islice, product
 from typing import NamedTuple, Protocol, TypeAlias
 
-from confab.planner.hierarchical.subplans import Effort, Forbidden, Ground, Keep, Segments
-from confab.planner.hierarchical.subproblem import Width, World, focus, problem_of
+from confab.planner.hierarchical.chains import REFINING, Effort, Forbidden, Ground, Keep, Segments
+from confab.planner.hierarchical.scope import Subproblem, Width, focus, problem_of
 from confab.planner.transitions import Cell, Change, Changes, key_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import OpenRole
 from confab.reasoner.symbols import FALSE, Behavior, ValueCondition
 
-SHORT = Effort(depth=4)
-"""For a refinement that a few relevant steps make; a longer one is searched in a small world."""
 MUCH = 1_500_000
 """What a search in a large world may cost, in states times operators."""
 NEAR, WIDER = Width(10, 0, 50_000), Width(20)
@@ -192,7 +190,7 @@ class Refiner:
                         known.insert(0, known.pop(position))
                     return steps
         now = self.table.now
-        widths = self.worlds(below)
+        widths = self.scopes(below)
         question = name, arguments, careful, tuple(self.besides)
         here = question, frozenset(self.table.since(0).items())
         if here in self.found:
@@ -207,7 +205,7 @@ class Refiner:
         self.at = (name, arguments) if level == self.levels[0] else self.at
         found = self.advice.follow(below, targets, keep) if self.advice is not None else None
         if found is None:
-            found = self.achieve(below, targets, keep, SHORT)
+            found = self.achieve(below, targets, keep, REFINING)
         if found is None:
             found = self.achieve(below, targets, keep, widths)
         if found is None:
@@ -222,7 +220,7 @@ class Refiner:
         del known[TEMPLATES:]
         return self.found[here]
 
-    def worlds(self, level: int) -> tuple[Width, ...]:
+    def scopes(self, level: int) -> tuple[Width, ...]:
         """Return the worlds to look at one after the other, the last of them large."""
         return (NEAR, WIDER, WHOLE if self.segments.program.size(level) <= MOST_OPERATORS else WIDE)
 
@@ -238,16 +236,16 @@ class Refiner:
         A step that can't be refined is forbidden where it stands, and the steps are searched again.
         """
         if isinstance(effort, Effort):
-            return self._by_relevance(level, targets, keep, effort)
+            return self._by_a_chain(level, targets, keep, effort)
         insides = [focus(self.segments, level, targets, width) for width in effort]
         for width, inside, following in zip(effort, insides, [*insides[1:], set()], strict=True):
             if inside != following:  # else the next search sees the same world, and longer
-                found = self._in_a_world(level, dict(targets), keep, width)
+                found = self._in_a_scope(level, dict(targets), keep, width)
                 if found is not None:
                     return found
         return None
 
-    def _by_relevance(
+    def _by_a_chain(
         self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort
     ) -> list[RefinedStep] | None:
         segments, table = self.segments, self.table
@@ -272,19 +270,19 @@ class Refiner:
             table.undo(mark)
         return None
 
-    def _in_a_world(self, level: int, targets: dict[Cell, str], keep: Keep, width: Width) -> list[RefinedStep] | None:
+    def _in_a_scope(self, level: int, targets: dict[Cell, str], keep: Keep, width: Width) -> list[RefinedStep] | None:
         table = self.table
         mark = len(table.trail)
-        world = World(self.segments, level, targets, keep, width)
+        task = Subproblem(self.segments, level, targets, keep, width)
         for _ in range(ATTEMPTS):
-            found = world.search()
+            found = task.search()
             if found is None:
                 return None
             steps: list[RefinedStep] = []
             for position, (name, arguments) in enumerate(found):
                 step = self.do(level, name, arguments)
                 if step is None:
-                    world.forbid(position)
+                    task.forbid(position)
                     break
                 steps.append(step)
             if len(steps) == len(found):
@@ -298,7 +296,7 @@ class Refiner:
                     return None
                 targets[astray] = wanted
                 table.undo(mark)
-                world = World(self.segments, level, targets, keep, width)
+                task = Subproblem(self.segments, level, targets, keep, width)
                 continue
             table.undo(mark)
         return None

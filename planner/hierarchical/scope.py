@@ -4,7 +4,7 @@ focus      the individuals that may act and be acted on: those of the targets, a
 frozen     others that have a value of theirs, or that a condition looks for: they stand where they stand, so that whether there is
            somebody who … is judged as in the whole world
 targets    the symbols that shall get a value; what is kept besides is said by a function, as for
-`confab.planner.hierarchical.subplans`
+`confab.planner.hierarchical.chains`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
 proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be. The room that grounds
@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.subplans import Ground, Keep, Segments
+from confab.planner.hierarchical.chains import Ground, Keep, Segments
 from confab.planner.plan import Counts, Limits, Reason, Status, UngroundableError
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets
@@ -64,7 +64,7 @@ class Width:
     work: int = 200_000
 
 
-class World:
+class Subproblem:
     """A small world on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
 
     def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
