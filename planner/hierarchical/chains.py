@@ -360,3 +360,23 @@ class Segments:
         """Raise `LimitError` when the time limit has passed."""
         if self.deadline is not None and perf_counter() > self.deadline:
             raise LimitError("the time limit")
+
+
+class Chain:
+    """A search for a few relevant steps, repeated as often as steps turn out not to be refinable."""
+
+    def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort) -> None:
+        self.segments, self.level, self.targets, self.keep, self.effort = segments, level, targets, keep, effort
+        self.mark = len(segments.table.trail)
+        self.found: list[Ground] = []
+        self.forbidden: set[Forbidden] = set()
+
+    def search(self) -> list[Ground] | None:
+        """Return steps, or None if none were found; `forbid` takes one of them back."""
+        found = self.segments.find(self.level, self.targets, self.keep, self.effort, self.forbidden)
+        self.found = found or []
+        return found
+
+    def forbid(self, position: int) -> None:
+        """Take back a step of those found last, which can't be refined where it stands: as the table is now."""
+        self.forbidden.add((self.found[position], frozenset(self.segments.table.since(self.mark).items())))

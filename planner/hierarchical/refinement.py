@@ -8,12 +8,13 @@ end that the refinement leaves what it must (docs/levels.md); so a template can 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice, product
 from typing import NamedTuple, Protocol, TypeAlias
 
-from confab.planner.hierarchical.chains import REFINING, Effort, Forbidden, Ground, Keep, Segments
+from confab.planner.hierarchical.chains import REFINING, Chain, Effort, Ground, Keep, Segments
 from confab.planner.hierarchical.scope import Subproblem, Width, focus, problem_of
 from confab.planner.transitions import Cell, Change, Changes, key_of
 from confab.reasoner.amounts import meets
@@ -21,10 +22,10 @@ from confab.reasoner.memory.experience import OpenRole
 from confab.reasoner.symbols import FALSE, Behavior, ValueCondition
 
 MUCH = 1_500_000
-"""What a search in a large world may cost, in states times operators."""
+"""What a search in a large scope may cost, in states times operators."""
 NEAR, WIDER = Width(10, 0, 50_000), Width(20)
 WIDE, WHOLE = Width(160, 4, MUCH), Width(None, work=MUCH)
-"""The worlds that are looked at one after the other; each costs about as much as all before."""
+"""The scopes that are searched one after the other; each costs about as much as all before."""
 MOST_OPERATORS = 3_000
 """A level with at most so many quantified behaviours is looked at as a whole at once."""
 LONG = 4
@@ -89,7 +90,7 @@ class Refiner:
         self.besides: dict[Cell, str] = {}
         """What a step of the most abstract level shall bring about besides, of what this level doesn't see."""
         self.failed: dict[object, list[list[tuple[Cell, str]]]] = {}
-        """Nogoods: of each step that couldn't be refined, what held in the world in which that was found out."""
+        """Nogoods: of each step that couldn't be refined, what held in the scope in which that was found out."""
         self.found: dict[object, tuple[RefinedStep, ...]] = {}
         """What search found, by the state: steps after which another can't be refined are done again on the next way."""
         self.careful = False
@@ -221,7 +222,7 @@ class Refiner:
         return self.found[here]
 
     def scopes(self, level: int) -> tuple[Width, ...]:
-        """Return the worlds to look at one after the other, the last of them large."""
+        """Return the scopes to search one after the other, the last of them large."""
         return (NEAR, WIDER, WHOLE if self.segments.program.size(level) <= MOST_OPERATORS else WIDE)
 
     def achieve(
@@ -236,68 +237,49 @@ class Refiner:
         A step that can't be refined is forbidden where it stands, and the steps are searched again.
         """
         if isinstance(effort, Effort):
-            return self._by_a_chain(level, targets, keep, effort)
+            return self._done(level, targets, keep, partial(Chain, self.segments, level, keep=keep, effort=effort))
         insides = [focus(self.segments, level, targets, width) for width in effort]
         for width, inside, following in zip(effort, insides, [*insides[1:], set()], strict=True):
-            if inside != following:  # else the next search sees the same world, and longer
-                found = self._in_a_scope(level, dict(targets), keep, width)
+            if inside != following:  # else the next search sees the same scope, and longer
+                search = partial(Subproblem, self.segments, level, keep=keep, width=width)
+                found = self._done(level, targets, keep, search)
                 if found is not None:
                     return found
         return None
 
-    def _by_a_chain(
-        self, level: int, targets: Mapping[Cell, str], keep: Keep, effort: Effort
+    def _done(
+        self,
+        level: int,
+        targets: Mapping[Cell, str],
+        keep: Keep,
+        begun: Callable[[Mapping[Cell, str]], Chain | Subproblem],
     ) -> list[RefinedStep] | None:
-        segments, table = self.segments, self.table
-        forbidden: set[Forbidden] = set()
-        mark = len(table.trail)
+        """Do the steps that a search finds, refined; what they touch and leave wrong becomes a target of the next search."""
+        table, mark, targets = self.table, len(self.table.trail), dict(targets)
+        search = begun(targets)
         for _ in range(ATTEMPTS):
-            found = segments.find(level, targets, keep, effort, forbidden)
-            if found is None:
-                return None
-            steps: list[RefinedStep] = []
-            for name, arguments in found:
-                step = self.do(level, name, arguments)
-                if step is None:
-                    forbidden.add(((name, arguments), frozenset(table.since(mark).items())))
-                    break
-                steps.append(step)
-            if len(steps) == len(found):
-                if self.left_wrong(mark, targets, keep) is None:
-                    return steps
-                table.undo(mark)
-                return None
-            table.undo(mark)
-        return None
-
-    def _in_a_scope(self, level: int, targets: dict[Cell, str], keep: Keep, width: Width) -> list[RefinedStep] | None:
-        table = self.table
-        mark = len(table.trail)
-        task = Subproblem(self.segments, level, targets, keep, width)
-        for _ in range(ATTEMPTS):
-            found = task.search()
+            found = search.search()
             if found is None:
                 return None
             steps: list[RefinedStep] = []
             for position, (name, arguments) in enumerate(found):
                 step = self.do(level, name, arguments)
                 if step is None:
-                    task.forbid(position)
+                    search.forbid(position)
                     break
                 steps.append(step)
             if len(steps) == len(found):
-                astray = self.left_wrong(mark, targets, keep)
-                if astray is None:
+                wrong = self.left_wrong(mark, targets, keep)
+                if wrong is None:
                     return steps
-                first = next((old for s, key, old in table.trail[mark:] if (s, key) == astray), None)
-                wanted = targets.get(astray) or (keep(astray, first) if first is not None else None)
-                if astray in targets or wanted is None:
+                first = next((old for s, key, old in table.trail[mark:] if (s, key) == wrong), None)
+                wanted = keep(wrong, first) if first is not None else None
+                if wrong in targets or wanted is None:
                     table.undo(mark)
                     return None
-                targets[astray] = wanted
+                targets[wrong] = wanted
                 table.undo(mark)
-                task = Subproblem(self.segments, level, targets, keep, width)
-                continue
+                search = begun(targets)
             table.undo(mark)
         return None
 

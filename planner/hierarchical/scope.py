@@ -1,14 +1,14 @@
-"""A small world cut out of a large one, grounded and searched: for what no short chain of relevant steps achieves.
+"""A scope: a part of the world, grounded and searched flat, for what no short chain of relevant steps achieves.
 
 focus      the individuals that may act and be acted on: those of the targets, and those that chains towards the targets meet
 frozen     others that have a value of theirs, or that a condition looks for: they stand where they stand, so that whether there is
-           somebody who … is judged as in the whole world
+           an individual such that … is judged as in the whole world
 targets    the symbols that shall get a value; what is kept besides is said by a function, as for
 `confab.planner.hierarchical.chains`
 
 What holds of the individuals in focus is exact, so that steps found here can be done in the whole world; that there are none here
 proves nothing. Everything is done on one level; the caller refines the steps and forbids those that can't be. The room that grounds
-and searches is imported where a world is looked at: numpy alone takes longer to import than a small task to plan.
+and searches is imported where a scope is searched: numpy alone takes longer to import than a small task to plan.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 4
-"""Classes of so few individuals (the hands) are part of every world, and so many holders of one value are."""
+"""Classes of so few individuals (the hands) are part of every scope, and so many holders of one value are."""
 
 BITS = 20
 """Bits that a flat search follows for each relaxed operator of a state, with what it does besides."""
 LEAST, MAKING = 300, 100
 """A task counts as having at least so many relaxed operators, since a state costs something whatever can be done there; and
-making it as much as looking at so many states. A world of which not a fifth as many could be looked at isn't grounded."""
+making it as much as looking at so many states. A scope of which not a fifth as many could be looked at isn't grounded."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Width:
 
 
 class Subproblem:
-    """A small world on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
+    """A scope on one level, as it is now: a grounded task, searched as often as steps turn out not to be refinable."""
 
     def __init__(self, segments: Segments, level: int, targets: Mapping[Cell, str], keep: Keep, width: Width) -> None:
         self.segments, self.level, self.width = segments, level, width
