@@ -49,7 +49,7 @@ def test_that_a_lower_level_comes_first_is_told() -> None:
 def test_the_lowest_level_alone_leaves_nothing_touched_that_was_found_not_at_rest(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("confab.planner.hierarchical.planner.soon", lambda recovery: False)
-    monkeypatch.setattr("confab.planner.hierarchical.planner.achieved", lambda recovery: False)
+    monkeypatch.setattr("confab.planner.hierarchical.planner.soon", lambda agenda: False)
+    monkeypatch.setattr("confab.planner.hierarchical.agenda.Agenda.achieve_all", lambda agenda: False)
     outcome = solve(Request(hierarchy(seed)))
     assert outcome.status is Status.SOLVED
