@@ -12,6 +12,7 @@ from confab.sim.base import offset_from_stand
 from confab.sim.perception import tilt_of
 from confab.sim.running import Run
 from confab.sim.verdict import SkillError
+from confab.sim.whereabouts import floor_below
 
 
 def finger_force(run: Run, name: str) -> float:
@@ -43,7 +44,7 @@ def _height(run: Run) -> float:
     base = run.world.truth(_load(run))[1]
     if "place" in run.roles:
         return float(abs(base[2] - run.world.place(run.roles["place"])[2]))
-    return float(base[2] - run.world.place(run.world.nearest_place(base)[0])[2])
+    return float(base[2] - floor_below(run.world, run.attempt.hand.hand.name, base))
 
 
 def _bearing(run: Run) -> float:

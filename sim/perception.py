@@ -19,9 +19,9 @@ from confab.reasoner.amounts import written
 from confab.reasoner.embodiment.values import PerceiverUse
 from confab.reasoner.symbols import FALSE, TRUE
 from confab.sim.base import offset_from_stand
-from confab.sim.bodies import height_of
 from confab.sim.engine import Engine
 from confab.sim.urdf import Array
+from confab.sim.whereabouts import point_of
 
 
 @dataclass
@@ -63,11 +63,15 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     if not world.knows(body):
         return None
     rotation, position = world.sense(body)
-    place, distance = world.nearest_place(position)
-    standing = abs(position[2] - world.place(place)[2]) < use.numbers["contact_height"]
-    if standing and distance < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
+    points = {name: world.place(name) for name in world.embodiment.places}
+    level = {
+        name: point for name, point in points.items() if abs(position[2] - point[2]) < use.numbers["contact_height"]
+    }
+    gaps = {name: float(np.hypot(*(position - point)[:2])) for name, point in level.items()}
+    place = min(gaps, key=gaps.__getitem__, default="")
+    if place and gaps[place] < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
         return place
-    if not standing and any(world.held(hand) == body for hand in world.hands):
+    if any(world.held(hand) == body for hand in world.hands):
         return use.values["in_hand"]
     return None
 
@@ -119,39 +123,23 @@ def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return a hand's position: `raised`, an object, or a place.
+    """Return where a hand's own motions have brought it: `raised`, an object, or a place.
 
-    The height is that of the lowest point of the load, or of the grip of an empty hand, above the nearest place. A low hand is at
-    the object that it holds if that still stands on its place, at the vessel below its load, or at the object between its open
-    fingers; else at the nearest place, which for an empty hand is the nearest to a point ahead of it, since it may have backed
-    off.
+    None if it was stopped on its way, or if the object at which it is has left since and the hand doesn't hold it.
     """
-    hand, numbers = arguments[0], use.numbers
-    if not world.embodiment.places:  # no place to be low above
+    hand = arguments[0]
+    at = world.hands[hand].at
+    if at.lost:
+        return None
+    if at.point is None:
         return use.values["raised"]
-    held = world.held(hand)
-    point = top = world.hands[hand].frame()[1]
-    if held is not None:
-        rotation, point = world.sense(held)
-        top = point + rotation[:, 2] * height_of(world.bodies[held].shape)
-    place, distance = world.nearest_place(point)
-    height = min(point[2], top[2]) - world.place(place)[2]
-    if height >= numbers["raised"]:
-        return use.values["raised"]
-    if held is not None and height < numbers["contact_height"]:
-        return held
-    near = [
-        (float(np.hypot(*(world.sense(body)[1] - top)[:2])), body)
-        for body in world.bodies
-        if body != held and world.knows(body)
-    ]
-    gap, body = min(near, default=(np.inf, ""))
-    if gap < (numbers["beside"] if held is not None else numbers["between"]):
-        return body
-    if held is None:
-        rotation, point = world.hands[hand].frame()
-        place, distance = world.nearest_place(point + numbers["ahead"] * rotation[:, 0])
-    return place if distance < numbers["nearness"] else None
+    if at.target in world.embodiment.places or world.held(hand) == at.target:
+        return at.target
+    there = (
+        world.knows(at.target)
+        and float(np.linalg.norm(point_of(world, at.target) - at.point)) < use.numbers["nearness"]
+    )
+    return at.target if there else None
 
 
 def observe_tilt(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:

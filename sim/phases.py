@@ -11,7 +11,7 @@ free         planned around all obstacles
 line         straight
 yielding     straight, and to the side when a finger touches the object
 joint        along the joint's path, with corrections by touch
-rise         straight up to `above` the place below, with the elbow free to turn
+rise         straight up to `above` that from which the load was taken, with the elbow free to turn
 home         to the posture at rest
 drive        the whole robot to a stand, with the arms at rest
 over         with a vessel to a pose above another one, from which it can be tilted (`confab.sim.pouring`)
@@ -42,6 +42,7 @@ from confab.sim.swings import SAMPLES, check_swing
 from confab.sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
 from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError
+from confab.sim.whereabouts import arrived, floor_below, stopping
 
 LOOKS = 3
 """Number of attempts at a motion with noisy perception, each after a new look, before its failure counts."""
@@ -78,9 +79,10 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
     world.look()
     run = Run(Attempt.begin(world, world.acting(roles)), roles, use.numbers)
     phases = [phase for phase in use.phases if all(CONDITIONS[word](run) for word in phase.when)]
-    for i, phase in enumerate(phases):
-        if not phase.foreseen:
-            _carry_out(run, phase, phases[i + 1 :])
+    with stopping(world, run.attempt.hand.hand.name):
+        for i, phase in enumerate(phases):
+            if not phase.foreseen:
+                _carry_out(run, phase, phases[i + 1 :])
     if "disturbance" in use.numbers:
         run.attempt.check_others(use.numbers, *_handled(run, phases))
     return run.measured
@@ -99,6 +101,8 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     else:
         FINGERS[phase.fingers](run, phase)
         _with_looks(run, phase, lambda: MOTIONS[phase.motion](run, phase))
+    if phase.motion:
+        arrived(run.world, run.attempt.hand.hand.name, phase.motion, run.roles.get(phase.to.partition(".")[0], ""))
     run.world.run(round(run.number(phase.wait) * run.world.rate))
     for guard in phase.checks:
         check(run, phase, guard)
@@ -309,7 +313,7 @@ def _rise(run: Run, phase: Phase) -> None:
     world, hand, held = run.world, run.attempt.hand, run.attempt.held
     load = hand.frame()[1] if held is None else world.truth(held)[1]
     goal = hand.pose
-    goal[2] += max(world.place(world.nearest_place(load)[0])[2] + run.number(phase.above) - load[2], 0.0)
+    goal[2] += max(floor_below(world, hand.hand.name, load) + run.number(phase.above) - load[2], 0.0)
     run.attempt.rise(goal, run.things() if held is None else (held,), *run.free_of(phase))
 
 

@@ -28,13 +28,26 @@ CLOSING = 0.12
 """Speed in metres per second of closing fingers."""
 
 
+@dataclass(frozen=True)
+class Whereabouts:
+    """The thing or place at which a hand is, and its point then; none of them if the hand is raised.
+
+    `floor` is the height in metres of what the hand was last at, from which it rises. A `lost` hand was stopped on its way.
+    """
+
+    target: str = ""
+    point: Array | None = None
+    floor: float | None = None
+    lost: bool = False
+
+
 @dataclass
 class Manipulator:
     """One hand of a robot in a physics world.
 
     `posture` is the arm's last command. `grasp` is the rotation and position of the held object in the hand at the grasp, the
     reference for slip. `limit` is the time limit in seconds of the running skill, `deadline` the simulation step at which it
-    expires. `pace` is the share of its speeds that the arm uses.
+    expires. `pace` is the share of its speeds that the arm uses. `at` is where its motions have brought the hand.
     """
 
     client: int
@@ -54,6 +67,7 @@ class Manipulator:
     pace: float = 1.0
     limit: float = math.inf
     deadline: float = math.inf
+    at: Whereabouts = Whereabouts()
 
     @property
     def limits(self) -> MotionLimits:

@@ -81,12 +81,13 @@ def _fixture(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Fixtur
 
 
 def _places(facts: BodyFacts) -> list[str]:
-    """Return the nodes with coordinates that are neither robots, stands nor furniture, nor belong to a mechanism."""
+    """Return the nodes with coordinates or a carrier that are neither robots, stands nor furniture, nor belong to a mechanism."""
     other = {
         node for kind in ("Fixture", "Mechanism", "Link", "Part", "Feature", "Stand") for node in facts.members(kind)
     }
     other |= {node for node, links in facts.links.items() if "part_of" in links} | {*facts.having("urdf")}
-    return facts.ordered(node for node in facts.having("x") if node not in other)
+    placed = {*facts.having("x"), *(node for node, links in facts.links.items() if "carried_by" in links)}
+    return facts.ordered(placed - other)
 
 
 def _place(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Place:

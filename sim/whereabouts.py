@@ -1,0 +1,59 @@
+"""Where hands are: where their own motions have brought them, in three dimensions.
+
+A motion ends at a thing or a place, or with the hand raised. That holds until the hand's next motion, or until the thing is no longer where it
+was then. A hand that was stopped on its way is lost: it is at nothing that has a name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from confab.sim.engine import Engine
+from confab.sim.robot import Whereabouts
+from confab.sim.urdf import Array
+from confab.sim.verdict import SkillError
+
+RAISED = ("rise", "home")
+"""Motions after which a hand is raised."""
+
+MOVED = 0.03
+"""Metres by which a hand has to be moved to be lost when it is stopped."""
+
+
+def point_of(world: Engine, name: str) -> Array:
+    """Return the perceived point of a place, or of the base of a body."""
+    point: Array = world.place(name) if name in world.embodiment.places else world.sense(name)[1]
+    return point
+
+
+def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
+    """Store where a motion has brought a hand; motions of links and at the hand itself leave it where it was."""
+    if motion in RAISED:
+        world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
+    elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):
+        point = point_of(world, target)
+        world.hands[hand].at = Whereabouts(target, point, float(point[2]))
+
+
+@contextmanager
+def stopping(world: Engine, hand: str) -> Iterator[None]:
+    """Store that a hand is lost if it fails in the block after it has moved."""
+    begin = world.hands[hand].frame()[1]
+    try:
+        yield
+    except SkillError:
+        if float(np.linalg.norm(world.hands[hand].frame()[1] - begin)) > MOVED:
+            world.hands[hand].at = replace(world.hands[hand].at, lost=True)
+        raise
+
+
+def floor_below(world: Engine, hand: str, point: Array) -> float:
+    """Return the height of what a hand's load was last taken from, or of the place below a point if that is unknown."""
+    at = world.hands[hand].at
+    if at.floor is not None and not at.lost:
+        return at.floor
+    return float(world.place(world.nearest_place(point)[0])[2])
