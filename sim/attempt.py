@@ -310,7 +310,9 @@ class Attempt:
             if tilt_of(rotation) > 0.5:
                 raise SkillError("toppled", (name,), tilt_rad=tilt_of(rotation))
             if shift > numbers["disturbance"]:
-                raise SkillError("object disturbed", (name,), moved_m=shift)
+                most = f"at most {numbers['disturbance'] * 1000:.0f} mm are let pass"
+                message = f"{name} was moved by {shift * 1000:.0f} mm; {most}"
+                raise SkillError("object disturbed", (name,), message, moved_m=shift)
 
     def check_grip(self, numbers: Numbers) -> dict[str, float]:
         """Return how far the held object has slipped since the grasp; raise `SkillError` if it slipped too far or is lost."""
@@ -322,15 +324,22 @@ class Attempt:
         first_rotation, first_base = self.hand.grasp
         slip = float(np.linalg.norm(base - first_base))
         turned = float(np.arccos(np.clip((np.trace(first_rotation.T @ rotation) - 1) / 2, -1, 1)))
-        if self.world.held(self.hand.hand.name) != self.held or slip > numbers["slip"]:
-            raise SkillError("slip or drop", (self.held,), slip_m=slip, turned_rad=turned)
+        lost, most = self.world.held(self.hand.hand.name) != self.held, numbers["slip"]
+        if lost or slip > most:
+            how = (
+                "is pressed by no two fingers"
+                if lost
+                else f"slipped by {slip * 1000:.0f} mm, wanted at most {most * 1000:.0f}"
+            )
+            raise SkillError("slip or drop", (self.held,), f"{self.held} {how}", slip_m=slip, turned_rad=turned)
         return {"slip_m": slip, "turned_rad": turned}
 
     def check_arrival(self, goal: Array, numbers: Numbers) -> dict[str, float]:
         """Return the hand's distance from a goal pose (6,); raise `SkillError` if it exceeds the tolerance."""
         error = float(np.linalg.norm(self.hand.frame()[1] - goal[:3]))
         if error > numbers["tolerance"]:
-            raise SkillError("tracking error", self.world.touching(self.hand), tip_error_m=error)
+            message = f"the hand stopped {error * 1000:.0f} mm off its goal"
+            raise SkillError("tracking error", self.world.touching(self.hand), message, tip_error_m=error)
         return {"tip_error_m": error}
 
 

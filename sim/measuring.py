@@ -100,15 +100,17 @@ QUANTITIES: Mapping[str, MeasuredQuantity] = {
 }
 
 
-def _holds(run: Run, guard: Guard) -> tuple[bool, float | None]:
+def _holds(run: Run, guard: Guard) -> tuple[bool, float | None, float]:
+    """Return whether a guard holds, the measured value, and its bound."""
     value = QUANTITIES[guard.quantity].measure(run)
     link = run.roles.get("object", "") if guard.quantity == "joint" else ""
-    return value is None or (value - run.number(guard.bound, link)) * guard.sign >= 0, value
+    bound = run.number(guard.bound, link)
+    return value is None or (value - bound) * guard.sign >= 0, value, bound
 
 
 def check(run: Run, phase: Phase, guard: Guard) -> None:
-    """Measure the quantity of a guard; raise `SkillError` if the guard doesn't hold."""
-    holds, value = _holds(run, guard)
+    """Measure the quantity of a guard; raise `SkillError` with phase, value and bound if the guard doesn't hold."""
+    holds, value, bound = _holds(run, guard)
     quantity = QUANTITIES[guard.quantity]
     if value is not None:
         run.measured[quantity.name] = value
@@ -121,7 +123,9 @@ def check(run: Run, phase: Phase, guard: Guard) -> None:
             if load
             else run.things()
         )
-        raise SkillError(guard.code or quantity.code, things, **run.measured)
+        wanted = f"{'at least' if guard.sign > 0 else 'at most'} {bound:.3g}"
+        message = f"{guard.quantity} {value:.3g} after {phase.name}, wanted {wanted}"
+        raise SkillError(guard.code or quantity.code, things, message, **run.measured)
 
 
 def until(run: Run, phase: Phase) -> Callable[[], bool] | None:

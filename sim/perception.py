@@ -21,7 +21,7 @@ from confab.reasoner.symbols import FALSE, TRUE
 from confab.sim.base import offset_from_stand
 from confab.sim.engine import Engine
 from confab.sim.urdf import Array
-from confab.sim.whereabouts import point_of
+from confab.sim.whereabouts import level_place, point_of
 
 
 @dataclass
@@ -63,17 +63,27 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     if not world.knows(body):
         return None
     rotation, position = world.sense(body)
-    points = {name: world.place(name) for name in world.embodiment.places}
-    level = {
-        name: point for name, point in points.items() if abs(position[2] - point[2]) < use.numbers["contact_height"]
-    }
-    gaps = {name: float(np.hypot(*(position - point)[:2])) for name, point in level.items()}
-    place = min(gaps, key=gaps.__getitem__, default="")
-    if place and gaps[place] < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
+    place, beside = level_place(world, position, use.numbers["contact_height"])
+    if beside < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
         return place
     if any(world.held(hand) == body for hand in world.hands):
         return use.values["in_hand"]
     return None
+
+
+def measure_place(world: Engine, arguments: tuple[str, ...]) -> Mapping[str, float]:
+    """Return the distances of an object from the nearest place, sideways and upwards, and its tilt."""
+    if not world.knows(arguments[0]) or not world.embodiment.places:
+        return {}
+    rotation, position = world.sense(arguments[0])
+    gaps = [
+        position - world.place(name) for name, place in world.embodiment.places.items() if place.carrier != arguments[0]
+    ]
+    nearest = min(gaps, key=lambda gap: float(np.linalg.norm(gap)), default=None)
+    if nearest is None:
+        return {}
+    beside, above = float(np.hypot(*nearest[:2])), float(nearest[2])
+    return {"beside_place_m": beside, "above_place_m": above, "tilt_rad": tilt_of(rotation)}
 
 
 def arrange_place(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], value: str) -> None:
@@ -230,7 +240,7 @@ def arrange_rest(special: str) -> Callable[[Draft, PerceiverUse, tuple[str, ...]
 
 
 BUILT_IN: Mapping[str, Perceiver] = {
-    "perceive_place": Perceiver(observe_place, arrange_place, "misplaced", True),
+    "perceive_place": Perceiver(observe_place, arrange_place, "misplaced", True, measure_place),
     "perceive_content": Perceiver(observe_content, arrange_content, "under-pour"),
     "perceive_servings": Perceiver(observe_servings, arrange_servings, "under-pour"),
     "perceive_held": Perceiver(observe_held, arrange_rest("nothing"), "slip or drop"),

@@ -11,7 +11,7 @@ free         planned around all obstacles
 line         straight
 yielding     straight, and to the side when a finger touches the object
 joint        along the joint's path, with corrections by touch
-rise         straight up to `above` that from which the load was taken, with the elbow free to turn
+rise         straight up to `above` the support that the load has left, with the elbow free to turn
 home         to the posture at rest
 drive        the whole robot to a stand, with the arms at rest
 over         with a vessel to a pose above another one, from which it can be tilted (`confab.sim.pouring`)

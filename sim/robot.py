@@ -32,7 +32,7 @@ CLOSING = 0.12
 class Whereabouts:
     """The thing or place at which a hand is, and its point then; none of them if the hand is raised.
 
-    `floor` is the height in metres of what the hand was last at, from which it rises. A `lost` hand was stopped on its way.
+    `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped on its way.
     """
 
     target: str = ""

@@ -1,7 +1,7 @@
 """Where hands are: where their own motions have brought them, in three dimensions.
 
-A motion ends at a thing or a place, or with the hand raised. That holds until the hand's next motion, or until the thing is no longer where it
-was then. A hand that was stopped on its way is lost: it is at nothing that has a name.
+A motion ends at a thing or a place, or with the hand raised. That holds until the hand's next motion, or until the thing has moved
+away from where it was then. A hand that was stopped on its way is lost: it is at nothing that has a name.
 """
 
 from __future__ import annotations
@@ -12,13 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from confab.sim.engine import Engine
+from confab.sim.engine import NEAR_PLACE, Engine
 from confab.sim.robot import Whereabouts
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 RAISED = ("rise", "home")
 """Motions after which a hand is raised."""
+
+LEVEL = 0.01
+"""Metres between the heights of a place and of an object that stands on it."""
 
 MOVED = 0.03
 """Metres by which a hand has to be moved to be lost when it is stopped."""
@@ -30,13 +33,23 @@ def point_of(world: Engine, name: str) -> Array:
     return point
 
 
+def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]:
+    """Return the nearest of the places that are as high as a point, within `height` metres, and its distance sideways."""
+    points = {name: world.place(name) for name in world.embodiment.places}
+    gaps = {name: float(np.hypot(*(point - at)[:2])) for name, at in points.items() if abs(point[2] - at[2]) < height}
+    best = min(gaps, key=gaps.__getitem__, default="")
+    return best, gaps.get(best, np.inf)
+
+
 def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
     """Store where a motion has brought a hand; motions of links and at the hand itself leave it where it was."""
     if motion in RAISED:
         world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
     elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):
         point = point_of(world, target)
-        world.hands[hand].at = Whereabouts(target, point, float(point[2]))
+        place, beside = level_place(world, point, LEVEL)
+        floor = world.place(place)[2] if beside < NEAR_PLACE else point[2]
+        world.hands[hand].at = Whereabouts(target, point, float(floor))
 
 
 @contextmanager
@@ -52,7 +65,7 @@ def stopping(world: Engine, hand: str) -> Iterator[None]:
 
 
 def floor_below(world: Engine, hand: str, point: Array) -> float:
-    """Return the height of what a hand's load was last taken from, or of the place below a point if that is unknown."""
+    """Return the height of the support that a hand's load has left, or of the place below a point if that height is unknown."""
     at = world.hands[hand].at
     if at.floor is not None and not at.lost:
         return at.floor
