@@ -20,7 +20,7 @@ from confab.terminal import Ending, run_to_end
 GROUPS = {  # as the help lists them, the main ones first
     "Plan and act": ("plan", "run", "verify", "execute", "explain"),
     "Learn": ("learn", "memory"),
-    "Ask": ("query", "serve", "picture"),
+    "Ask": ("query", "serve", "mcp", "picture"),
     "Author": ("validate", "new", "generate", "convert", "fetch"),
     "Exchange": ("import", "export"),
 }
@@ -31,6 +31,7 @@ COMMANDS = {
     "execute": ("planning", "execute"),
     "serve": ("asking", "serve"),
     "query": ("asking", "query"),
+    "mcp": ("asking", "mcp"),
     "learn": ("learning", "learn"),
     "new": ("authoring", "new"),
     "fetch": ("authoring", "fetch"),

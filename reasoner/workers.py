@@ -125,6 +125,7 @@ def call(
     seconds: float = CPU_SECONDS,
     megabytes: int | None = None,
     timeout: float | None = None,
+    started: Callable[[Popen[bytes]], object] | None = None,
 ) -> Any:
     """Return what a function returns in a process of its own.
 
@@ -140,6 +141,8 @@ def call(
         Memory.
     timeout : float, optional
         Seconds that may pass.
+    started : callable, optional
+        Is given the process, which `kill` ends from elsewhere.
 
     Raises
     ------
@@ -157,6 +160,8 @@ def call(
     process = start(
         [sys.executable, "-c", code, str(megabytes or 0), *sys.path], seconds, stdin=PIPE, stdout=PIPE, stderr=PIPE
     )
+    if started is not None:
+        started(process)
     try:
         said, complaint = process.communicate(pickle.dumps((function, arguments)), timeout)
     finally:
@@ -192,7 +197,9 @@ def main(end: int, seconds: int, command: list[str]) -> None:
     """Become a command that ends with the process which holds the other end of a pipe."""
     tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # of a process that was started with a limit itself
+    most = seconds + 1 if hard == resource.RLIM_INFINITY else min(seconds + 1, hard)
+    resource.setrlimit(resource.RLIMIT_CPU, (min(seconds, most), most))
     os.execvp(command[0], command)
 
 

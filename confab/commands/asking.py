@@ -52,6 +52,15 @@ def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
         Event().wait()
 
 
+@command(epilog=examples("mcp"))
+@click.argument("folder", type=PATH, default=".", metavar="[FOLDER]")
+def mcp(folder: Path) -> None:
+    """Answer agents (Model Context Protocol) on stdio."""
+    from confab.agents import server
+
+    server(folder).run("stdio")
+
+
 FORMS = {
     ".ttl": "turtle",
     ".txt": "table",

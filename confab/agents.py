@@ -1,0 +1,189 @@
+"""An MCP server: plan, query, validate, why, why not, verify and replan as tools of a language model's agent, on stdio.
+
+Each call is answered in a process of its own, which ends with the call: when its time is over, when the client cancels it, when the
+server ends. An answer is text of at most `SHOWN` bytes; the whole of a longer one is a resource that its last line names. Files are
+read in one folder; nothing is written but a scene's reach facts beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from subprocess import Popen, TimeoutExpired
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field
+
+from confab import __version__, answers
+from confab.planner.solve import Mode
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
+from confab.reasoner.workers import WorkerError, call, kill
+
+if TYPE_CHECKING:
+    from mcp.server.mcpserver import MCPServer
+
+SHOWN, KEPT = 4_000, 50
+"""Maximum bytes of an answer, and of how many long ones the whole is kept."""
+MORE, MEGABYTES, MOST_SECONDS = 10.0, 6_000, 600.0
+"""Seconds that a process may take beyond its limit, its memory, and the largest limit."""
+
+SceneName = Annotated[
+    str, Field(description="A shipped scene (tool scenes), or a file in the folder, e.g. kitchen.ttl")
+]
+Goals = Annotated[
+    list[str], Field(description="Goals that replace those of the scene's task, each like 'cup2 LOCATION location8'")
+]
+Facts = Annotated[
+    list[str], Field(description="What is so now in place of what the scene says, each like 'cup1 LOCATION location7'")
+]
+Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=MOST_SECONDS)]
+
+
+class Kept:
+    """The whole of the answers that were cut, by their number, the latest `KEPT` of them."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, str] = {}
+        self._count = 0
+
+    def shown(self, text: str) -> str:
+        """Return an answer, or its beginning with the address of the whole."""
+        if len(text.encode()) <= SHOWN:
+            return text
+        self._count += 1
+        self._texts[str(self._count)] = text
+        self._texts.pop(str(self._count - KEPT), None)
+        last = f"\n… cut at {SHOWN} bytes; all {len(text.encode())}: confab://answers/{self._count}"
+        return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
+
+    def whole(self, number: str) -> str:
+        """Return the whole of an answer.
+
+        Raises
+        ------
+        KeyError
+            It isn't kept, or never was.
+        """
+        return self._texts[number]
+
+
+def server(folder: Path) -> MCPServer[Any]:
+    """Return the server for the scenes in a folder.
+
+    Raises
+    ------
+    KnowledgeError
+        The SDK isn't installed, or the folder doesn't exist.
+    """
+    try:
+        import anyio.to_thread
+        from mcp.server.mcpserver import MCPServer
+        from mcp.server.mcpserver.exceptions import ResourceError, ToolError
+    except ImportError as error:
+        raise KnowledgeError(
+            "agents need the Python SDK of the Model Context Protocol: pip install 'mcp>=2'"
+        ) from error
+    folder = folder.resolve()
+    if not folder.is_dir():
+        raise KnowledgeError(f"{folder}: there is no such folder")
+    made: MCPServer[Any] = MCPServer(
+        "confab",
+        version=__version__,
+        instructions="Plans of a robot from an ontology, with reasons, proofs that there is none, and checks in physics.",
+        log_level="ERROR",
+    )
+    kept = Kept()
+
+    async def answered(function: Callable[..., str], *arguments: object, seconds: float) -> str:
+        processes: list[Popen[bytes]] = []
+        work = partial(
+            call, function, folder, *arguments, seconds=2 * seconds + MORE, megabytes=MEGABYTES, timeout=seconds + MORE,
+            started=processes.append,
+        )  # fmt: skip
+        try:
+            return kept.shown(await anyio.to_thread.run_sync(work, abandon_on_cancel=True))
+        except (KnowledgeError, LimitError, ValueError) as error:
+            raise ToolError(kept.shown(str(error))) from None
+        except TimeoutExpired:
+            raise ToolError(f"gave up after {seconds:g} s; give more time (seconds)") from None
+        except WorkerError as error:
+            raise ToolError(f"the process that worked it out ended early (exit {error.status})") from None
+        except Exception as error:
+            raise ToolError(
+                f"a fault of this program, not of the call: {type(error).__name__}: {error}"[:SHOWN]
+            ) from None
+        finally:
+            for process in processes:
+                kill(process)
+
+    @made.tool()
+    async def scenes() -> str:
+        """List the scenes that the other tools take: shipped ones, and files in the folder."""
+        return await answered(answers.scenes, seconds=20.0)
+
+    @made.tool()
+    async def plan(scene: SceneName, goals: Goals = [], mode: Mode = "guarded", seconds: Seconds = 20.0) -> str:  # noqa: B006
+        """Plan: the steps of all levels, or why there is no plan, with what proves it."""
+        return await answered(answers.plan, scene, goals, [], mode, seconds, seconds=seconds)
+
+    @made.tool()
+    async def replan(scene: SceneName, facts: Facts, goals: Goals = [], seconds: Seconds = 20.0) -> str:  # noqa: B006
+        """Plan again after something has changed in the world."""
+        return await answered(answers.plan, scene, goals, facts, "guarded", seconds, seconds=seconds)
+
+    @made.tool()
+    async def query(
+        scene: SceneName, sparql: Annotated[str, Field(description="A SPARQL 1.1 query")], seconds: Seconds = 20.0
+    ) -> str:
+        """Ask a scene in SPARQL (SELECT, ASK or CONSTRUCT); its prefixes are declared already."""
+        return await answered(answers.query, scene, sparql, seconds, seconds=seconds)
+
+    @made.tool()
+    async def validate(scene: SceneName, seconds: Seconds = 60.0) -> str:
+        """Say what is wrong with an ontology file, where, why, and what to do."""
+        return await answered(answers.validate, scene, seconds=seconds)
+
+    @made.tool()
+    async def why(
+        scene: SceneName,
+        step: Annotated[str, Field(description="Its number on the first level, or L3#12; all steps if left out")] = "",
+        goals: Goals = [],  # noqa: B006
+        seconds: Seconds = 20.0,
+    ) -> str:
+        """Say why a step is in the plan: what it gives, and what needs that."""
+        return await answered(answers.why, scene, goals, step, seconds, seconds=seconds)
+
+    @made.tool()
+    async def why_not(
+        scene: SceneName,
+        instead: Annotated[
+            str, Field(description="'cup2 LOCATION location8 by left_hand' or 'B2_PICK right_hand cup1'")
+        ],
+        goals: Goals = [],  # noqa: B006
+        seconds: Seconds = 20.0,
+    ) -> str:
+        """Say why something else isn't done: what it lacks, or what it costs more."""
+        return await answered(answers.why_not, scene, goals, instead, seconds, seconds=seconds)
+
+    @made.tool()
+    async def verify(
+        scene: SceneName,
+        goals: Goals = [],  # noqa: B006
+        rollouts: Annotated[int, Field(description="How often", ge=1, le=answers.ROLLOUTS)] = 1,
+        seed: int = 0,
+        seconds: Seconds = 120.0,
+    ) -> str:
+        """Plan, and carry the plan out in physics: which steps had their effects, and by what numbers."""
+        return await answered(answers.verify, scene, goals, rollouts, seed, seconds, seconds=seconds)
+
+    @made.resource("confab://answers/{number}", mime_type="text/plain")
+    def whole(number: str) -> str:
+        """Return the whole of an answer that was cut."""
+        try:
+            return kept.whole(number)
+        except KeyError:
+            raise ResourceError(f"there is no answer {number}: the latest {KEPT} that were cut are kept") from None
+
+    return made

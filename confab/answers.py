@@ -1,0 +1,150 @@
+"""What agents ask for (`confab.agents`), as text: each answer is worked out in a process of its own, within one folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from confab import ontology
+from confab.planner.solve import Mode
+from confab.planning import NO_ENGINE, Result
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import within
+from confab.scene import Scene, load
+
+ROWS, ROLLOUTS = 1_000, 20
+"""Maximum number of rows of a query, and of rollouts of a verification."""
+
+
+def inside(folder: Path, name: str) -> Path:
+    """Return the file of a name in a folder.
+
+    Raises
+    ------
+    KnowledgeError
+        There is none, or it lies elsewhere, as an address, an absolute path, ``..`` or a link may.
+    """
+    path = (folder / name).resolve()
+    if "://" in name or not path.is_relative_to(folder.resolve()):
+        raise KnowledgeError(
+            f"'{name}' lies outside of the folder; wanted a file in it, or the name of a shipped scene"
+        )
+    if not path.is_file():
+        there = ", ".join(sorted(ontology.scenes()))
+        raise KnowledgeError(f"there is no file '{name}' in the folder; wanted one, or a shipped scene: {there}")
+    return path
+
+
+def scene_of(folder: Path, name: str) -> Scene:
+    """Return a shipped scene, or one in a folder, none of whose files lies outside of it.
+
+    Raises
+    ------
+    KnowledgeError
+        As `inside`; or a catalog or an import leads out of the folder.
+    """
+    from confab.reaching import with_current_reach
+
+    if name in ontology.scenes():
+        return load(name)
+    path = inside(folder, name)
+    allowed = folder.resolve(), ontology.ROOT.resolve()
+
+    def refuse_outside(said: Path, file: Path) -> None:
+        if not any(file.resolve().is_relative_to(place) for place in allowed):
+            raise KnowledgeError(f"{said.name} leads to {file.name}, which lies outside of the folder")
+
+    for catalog in sorted(folder.rglob(ontology.CATALOG)):
+        refuse_outside(catalog, catalog)
+        for file in ontology.catalog(catalog).values():
+            refuse_outside(catalog, file)
+    for file in sorted(path.parent.iterdir()):  # what may be imported by its name
+        if file.suffix in ontology.SUFFIXES:
+            refuse_outside(file, file)
+    scene = load(path)
+    for file in scene.knowledge.files.values():
+        refuse_outside(path, file)
+    return with_current_reach(scene, lambda text: None)
+
+
+def scenes(folder: Path) -> str:
+    """Return the names of the scenes that can be asked about."""
+    own = sorted(
+        str(file.relative_to(folder))
+        for file in folder.rglob("*")
+        if file.suffix in ontology.SUFFIXES and file.is_file()
+    )
+    return "\n".join(["shipped: " + ", ".join(ontology.scenes()), "in the folder: " + (", ".join(own) or "none")])
+
+
+def planned(scene: Scene, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> Result:
+    """Return what comes of planning in a scene, with some facts in place of what it says."""
+    return (scene.with_fact(*facts) if facts else scene).plan(
+        list(goals), mode=mode, time_limit=seconds, engine=None if mode == "paper" else NO_ENGINE
+    )
+
+
+def plan(folder: Path, name: str, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> str:
+    """Return a plan as a tree of steps, or why there is none."""
+    result = planned(scene_of(folder, name), goals, facts, mode, seconds)
+    if not result.solved:
+        return "\n".join([repr(result), *map(str, result.explain().proof)])
+    return "\n".join([repr(result).splitlines()[0], *(f"{'  ' * len(s.path)}{s}" for s in result.plan.walk())])
+
+
+def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
+    """Return the rows of a query, tab-separated, below the names of its columns."""
+    from confab.reasoner.graph.apart import QueryLimits
+
+    if "{" not in sparql:
+        raise KnowledgeError("wanted a SPARQL query as text, e.g. SELECT ?o ?l WHERE { ?o k:location ?l }")
+    table = scene_of(folder, name).query(sparql, QueryLimits(seconds=seconds, rows=ROWS))
+    if table.truth is not None:
+        return str(table.truth).lower()
+    lines = ["\t".join(table.columns), *("\t".join(cell or "" for cell in row) for row in table)]
+    return "\n".join([*lines, f"({len(table)} rows)"])
+
+
+def validate(folder: Path, name: str) -> str:
+    """Return what is wrong with a file, with what to do about it; the answer is empty of findings where nothing is."""
+    from confab.reasoner.validation.validate import validate as found
+
+    path = ontology.scenes()[name] if name in ontology.scenes() else scene_of(folder, name).knowledge.path
+    findings = found([path or inside(folder, name)])
+    lines = [
+        f"{Path(f.file).name}:{f.line}: {f.what} [{f.rule}]\n  why: {f.why}\n  do: {f.remedy}"
+        for f in findings
+        if f.serious
+    ]
+    return "\n".join([f"{len(lines)} errors", *lines])
+
+
+def why(folder: Path, name: str, goals: Sequence[str], step: str, seconds: float) -> str:
+    """Return why a step is in the plan, or each step; where there is no plan, why."""
+    with within(seconds):
+        result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
+        return (
+            str(result.why(int(step) if step.isdigit() else step)) if step and result.solved else str(result.explain())
+        )
+
+
+def why_not(folder: Path, name: str, goals: Sequence[str], instead: str, seconds: float) -> str:
+    """Return why something else isn't done."""
+    with within(seconds):
+        return str(planned(scene_of(folder, name), goals, (), "guarded", seconds).why_not(instead))
+
+
+def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: int, seconds: float) -> str:
+    """Return what came of carrying the plan out in physics, rollout by rollout."""
+    if not 1 <= rollouts <= ROLLOUTS:
+        raise KnowledgeError(f"got {rollouts} rollouts; wanted 1 to {ROLLOUTS}")
+    with within(seconds):
+        result = planned(scene_of(folder, name), goals, (), "guarded", seconds)
+        if not result.solved:
+            return repr(result)
+        report = result.verify(rollouts, seed, time_limit=seconds)
+    steps = ("\t".join(cell or "" for cell in row) for row in report.table())
+    return "\n".join(
+        [report.summary(), "\t".join(report.table().columns), *steps, json.dumps(report.json()["success"])]
+    )
