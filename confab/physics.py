@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -15,7 +16,7 @@ from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.names import right_names
-from confab.reasoner.symbols import Fact, State
+from confab.reasoner.symbols import FALSE, Fact, State
 from confab.sim.engine import Engine
 from confab.sim.rollouts import Done, Trial, wilson
 from confab.sim.rollouts import rollouts as roll_out
@@ -35,14 +36,14 @@ class Report:
     """The report of a verification: one or more rollouts of a plan, and the film of the first.
 
     A rollout is good if every primitive had its expected effects and the goal's facts were seen in the end. `trusted` has the
-    situation types that the plan changes and no perceiver reads: these effects are not verified.
+    number of effects of the plan by situation type that no perceiver reads: these effects are not verified.
     """
 
     plan: Plan
     goal: State
     rollouts: tuple[Rollout, ...]
     video: Path | None = None
-    trusted: tuple[str, ...] = ()
+    trusted: Mapping[str, int] = field(default_factory=dict)
     scene: Known | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -84,7 +85,7 @@ class Report:
         return {
             "status": "verified" if self.verified else "failed",
             "success": {"verified": self.good, "of": len(self.rollouts), "interval": interval, "poured": self.poured},
-            "trusted": list(self.trusted),
+            "trusted": dict(self.trusted),
             "rollouts": [rollout.as_json() for rollout in self.rollouts],
         }
 
@@ -107,7 +108,7 @@ class Report:
     def summary(self) -> str:
         """Return the result in one line."""
         first = self.shown
-        several = f"; {self.rate()}" if len(self.rollouts) > 1 else ""
+        several = self._on_trust() + (f"; {self.rate()}" if len(self.rollouts) > 1 else "")
         if first.failure is not None:
             step = first.failure.step
             where = f"at step {'.'.join(map(str, step.path))} ({step}), seed {first.seed}"
@@ -124,9 +125,13 @@ class Report:
             + (f", poured {poured} of a serving" if poured else "")
             + f", {first.simulated_seconds:.1f} s simulated in {first.cpu_seconds:.1f} CPU s"
             + (f"; not seen in the end, believed: {', '.join(map(str, unseen))}" if unseen else "")
-            + (f"; not verified, since no perceiver reads it: {', '.join(self.trusted)}" if self.trusted else "")
             + several
         )
+
+    def _on_trust(self) -> str:
+        """Return the number of effects that are not verified, by situation type."""
+        effects = ", ".join(f"{count} of {situation}" for situation, count in self.trusted.items())
+        return f"; on trust, since no perceiver reads the effects: {effects}" if effects else ""
 
     def rate(self) -> str:
         """Return the number of verified rollouts, with Wilson's confidence interval and the seeds, as text."""
@@ -260,11 +265,17 @@ def verify(
     return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene)
 
 
-def on_trust(scene: Known, expected: Sequence[State]) -> tuple[str, ...]:
-    """Return the situation types that change in the expected states and that no perceiver reads."""
-    initial = scene.problem.initial
-    changed = {s.situation for state in expected for s, value in state.items() if initial.get(s) != value}
-    return tuple(sorted(changed - scene.embodiment.perceivers.keys()))
+def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
+    """Return the number of values that change from state to state and that no perceiver reads, by situation type."""
+    counts: dict[str, int] = {}
+    for before, after in pairwise((scene.problem.initial, *expected)):
+        for symbol in {*before, *after}:
+            if (
+                before.get(symbol, FALSE) != after.get(symbol, FALSE)
+                and symbol.situation not in scene.embodiment.perceivers
+            ):
+                counts[symbol.situation] = counts.get(symbol.situation, 0) + 1
+    return dict(sorted(counts.items()))
 
 
 def require_skills(scene: Known, behaviors: Iterable[str]) -> None:

@@ -48,9 +48,11 @@ def check_swing(world: Engine, link: str, values: Sequence[float]) -> None:
         pose = world.sense(name)
         if world.known[name][0] == link:
             continue
-        left = gap(world, link, values[1:], name, pose)
-        if left <= 0:
-            error = SkillError("no path", (link, name), f"{name} stands in the way of {link}", clearance_m=left)
+        gaps = {value: gap(world, link, [value], name, pose) for value in values[1:]}
+        met = min(gaps, key=gaps.__getitem__)
+        if gaps[met] <= 0:
+            message = f"{name} stands in the way of {link}"
+            error = SkillError("no path", (link, name), message, clearance_m=gaps[met], joint=met)
             error.verdict = replace(error.verdict, swings=link)
             raise error
 

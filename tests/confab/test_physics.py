@@ -74,13 +74,12 @@ def test_a_failure_shows_what_was_expected_and_seen_or_what_the_code_does_not_sa
     assert blocked.as_json()["message"] == "the hand or its load would touch something there"
 
 
-def test_what_nothing_perceives_is_said_to_be_on_trust(scene: confab.Scene, report: Report) -> None:
-    assert report.trusted == ()
+def test_what_nothing_perceives_is_counted_as_on_trust(scene: confab.Scene, report: Report) -> None:
+    assert report.trusted == {}
     symbol = Symbol("GREETED", ("cup1",))
-    assert on_trust(scene, [{**scene.problem.initial, symbol: "warmly"}]) == ("GREETED",)
-    assert (
-        replace(report, trusted=("GREETED",)).summary().endswith("; not verified, since no perceiver reads it: GREETED")
-    )
+    assert on_trust(scene, [{**scene.problem.initial, symbol: "warmly"}]) == {"GREETED": 1}
+    told = replace(report, trusted={"GREETED": 1}).summary()
+    assert told.endswith("; on trust, since no perceiver reads the effects: 1 of GREETED")
 
 
 def test_nothing_is_cut_off_in_a_pipe_and_lines_wrap_in_a_terminal(

@@ -83,7 +83,7 @@ def failed(serving: confab.Result) -> confab.Report:
     lost = Verdict(False, "slip or drop", ("cup2",), {"joint_lag_rad": 0.0863}, "it was lost on the way")
     reports[-1] = StepReport(steps[-1], lost, 0.5)
     rollout = Rollout(0, False, tuple(reports), (), 2.0, 9.75, {})
-    return confab.Report(serving.plan, serving.problem.goal, (rollout,), None, (), serving.scene)
+    return confab.Report(serving.plan, serving.problem.goal, (rollout,), None, {}, serving.scene)
 
 
 @pytest.fixture(scope="module")
