@@ -187,7 +187,7 @@ def _inventory(scene: Scene) -> dict[str, list[str]]:
     problem = scene.problem
     grounds = [g for level in problem.domain.levels for g in ground(problem, level)]
     return {
-        "individual": sorted({name for members in problem.classes.values() for name in members}),
+        "individual": sorted(problem.individuals),
         "situation type": sorted(problem.domain.situations),
         "behaviour": list(problem.domain.behaviors),
         "quantified": [" ".join((g.behavior, *g.arguments)) for g in grounds],

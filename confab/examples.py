@@ -36,7 +36,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "curl http://127.0.0.1:7879/sparql --data-urlencode 'query=SELECT ?o ?where WHERE { ?o k:location ?where }'",
         "confab execute beverage-serving --world pybullet --serve 7879",
     ),
-    "mcp": ("confab mcp < /dev/null",),
+    "mcp": ("confab mcp .",),
     "learn": (
         "confab learn beverage-serving --memory memory.ttl",
         "confab learn towers-small towers-large --memory towers.ttl",

@@ -392,7 +392,7 @@ class Known:
         """
         from confab.reasoner.reading.affordance import affordances
 
-        known = {name for members in self.problem.classes.values() for name in members}
+        known = self.problem.individuals
         if of not in (None, "all", *known):
             raise KnowledgeError(f"unknown object '{of}'{nearest(str(of), known)}")
         found = affordances(self.knowledge, self.reading)

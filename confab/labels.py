@@ -148,7 +148,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem) -> Labe
     """
     domain = problem.domain
     spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
-    spoken |= {name for members in problem.classes.values() for name in members}
+    spoken |= problem.individuals
     behaviors = domain.behaviors.values()
     spoken |= {term for b in behaviors for effect in b.effects for term in (*effect.arguments, effect.value)}
     properties = {names.short(text(row[0])): text(row[1]) for row in knowledge.select(PROPERTIES)}

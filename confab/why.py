@@ -482,7 +482,7 @@ def _fact_told(
     before = cost_of(problem, plan)
     if by is not None:
         if not any(by in members for members in problem.classes.values()):
-            known = {name for members in problem.classes.values() for name in members}
+            known = problem.individuals
             raise KnowledgeError(f"unknown individual '{by}' in '{asked}'{nearest(by, known)}")
         try:
             found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)

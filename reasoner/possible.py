@@ -54,7 +54,7 @@ def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
     state : State
         The values of some symbols, or of all.
     """
-    declared = {name for members in problem.classes.values() for name in members}
+    declared = problem.individuals
     wrong = [*values_at_fault(state, problem.domain, declared)]
     yield from wrong
     for symbol, value in state.items():

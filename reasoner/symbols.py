@@ -417,6 +417,11 @@ class Problem:
         return self._members.get(kind, frozenset())
 
     @cached_property
+    def individuals(self) -> frozenset[str]:
+        """The individuals of all classes."""
+        return frozenset[str]().union(*self.classes.values())
+
+    @cached_property
     def _members(self) -> Mapping[str, frozenset[str]]:
         return {kind: frozenset(members) for kind, members in self.classes.items()}
 

@@ -58,7 +58,7 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         A word names nothing of its kind; the message has the nearest known name.
     """
     words = fact.split()
-    individuals = {name for members in problem.classes.values() for name in members}
+    individuals = problem.individuals
     if len(words) < 2:
         raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value', e.g. 'cup2 LOCATION location8'")
     about, name, *rest = words
@@ -86,12 +86,12 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
             raise KnowledgeError(
                 f"unknown individual '{word}' in '{fact}'{nearest(word, problem.classes.get(kind, ()))}"
             )
-        if word not in problem.classes.get(kind, ()):
+        if word not in problem.members(kind):
             raise KnowledgeError(
                 f"'{fact}': {word} is no value of {name}; values: {some_of(problem.classes.get(kind, ()))}"
             )
     symbol = Symbol(name, (about, *rest[:-1]))
-    if about not in problem.classes.get(situation.arguments[0], ()):
+    if about not in problem.members(situation.arguments[0]):
         raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
     return symbol, rest[-1]
 

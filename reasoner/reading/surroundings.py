@@ -47,7 +47,7 @@ class Surroundings:
             for s in self.schema.of_kind("SituationType")
             for p in self.schema.nodes[s].get(CORE + "valueProperty", ())
         } - self.schema.numbers
-        known = {name for members in slice_.problem.classes.values() for name in members}
+        known = slice_.problem.individuals
         self._add({self.names.iri(name) for name in known} | constants_of(self.schema), self._classes_of_goals())
         self._known: Frame | None = None
 
