@@ -38,6 +38,6 @@ def main() -> None:
     print("| mode | files, lines in all | in `planner/` | which |\n|---|---|---|---|")
     for mode in ("guarded", "paper"):
         files = entered(lambda mode=mode: confab.load(SCENE).plan(mode=mode))  # type: ignore[misc]
-        ours = {path: lines for path, lines in files.items() if path.startswith("planner/")}
-        names = ", ".join(f"{path.removeprefix('planner/')} {lines}" for path, lines in ours.items())
+        ours = {path: lines for path, lines in files.items() if "planner/" in path}
+        names = ", ".join(f"{path.partition('planner/')[2]} {lines}" for path, lines in ours.items())
         print(f"| {mode} | {len(files)}, {sum(files.values()):,} | {len(ours)}, {sum(ours.values()):,} | {names} |")
