@@ -102,10 +102,8 @@ def _contested(lowest: Lowest) -> Certificate | None:
         for one, other in pairwise(symbols):
             told_apart = {one: (wanted,), other: (wanted,)}
             unmet = (Fact(one, wanted), Fact(other, wanted))
-            cases = Cases(lowest, Certificate(told_apart=told_apart, unmet=unmet))
-            cases.explore()
-            if not cases.fault and cases.reached is None:
-                return replace(cases.certificate, cases=len(cases.came_from))
+            if (found := _counted(lowest, Certificate(told_apart=told_apart, unmet=unmet))) is not None:
+                return found
     return None
 
 
@@ -309,7 +307,7 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
             partial(_by_states, lowest),
         ):
             if (found := _with_little(lowest, min(little, SHARE * (lowest.most - lowest.work)), find)) is not None:
-                return found
+                return _with_fewer(lowest, found)
     return None
 
 
@@ -361,11 +359,32 @@ def _by_states(lowest: Lowest) -> Certificate | None:
     ]
     unmet = [Fact(symbol, wanted) for symbol, wanted in sorted(problem.goal.items())]
     unmet += [fact for fact in sorted(rests) if fact.symbol not in problem.goal and wanted_in_the_end(problem, fact)]
-    cases = Cases(lowest, Certificate(told_apart=told_apart, unmet=tuple(unmet)))
-    cases.explore()
-    if cases.fault or cases.reached is not None:
+    cases = _closed(lowest, Certificate(told_apart=told_apart, unmet=tuple(unmet)))
+    if cases is None:
         return None
     return replace(cases.certificate, unmet=_enough(cases, unmet), cases=len(cases.came_from))
+
+
+def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
+    """Return a certificate without the symbols that needn't be told apart, as far as little work shows it for each."""
+    for symbol in sorted(found.told_apart):
+        fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
+        work = min(LITTLE[1], SHARE * (lowest.most - lowest.work))
+        found = _with_little(lowest, work, partial(_counted, lowest, fewer)) or found
+    return found
+
+
+def _closed(lowest: Lowest, certificate: Certificate) -> Cases | None:
+    """Return the cases of a certificate if the goal holds in none that can be reached."""
+    cases = Cases(lowest, certificate)
+    cases.explore()
+    return None if cases.fault or cases.reached is not None else cases
+
+
+def _counted(lowest: Lowest, certificate: Certificate) -> Certificate | None:
+    """Return a certificate with the number of its cases, if it is one."""
+    cases = _closed(lowest, certificate)
+    return None if cases is None else replace(certificate, cases=len(cases.came_from))
 
 
 def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
