@@ -269,9 +269,6 @@ def _check_plan(result: Result) -> None:
     from worlds.agreement import cheapest
 
     outcome, problem = result.outcome, result.problem
-    if outcome.status is Status.UNSOLVABLE:
-        assert outcome.certificate is not None, "unsolvable was said without a certificate"
-        assert refusal(problem, outcome.certificate) is None, "the certificate of unsolvable is refused"
     proved = outcome.status is Status.UNSOLVABLE or outcome.bound is not None
     if (
         proved
@@ -283,6 +280,9 @@ def _check_plan(result: Result) -> None:
         assert (outcome.bound or 0.0) <= least + 1e-6, (
             f"{outcome.bound} was proved, and a search of all states finds {least}"
         )
+    if outcome.status is Status.UNSOLVABLE:
+        assert outcome.certificate is not None, "unsolvable was said without a certificate"
+        assert refusal(problem, outcome.certificate) is None, "the certificate of unsolvable is refused"
     if outcome.plan is None:
         return
     faults = validate(problem, outcome.plan)

@@ -12,7 +12,7 @@ import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import prod
 from pathlib import Path
 from random import Random
@@ -39,9 +39,11 @@ SECONDS, CPU = 3.0, 4.0
 """The time limit of a call, and the CPU time after which it is taken for one that doesn't return."""
 MOST = 5_000
 """So many nodes are searched for the truth."""
-OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS = 3, 2, 3, 8, 6, 8, 250
+OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3, 2, 3, 8, 6, 8, 250, 4
 """One of so many worlds is planned in optimally, by the paper's mode, without leaving levels, and with a memory; is exported, and
-read by unified-planning; and is carried out."""
+read by unified-planning; is carried out; and has its plan denied by certificates of tasks that lack a behaviour."""
+LEFT_OUT, CERTIFYING = 3, 100_000
+"""Number of behaviours left out for that, one after the other, and the tests for a certificate of each."""
 MOST_ACTIONS = 1_500
 """So many quantified behaviours may what was exported and imported have, if it is to be searched."""
 T = TypeVar("T")
@@ -200,6 +202,8 @@ class Judge:
         if not self.only or self.only == "checker":
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
             self.call("checker", lambda: self.checker(read, plans))
+        if self.sampled(CERTIFICATES, "certificates", "certificates"):
+            self.call("certificates", lambda: self.false_certificates(read))
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
@@ -276,6 +280,24 @@ class Judge:
                 text = "; ".join(f"{step.path} {step.behavior} {' '.join(step.arguments)}" for step in steps.walk())
                 self.complain(what, "checker", f"{meant[:1]} {[one.text for one in said[:1]]}: {text}")
                 return
+
+    def false_certificates(self, read: Scene) -> None:
+        """Hold the checker of certificates against those of tasks that lack a behaviour: where there is a plan, none is right."""
+        from confab.planner.certificate_checks import refusal
+        from confab.planner.certifying import certify
+
+        if self.found.least is None or self.surely is None:
+            return
+        problem = read.reading.problem
+        lowest = [behavior.name for behavior in problem.domain.at_level(problem.domain.levels[-1])]
+        for name in self.rng.sample(lowest, min(len(lowest), LEFT_OUT)):
+            others = {other: behavior for other, behavior in problem.domain.behaviors.items() if other != name}
+            domain = replace(problem.domain, behaviors=others)
+            if problem.domain.levels[-1] not in domain.levels:
+                continue  # another level is the lowest then
+            found = certify(replace(problem, domain=domain), CERTIFYING)
+            if found is not None and refusal(problem, found) is None:
+                self.complain("a false certificate is accepted", "certificates", f"without {name}: {found}")
 
     def with_a_lesson(self, read: Scene, first: Plan) -> None:
         """Plan with a memory that has learned one plan."""

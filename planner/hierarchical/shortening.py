@@ -4,8 +4,9 @@ orders   the agenda again in other orders of the goals, with the refinements tha
 windows  on each level, from the top: steps in a row replaced by fewer (`confab.planner.hierarchical.windows`)
 detours  steps that together come to nothing are dropped (`confab.planner.hierarchical.detours`)
 
-Orders and windows are only tried where a plan puts something aside. The shortest plan is kept; steps of the most abstract level,
-which say what the others are for, are given up only where that saves enough.
+Orders, and windows of the first level, are only tried where a plan puts something aside or has many steps for its goals, other
+windows where it puts something aside. The shortest plan is kept; steps of the most abstract level, which say what the others are for,
+are given up only where that saves enough.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ LEAST_EFFORT = 200_000
 """The least effort that a first plan counts as, in states times operators: length of plans found at once, against CPU time."""
 DOING = 20
 """The effort of doing a primitive once more, in states times operators."""
+MANY = 1.25
+"""Steps for each goal from which on other orders are tried, too: some may be needless; length against CPU time."""
 KEPT = 1.5
 """Level-1 steps are kept as long as primitives that come to nothing make the plan longer by less than this factor."""
 
@@ -49,9 +52,12 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     """Make the steps of a call shorter."""
     levels = call.program.levels
     work = max(call.segments.effort, LEAST_EFFORT) * improve // (2 * ORDERS)
-    if len(levels) > 1 and puts_aside(call):
+    aside = len(levels) > 1 and puts_aside(call)
+    if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
         reordered(call, improve, work, advised)
-        for level in levels[:-1] if leave_levels else levels[:1]:
+        windowed(call, levels[0], work)
+    if aside:
+        for level in levels[1:-1] if leave_levels else ():
             windowed(call, level, work)
         if leave_levels:
             drop_detours(call, levels[-2])

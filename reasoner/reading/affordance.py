@@ -26,6 +26,7 @@ import pyoxigraph as ox
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.derivation import circular, strata
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
+from confab.reasoner.limits import check
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
 from confab.reasoner.symbols import (
@@ -92,6 +93,8 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
     def write(symbol: Symbol, value: str) -> None:
         nonlocal count
         count += 1
+        if not count % 4096:
+            check("writing the situation")
         prop = properties.get(reading.names.iri(symbol.situation))
         for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{count}")):
             graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, name))
@@ -235,7 +238,7 @@ class _Writer:
     def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
         """Yield what the parameters and variables stand for, once for each way in which a behaviour can be done."""
         names = self.names(behavior, when)
-        for row in self.graph.select(self.query(behavior, when), SCENE):
+        for row in self.graph.select(self.query(behavior, when, ordered=False), SCENE):
             yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
 
     def effects(self, behavior: Behavior, arguments: tuple[str, ...], bindings: dict[str, str]) -> Iterator[Fact]:
@@ -256,7 +259,7 @@ class _Writer:
                 found[condition.value] = None
         return list(found)
 
-    def query(self, behavior: Behavior, when: Sequence[Condition] = ()) -> str:
+    def query(self, behavior: Behavior, when: Sequence[Condition] = (), ordered: bool = True) -> str:
         names = self.names(behavior, when)
         kinds = behavior.kinds
         situations = self.reading.problem.domain.situations
@@ -268,7 +271,7 @@ class _Writer:
         chosen = " ".join(names) or "(1 AS ?once)"
         order = " ".join(names)
         body = "\n".join(f"  {line}" for line in lines)
-        return f"{head}SELECT DISTINCT {chosen} WHERE {{\n{body}\n}}" + (f" ORDER BY {order}" if order else "")
+        return f"{head}SELECT DISTINCT {chosen} WHERE {{\n{body}\n}}" + (f" ORDER BY {order}" if order and ordered else "")
 
     def typed(self, name: str, kind: str) -> str:
         if kind in self.reading.names:
