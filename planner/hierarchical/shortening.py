@@ -5,8 +5,8 @@ windows  on each level, from the top: steps in a row replaced by fewer (`confab.
 detours  steps that together come to nothing are dropped (`confab.planner.hierarchical.detours`)
 
 Orders, and windows of the first level, are only tried where a plan puts something aside or has many steps for its goals, other
-windows where it puts something aside. The shortest plan is kept; steps of the most abstract level, which say what the others are for,
-are given up only where that saves enough.
+windows where it puts something aside. The shortest plan is kept; steps of the most abstract level, which say what the others are
+for, are given up only where that saves enough.
 """
 
 from __future__ import annotations
