@@ -158,7 +158,12 @@ class _Join:
                 others = _variables((*c.arguments, c.value)) - self.bound
                 if others == {role} and c.value == role and role not in c.arguments:
                     now.append(writer.look(c))
-                elif others == {role} and c.arguments.count(role) == 1 and writer.listed(c.situation, c.value):
+                elif (
+                    c.value != role
+                    and others == {role}
+                    and c.arguments.count(role) == 1
+                    and writer.listed(c.situation, c.value)
+                ):
                     who, place = (
                         f"{identifier('who', c.situation)}.get({written(c.value)}, ())",
                         c.arguments.index(role),

@@ -523,7 +523,12 @@ CROSS = "SELECT * WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
         (NESTED, [], MISUSE, "brings the SPARQL engine down"),
         (CROSS, [], GAVE_UP, "more than 100,000 rows"),
         (CROSS, ["--rows", "7"], GAVE_UP, "more than 7 rows"),
-        (CROSS.replace("*", "(COUNT(*) AS ?n)"), ["--time-limit", "1"], GAVE_UP, "gave up after 1 s while answering a query"),
+        (
+            CROSS.replace("*", "(COUNT(*) AS ?n)"),
+            ["--time-limit", "1"],
+            GAVE_UP,
+            "gave up after 1 s while answering a query",
+        ),
         (CROSS + " ORDER BY ?a ?d ?g", ["--time-limit", "60"], GAVE_UP, "more than 2,000 MB of memory"),
         ("SELECT * WHERE { service <http://127.0.0.1:9/> { ?a ?b ?c } }", [], MISUSE, "asks another endpoint"),
     ],

@@ -97,3 +97,8 @@ def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Pa
     its = Judge(mixed(200_012_855), tmp_path, every=True).judged()
     assert not its.complaints
     assert its.least == 1.0 and its.length == 1
+
+
+def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path) -> None:
+    """What has itself as its value is looked for in its class: neither the object nor the value leads to the other."""
+    assert not Judge(mixed(201_042_338), tmp_path, every=True).judged().complaints
