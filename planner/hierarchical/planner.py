@@ -109,7 +109,8 @@ def _plan(
             call.count(flat)
             if flat.status is not Status.GAVE_UP:
                 return call.outcome(flat.status, flat.plan, flat.reason)
-        if not done and (one_level or not (call.at_rest() or (done := soon(agenda)))):
+        settles = len(levels) > 1 and not call.at_rest()  # by steps of lower levels
+        if not done and (one_level or (settles and not (done := soon(agenda)))):
             call = rested(call, advised)
             agenda = Agenda(call, levels)
         if done or agenda.achieve_all():

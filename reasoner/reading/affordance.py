@@ -271,7 +271,9 @@ class _Writer:
         chosen = " ".join(names) or "(1 AS ?once)"
         order = " ".join(names)
         body = "\n".join(f"  {line}" for line in lines)
-        return f"{head}SELECT DISTINCT {chosen} WHERE {{\n{body}\n}}" + (f" ORDER BY {order}" if order and ordered else "")
+        return f"{head}SELECT DISTINCT {chosen} WHERE {{\n{body}\n}}" + (
+            f" ORDER BY {order}" if order and ordered else ""
+        )
 
     def typed(self, name: str, kind: str) -> str:
         if kind in self.reading.names:

@@ -102,3 +102,8 @@ def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Pa
 def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path) -> None:
     """What has itself as its value is looked for in its class: neither the object nor the value leads to the other."""
     assert not Judge(mixed(201_042_338), tmp_path, every=True).judged().complaints
+
+
+@pytest.mark.parametrize("seed", [202_002_347, 202_002_963, 202_003_161, 202_004_228])
+def test_no_level_is_left_to_bring_the_beginning_to_rest_where_levels_are_strict(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
