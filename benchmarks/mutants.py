@@ -203,10 +203,10 @@ def table() -> None:
         stale = "" if its == record(file, (ROOT / file).read_text("utf-8")) else " (as it was)"
         row = f"{others + len(its['same'])} | {len(its['same'])} | {len(its['noticed'])} | {share:.0%} | {len(its['survived'])}"
         print(f"| `{file}`{stale} | {row} |")
-    print("\n| module | a line with a fault that survived |\n|---|---|")
+    print("\nLines with a fault that survived:\n\n```text")
     for file, its in known.items():
         for line in its["survived"].values():
-            print(f"| `{file}` | `{' '.join(line.split()).replace('|', chr(92) + '|')[:140]}` |")
+            print(f"{file}: {' '.join(line.split())[:140]}")
 
 
 def main(arguments: Sequence[str]) -> None:

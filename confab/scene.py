@@ -52,6 +52,7 @@ class Scene(Known):
     """
 
     plan = planning.plan
+    """Return the result of planning in this scene. Takes the parameters of `confab.planning.plan` but the first."""
 
     @overload
     def picture(self, path: None = None, behavior: str | None = None, classes: bool = False) -> Image: ...

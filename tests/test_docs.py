@@ -84,15 +84,6 @@ def test_the_tutorial_prints_what_it_says() -> None:
     assert result.failed == 0
 
 
-@pytest.mark.skipif(find_spec("mkdocs") is None or find_spec("material") is None, reason="needs the extra docs")
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "LOCATION" in (tmp_path / "reference.html").read_text()
-
-
 def test_what_shows_each_promise_is_there() -> None:
     text = (DOCS / "promises.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"`pytest (\S+)(?: -k (?:\"([^\"]+)\"|(\w+)))?`", text))

@@ -91,7 +91,13 @@ def rows(folder: Path) -> Iterator[str]:
 
 
 def _cell(text: str, folder: Path) -> str:
-    for path, word in ((f"{folder}/", ""), (str(folder), "."), (str(ontology.ROOT), "ontology"), ("|", "\\|")):
+    for path, word in (
+        (f"{folder}/", ""),
+        (str(folder), "."),
+        (str(ontology.ROOT), "ontology"),
+        ("|", "&#124;"),
+        ("<", "&lt;"),
+    ):
         text = text.replace(path, word)
     return re.sub(r"\s+", " ", text)
 

@@ -17,17 +17,16 @@ from confab.sim.perception import BUILT_IN as PERCEIVERS
 from confab.sim.skills import BUILT_IN as SKILLS
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "authoring.md"
-BLOCK = re.compile(r"^```(turtle|console)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r'^```(turtle title=|console$)(?:"(add to )?([^"\n]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.slow
 def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
     said = []
-    for kind, where, content in BLOCK.findall(GUIDE.read_text(encoding="utf-8")):
-        if kind == "turtle":
-            name, *more = where.split()
+    for _, added, name, content in BLOCK.findall(GUIDE.read_text(encoding="utf-8")):
+        if name:
             file = tmp_path / name
-            file.write_text((file.read_text() if more else "") + content)
+            file.write_text((file.read_text() if added else "") + content)
             continue
         for line in content.splitlines():
             command, *arguments = shlex.split(line.removeprefix("$ "))
