@@ -25,7 +25,8 @@ from confab.planner.acting.episode import Change, End, Episode, Intervention
 from confab.planner.acting.executive import Patience, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.repair import difference, mend, replan
-from confab.planner.acting.symbolic_world import Said, SymbolicWorld, disturbed, with_individual
+from confab.planner.acting.symbolic_world import SymbolicWorld, disturbed, with_individual
+from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.plan import Limits, Plan, Step
@@ -398,12 +399,12 @@ def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, patien
         if s.arguments[0] == reach.arguments[0] and s.bindings.get("place") and _is_source(problem, s)
     )
 
-    def fault(step: Step, state: State) -> Said | None:
+    def fault(step: Step, state: State) -> Report | None:
         hit = (
             step.arguments == first.arguments
             and state[Symbol(_where(problem), first.arguments[1:])] == first.bindings["place"]
         )
-        return Said(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
+        return Report(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
 
     for _ in range(episodes):
         episode = act(problem, SymbolicWorld(problem, fault=fault), patience=patience, caution=caution)

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, number, plan_of, possible, several
 from confab.interchange import step_json
-from confab.planner.acting.episode import Change, End, Episode, Intervention, World
+from confab.planner.acting.episode import Change, End, Episode, Intervention
 from confab.planner.acting.executive import Moment, Patience, act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, Step, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.reasoner.graph.knowledge import KnowledgeError

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from confab.execution import Execution
     from confab.memory import Memory
     from confab.physics import Report
-    from confab.planner.acting.episode import World
     from confab.planner.acting.executive import Moment
+    from confab.planner.acting.world import World
     from confab.reasoner.graph.apart import QueryLimits
     from confab.why import Account
 

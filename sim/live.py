@@ -15,6 +15,7 @@ import pybullet
 
 from confab.planner.acting.episode import Change, Intervention
 from confab.planner.acting.symbolic_world import disturbed, with_individual
+from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
 from confab.reasoner.embodiment.values import Body, PerceiverUse
 from confab.reasoner.possible import refuse_impossible
@@ -54,6 +55,7 @@ class LiveWorld:
     def __init__(self, world: World, classes: Mapping[str, Sequence[str]], problem: Problem | None = None) -> None:
         self.world, self.classes, self.problem = world, classes, problem
         self.waiting: list[Intervention] = []
+        self.stopping = False
         self.concerned: set[str] = set()
         world.disturb = self._each_step
 
@@ -83,10 +85,14 @@ class LiveWorld:
         try:
             verdict = self.world.execute(step)
         finally:
-            self.concerned, self.world.moved_by_others = set(), set()
+            self.concerned, self.world.moved_by_others, self.stopping = set(), set(), False
         if not verdict.ok:
             self.take_stock()
         return verdict
+
+    def stop(self) -> None:
+        """Stop the running primitive at its next simulation step."""
+        self.stopping = bool(self.concerned)
 
     def take_stock(self) -> None:
         """Adopt the present state after a failure.
@@ -150,6 +156,9 @@ class LiveWorld:
     # ------------------------------------------------------------------------------------------------- interventions
 
     def _each_step(self, world: Engine) -> None:
+        if self.stopping:
+            self.stopping = False
+            raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "it was stopped")
         happened = False
         while self.waiting and (self.waiting[0].at or 0.0) <= world.seconds:
             intervention = self.waiting.pop(0)
@@ -158,7 +167,7 @@ class LiveWorld:
             self.world.moved_by_others = self.world.moved_by_others | named  # the hand didn't disturb these
             happened = happened or not named.isdisjoint(self.concerned)
         if happened:
-            raise SkillError("interrupted", tuple(sorted(self.concerned)), "an intervention changed an object of it")
+            raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "an intervention changed an object of it")
 
     def _interfere(self, intervention: Intervention) -> None:
         if self.problem is not None:

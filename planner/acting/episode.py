@@ -1,11 +1,10 @@
-"""The values of execution: what people do in the meantime, what a world says to a step, and what an episode was."""
+"""The values of execution: interventions, events, and the episode as a whole."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
 
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.refutations import Refutation
@@ -57,50 +56,6 @@ class Intervention:
     def of_world(self) -> bool:
         """Whether it changes the world, and not what is wanted of it."""
         return self.change in (Change.WORLD, Change.REMOVE, Change.ADD)
-
-
-class WorldError(Exception):
-    """The world itself broke: it raised an exception, or answered with something that is no observation or verdict."""
-
-
-class Verdict(Protocol):
-    """What a world says to a step: it did what it should, or how it failed."""
-
-    @property
-    def ok(self) -> bool:
-        """Whether the step did what it should."""
-
-    @property
-    def code(self) -> str | None:
-        """How it failed."""
-
-    @property
-    def objects(self) -> tuple[str, ...]:
-        """What was involved in the failure."""
-
-    @property
-    def message(self) -> str:
-        """The failure in words."""
-
-
-class World(Protocol):
-    """Where plans are carried out: a simulation, a toy, a robot (docs/execution.md)."""
-
-    def observe(self) -> State:
-        """Return the facts that are perceived now; what can't be perceived is left out."""
-
-    def execute(self, step: Step) -> Verdict:
-        """Carry out a primitive, or stop it at once when an intervention makes it pointless."""
-
-    def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention happen now."""
-
-    def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of interventions that shall happen at a time of the world's clock."""
-
-    @property
-    def seconds(self) -> float:
-        """What the world's clock shows."""
 
 
 class End(Enum):

@@ -11,10 +11,9 @@ Rule 3: every loop ends: primitives and failures are counted, planning has limit
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
@@ -28,23 +27,18 @@ from confab.planner.acting.episode import (
     Replan,
     Seen,
     Surprise,
-    Verdict,
-    World,
-    WorldError,
 )
 from confab.planner.acting.failure_memory import Caution, Static, refuted_by, without_relations
 from confab.planner.acting.repair import difference, mend, replan, vanished
 from confab.planner.acting.symbolic_world import with_individual
+from confab.planner.acting.world import INTERRUPTED, Guarded, Verdict, World, WorldError
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.hierarchical.planner import plan as fast_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.validation import open_goals, successor
 from confab.reasoner.limits import LimitError, check
-from confab.reasoner.possible import ImpossibleStateError
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import FALSE, Fact, Problem, RelationCondition, State, Symbol
-
-logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -133,63 +127,12 @@ def act(
                 if not verdict.ok:
                     run.learn_from(chain, before, verdict)
     except (WorldError, LimitError) as error:
+        run.world.stop()
         run.break_off(str(error))
-    return run.episode()
-
-
-@dataclass(frozen=True)
-class Guarded:
-    """A world whose exceptions, and answers that are none, become one `WorldError` that says what was asked."""
-
-    world: World
-
-    def observe(self) -> State:
-        """Return the facts that are perceived now."""
-        with _asking("observe()"):
-            seen = self.world.observe()
-        wrong = [s for s in seen if not isinstance(s, Symbol)] if isinstance(seen, Mapping) else [seen]
-        if wrong:
-            raise WorldError(f"the world's observe() returned {wrong[0]!r:.60}; wanted a mapping of Symbol to value")
-        return seen
-
-    def execute(self, step: Step) -> Verdict:
-        """Carry out a primitive."""
-        with _asking(f"execute({step})"):
-            said = self.world.execute(step)
-        lacking = [name for name in ("ok", "code", "objects", "message") if not hasattr(said, name)]
-        if lacking:
-            raise WorldError(
-                f"the world's execute({step}) returned {said!r:.60} without {', '.join(lacking)}; wanted a verdict"
-            )
-        return said
-
-    def disturb(self, intervention: Intervention) -> None:
-        """Let an intervention happen now."""
-        with _asking(f"disturb({intervention.text or intervention.change.value})"):
-            self.world.disturb(intervention)
-
-    def announce(self, interventions: tuple[Intervention, ...]) -> None:
-        """Take note of interventions that shall happen at a time of the world's clock."""
-        with _asking("announce()"):
-            self.world.announce(interventions)
-
-    @property
-    def seconds(self) -> float:
-        """What the world's clock shows."""
-        with _asking("seconds"):
-            return float(self.world.seconds)
-
-
-@contextmanager
-def _asking(what: str) -> Iterator[None]:
-    """Turn whatever a world raises into a `WorldError`; the whole story goes to the log, at level DEBUG."""
-    try:
-        yield
-    except ImpossibleStateError:  # the caller's fault, and not the world's
+    except BaseException:  # Ctrl-C, too: nothing moves on without the executive
+        run.world.stop()
         raise
-    except Exception as error:
-        logger.debug("the world failed", exc_info=True)
-        raise WorldError(f"the world's {what} raised {type(error).__name__}: {error}") from error
+    return run.episode()
 
 
 @dataclass
@@ -197,7 +140,7 @@ class _Run:
     """One episode in the making. `act` is the loop; each method is one thing that it does."""
 
     belief: Problem
-    world: World
+    world: Guarded
     waiting: list[Intervention]
     planner: Planner | None
     patience: Patience
@@ -331,7 +274,7 @@ class _Run:
         self.note_what_happened_by_the_clock()
         seen = self.world.observe()
         there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
-        done = verdict.ok or (there and verdict.code != "interrupted")
+        done = verdict.ok or (there and verdict.code != INTERRUPTED)
         surprises = self.look(expected if done else dict(before), seen)
         relied_on = tuple(relations_of(self.belief, chain))
         self.events.append(Event(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on))
@@ -514,7 +457,7 @@ class _Run:
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
         """Try again, then otherwise: what failed again and again is taken as impossible for the rest of the episode."""
         step, code = chain[-1], verdict.code or "failed"
-        if code == "interrupted":
+        if code == INTERRUPTED:
             self.doubt(verdict.message)
             return
         self.failures.append(Failure(step, code, verdict.objects, verdict.message, before))

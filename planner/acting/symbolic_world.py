@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from confab.planner.acting.episode import Change, Intervention
+from confab.planner.acting.world import INTERRUPTED, Report
 from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.possible import refuse_impossible
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.symbols import Problem, State, Symbol
 
-
-@dataclass(frozen=True)
-class Said:
-    """The symbolic world's verdict."""
-
-    ok: bool
-    code: str | None = None
-    objects: tuple[str, ...] = ()
-    message: str = ""
-    facts: tuple[Fact, ...] = ()
-
-
-DONE = Said(True)
-Fault = Callable[[Step, State], Said | None]
+DONE = Report(True)
+Fault = Callable[[Step, State], Report | None]
 """Decides whether a primitive fails in a situation, and how; for trials."""
 
 
@@ -58,7 +47,7 @@ class SymbolicWorld:
         """Take note of what shall happen at a time."""
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
-    def execute(self, step: Step) -> Said:
+    def execute(self, step: Step) -> Report:
         """Carry out a primitive; what happens in the meantime stops it if its precondition is lost."""
         end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
         disturbed = False
@@ -72,13 +61,16 @@ class SymbolicWorld:
         after = successor(self.problem, behavior, step.arguments, self.state)
         if after is None:
             lost = "its precondition was lost in the meantime" if disturbed else "its precondition doesn't hold"
-            return Said(False, "interrupted" if disturbed else "not applicable", step.arguments, lost)
+            return Report(False, INTERRUPTED if disturbed else "not applicable", step.arguments, lost)
         self.seconds = end
         fault = self._fault(step, self.state) if self._fault is not None else None
         if fault is not None:
             return fault
         self.state = after
         return DONE
+
+    def stop(self) -> None:
+        """Do nothing: a primitive takes no time of the machine's."""
 
     def disturb(self, intervention: Intervention) -> None:
         """Let an intervention happen.

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from confab.planner.acting.episode import Change, End, Episode, Intervention
 from confab.planner.acting.executive import Moment, Patience, act
 from confab.planner.acting.failure_memory import Caution
-from confab.planner.acting.symbolic_world import Said, SymbolicWorld
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.acting.world import Report
 from confab.planner.hierarchical.planner import plan
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.paper.learning import learn
@@ -142,7 +143,7 @@ def test_an_object_that_vanished_is_not_poured_into() -> None:
 
 def test_a_primitive_whose_precondition_is_lost_is_not_begun() -> None:
     class Watched(SymbolicWorld):
-        def execute(self, step: Step) -> Said:
+        def execute(self, step: Step) -> Report:
             behavior = self.problem.domain.behaviors[step.behavior]
             assert successor(self.problem, behavior, step.arguments, self.state) is not None, step
             return super().execute(step)
@@ -212,8 +213,8 @@ def test_goals_about_what_was_added_are_served() -> None:
 
 
 def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episode:
-    def fault(step: Step, state: State) -> Said | None:
-        return Said(False, code, ("cup2",)) if test(step, state) else None
+    def fault(step: Step, state: State) -> Report | None:
+        return Report(False, code, ("cup2",)) if test(step, state) else None
 
     return act(serving(), SymbolicWorld(serving(), fault=fault), planned())
 
@@ -221,10 +222,10 @@ def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episo
 def test_what_has_no_path_as_things_stand_is_done_when_they_stand_otherwise() -> None:
     there = at("cup2", "location1")
 
-    def blocked(step: Step, state: State) -> Said | None:
+    def blocked(step: Step, state: State) -> Report | None:
         taken = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments[1] == "cup1"
         return (
-            Said(False, "no path", ("cup1", "cup2"), "", (there,))
+            Report(False, "no path", ("cup1", "cup2"), "", (there,))
             if taken and state[there.symbol] == there.value
             else None
         )
@@ -272,7 +273,7 @@ def test_a_world_in_which_nothing_works_is_given_up_soon() -> None:
 
 def test_the_number_of_primitives_is_bounded() -> None:
     class Stubborn(SymbolicWorld):
-        def execute(self, step: Step) -> Said:
+        def execute(self, step: Step) -> Report:
             said = super().execute(step)
             if step.behavior == "B3_LIFT":  # somebody puts the cup back, again and again
                 self.state[Symbol("LOCATION", ("cup1",))] = "location2"
@@ -284,11 +285,11 @@ def test_the_number_of_primitives_is_bounded() -> None:
     assert len(episode.events) <= 2 * 32 + 10
 
 
-def blocked(step: Step, state: State) -> Said | None:
+def blocked(step: Step, state: State) -> Report | None:
     """An obstacle that nobody perceives: the left hand can't get to the bottle at location3."""
     there = state[Symbol("LOCATION", ("bottle2",))] == "location3"
     hit = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments == ("left_hand", "bottle2") and there
-    return Said(False, "no path", ("bottle2",)) if hit else None
+    return Report(False, "no path", ("bottle2",)) if hit else None
 
 
 @pytest.mark.parametrize("learning", [True, False])
@@ -394,9 +395,9 @@ def test_what_never_came_is_kept() -> None:
 
 def test_a_primitive_that_failed_but_did_what_it_should_is_done() -> None:
     class Grumbling(SymbolicWorld):
-        def execute(self, step: Step) -> Said:
+        def execute(self, step: Step) -> Report:
             said = super().execute(step)
-            return Said(False, "object disturbed", ("bottle1",)) if step.behavior == "B3_GRASP" else said
+            return Report(False, "object disturbed", ("bottle1",)) if step.behavior == "B3_GRASP" else said
 
     episode = act(serving(), Grumbling(serving()), planned())
     assert episode.status is End.REACHED
@@ -427,7 +428,7 @@ class Broken(SymbolicWorld):
             raise ConnectionError("no camera")
         return [] if self.how == "observe returns" else super().observe()  # type: ignore[return-value]
 
-    def execute(self, step: Step) -> Said:
+    def execute(self, step: Step) -> Report:
         if self.how == "execute raises" and self.seconds > 3:
             raise RuntimeError("motor 3 is hot")
         return None if self.how == "execute returns" else super().execute(step)  # type: ignore[return-value]

@@ -1,0 +1,174 @@
+"""The world in which the executive acts: a simulation, a set of symbols, or a robot (docs/connecting.md).
+
+A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same time.
+`stop` is the exception: it is called while `execute` runs, from another thread, or after an exception has left it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from threading import Timer
+from typing import TYPE_CHECKING, Protocol
+
+from confab.planner.plan import Step
+from confab.reasoner.limits import current
+from confab.reasoner.possible import ImpossibleStateError
+from confab.reasoner.symbols import Fact, State, Symbol
+
+if TYPE_CHECKING:
+    from confab.planner.acting.episode import Intervention
+
+logger = logging.getLogger(__name__)
+
+INTERRUPTED = "interrupted"
+"""The code of a primitive that was stopped: no failure, so nothing is learned from it."""
+
+
+class WorldError(Exception):
+    """The world itself broke: it raised an exception, or answered with something that is no observation or verdict."""
+
+
+class Verdict(Protocol):
+    """The world's report on a primitive. Whether its effects hold is decided by the next observation, not by the verdict."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the primitive ended as it should."""
+
+    @property
+    def code(self) -> str | None:
+        """The kind of failure; `INTERRUPTED` if the primitive was stopped, None if it succeeded."""
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """The objects that took part in the failure."""
+
+    @property
+    def message(self) -> str:
+        """The failure as a sentence."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A verdict as a value. `facts` are those as long as which motion planning refuted the primitive."""
+
+    ok: bool
+    code: str | None = None
+    objects: tuple[str, ...] = ()
+    message: str = ""
+    facts: tuple[Fact, ...] = ()
+
+
+class World(Protocol):
+    """The world in which the executive acts."""
+
+    def observe(self) -> State:
+        """Return the facts that are perceived now; symbols that can't be perceived are left out."""
+
+    def execute(self, step: Step) -> Verdict:
+        """Execute a primitive and return when it has ended, failed, or was stopped."""
+
+    def stop(self) -> None:
+        """Stop the running primitive, so that `execute` returns with the code `INTERRUPTED`. Return at once; never raise."""
+
+    @property
+    def seconds(self) -> float:
+        """The world's clock; it never runs backwards."""
+
+
+class Disturbable(World, Protocol):
+    """A simulated world, in which interventions can take place."""
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention take place now."""
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of interventions that shall take place at a time of the world's clock."""
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """A world whose exceptions and malformed answers become one `WorldError` that names the call.
+
+    A primitive that still runs at the deadline that holds (`confab.reasoner.limits`) is stopped.
+    """
+
+    world: World
+
+    def observe(self) -> State:
+        """Return the facts that are perceived now."""
+        with _asking("observe()"):
+            seen = self.world.observe()
+        if not isinstance(seen, Mapping):
+            raise WorldError(f"the world's observe() returned {seen!r:.60}; wanted a mapping of Symbol to value")
+        for symbol, value in seen.items():
+            if not isinstance(symbol, Symbol) or not isinstance(value, str):
+                raise WorldError(
+                    f"the world's observe() returned {symbol!r:.60}: {value!r:.60}; wanted a mapping of Symbol to value, a text"
+                )
+        return seen
+
+    def execute(self, step: Step) -> Verdict:
+        """Execute a primitive; stop it at the deadline."""
+        left = current().left
+        timer = None if left is None else Timer(left, self.stop)
+        if timer is not None:
+            timer.daemon = True
+            timer.start()
+        try:
+            with _asking(f"execute({step})"):
+                said = self.world.execute(step)
+        finally:
+            if timer is not None:
+                timer.cancel()
+        lacking = [name for name in ("ok", "code", "objects", "message") if not hasattr(said, name)]
+        if lacking:
+            raise WorldError(
+                f"the world's execute({step}) returned {said!r:.60} without {', '.join(lacking)}; wanted a verdict"
+            )
+        return said
+
+    def stop(self) -> None:
+        """Stop the running primitive; a world that fails to do so is none that could be told."""
+        with suppress(WorldError), _asking("stop()"):
+            self.world.stop()
+
+    def disturb(self, intervention: Intervention) -> None:
+        """Let an intervention take place now."""
+        with _asking(f"disturb({intervention.text or intervention.change.value})"):
+            self._disturbable().disturb(intervention)
+
+    def announce(self, interventions: tuple[Intervention, ...]) -> None:
+        """Take note of interventions that shall take place at a time of the world's clock."""
+        if interventions:
+            with _asking("announce()"):
+                self._disturbable().announce(interventions)
+
+    def _disturbable(self) -> Disturbable:
+        world = self.world
+        if not (hasattr(world, "disturb") and hasattr(world, "announce")):
+            raise WorldError(
+                f"{type(world).__name__} has no disturb and announce: interventions can take place in simulated worlds only"
+            )
+        return world  # type: ignore[return-value]  # checked above
+
+    @property
+    def seconds(self) -> float:
+        """The world's clock."""
+        with _asking("seconds"):
+            return float(self.world.seconds)
+
+
+@contextmanager
+def _asking(call: str) -> Iterator[None]:
+    """Turn an exception of the world into a `WorldError`; log the traceback at level DEBUG."""
+    try:
+        yield
+    except (ImpossibleStateError, WorldError):  # the first is the caller's fault, not the world's
+        raise
+    except Exception as error:
+        logger.debug("the world failed", exc_info=True)
+        raise WorldError(f"the world's {call} raised {type(error).__name__}: {error}") from error
