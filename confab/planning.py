@@ -26,7 +26,7 @@ from confab.reasoner.names import right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
-from confab.reasoner.refining import never_done
+from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -181,9 +181,10 @@ def _plan(
             scene.knowledge.confirm()
         return with_goals(scene.problem, goals)
 
-    if any(never_done(problem)):  # of individuals that were left out a value may be that nothing makes
-        for behavior, why in never_done(problem if seen.whole else whole()):
-            raise KnowledgeError(why, seen.names.iri(behavior.name))
+    faulty = [*never_done(problem)]
+    if faulty and not seen.whole:  # an individual that was left out may have the value that nothing makes
+        problem = whole()
+        faulty = [*never_done(problem)]
 
     def search(problem: Problem) -> Outcome:
         deadline.check("reading the problem")
@@ -212,8 +213,14 @@ def _plan(
         reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
-    outcome = search(problem)
-    if not seen.whole and (
+    if faulty:
+        outcome = search(without(problem, [behavior for behavior, _ in faulty]))
+        if outcome.status is not Status.SOLVED:
+            behavior, why = faulty[0]
+            raise KnowledgeError(why, seen.names.iri(behavior.name))
+    else:
+        outcome = search(problem)
+    if problem is seen.problem and not seen.whole and (
         outcome.status is Status.UNSOLVABLE or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
     ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
         anew = whole()

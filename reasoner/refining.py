@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from confab.reasoner.language import situations_of, walk
-from confab.reasoner.symbols import FALSE, AmountEffect, Behavior, Problem, ValueEffect
+from confab.reasoner.symbols import FALSE, AmountEffect, AnyOf, Behavior, Problem, ValueEffect
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
@@ -45,6 +46,12 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
                     f"{behavior.name} of level {behavior.level} can be in no plan: {why}, where it rests; add a behaviour of level "
                     f"{first} that does, or take :restValue away if {situation} may stay as it is",
                 )
+
+
+def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
+    """Return a problem in which some behaviours can't be done; the IDs of all behaviours stay as they are."""
+    never = {one.name: replace(one, preconditions=(*one.preconditions, AnyOf(()))) for one in behaviors}
+    return replace(problem, domain=replace(problem.domain, behaviors={**problem.domain.behaviors, **never}))
 
 
 def _needed(problem: Problem) -> list[Behavior]:

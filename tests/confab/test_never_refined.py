@@ -76,3 +76,16 @@ def test_a_behaviour_that_the_task_cannot_need_is_no_error(tmp_path: Path) -> No
     w:GO.there a owl:NamedIndividual, :ValueEffect ; :about w:GO.x ; :situationType w:AT ; :value w:s0 .
     """
     assert scene(tmp_path, DYED, unneeded).plan().outcome.status is Status.SOLVED
+
+
+@MODES
+def test_a_task_is_planned_without_a_behaviour_that_can_be_in_no_plan(tmp_path: Path, options: dict[str, object]) -> None:
+    """DYE could be refined by nothing where FADE is done; PAINT does what the goal wants."""
+    stain = """
+    w:STAIN a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:STAIN.x ; :postcondition w:STAIN.blue, w:STAIN.there .
+    w:STAIN.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+    w:STAIN.blue a owl:NamedIndividual, :ValueEffect ; :about w:STAIN.x ; :situationType w:COLOR ; :value w:blue .
+    w:STAIN.there a owl:NamedIndividual, :ValueEffect ; :about w:STAIN.x ; :situationType w:AT ; :value w:s0 .
+    """
+    plan = scene(tmp_path, DYED, stain).plan(**options).plan  # type: ignore[arg-type]
+    assert [step.behavior for step in plan.primitives] == ["DIP"]
