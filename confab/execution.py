@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -353,7 +353,7 @@ def carry_out(
     from confab.live import spectator
 
     scene.settle()
-    problem = getattr(plan, "problem", None) or with_goals(scene.reading.problem, several(goals))
+    problem = _whole_problem(scene, plan, several(goals))
     check_goal(scene.iri, problem)
     begun = None if plan is None else plan_of(plan, problem)
     if isinstance(memory, str | Path):
@@ -370,6 +370,18 @@ def carry_out(
     number("time_limit", time_limit, "seconds as a number, e.g. 5")
     with within(time_limit), spectator(watch, tell) as heard:
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
+
+
+def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
+    """Return the problem of a result, with the whole scene if the plan was made in a part of it, else the scene's own problem.
+
+    A plan that is made while acting may need an individual that the first plan didn't.
+    """
+    from confab.planning import Result
+
+    if isinstance(plan, Result):
+        return plan.problem if plan.part is None else with_goals(scene.reading.problem, plan.goals)
+    return with_goals(scene.reading.problem, goals)
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:

@@ -220,8 +220,13 @@ def _plan(
             raise KnowledgeError(why, seen.names.iri(behavior.name))
     else:
         outcome = search(problem)
-    if problem is seen.problem and not seen.whole and (
-        outcome.status is Status.UNSOLVABLE or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
+    if (
+        problem is seen.problem
+        and not seen.whole
+        and (
+            outcome.status is Status.UNSOLVABLE
+            or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals))
+        )
     ):  # an answer of the slice that the scene doesn't confirm: the whole scene is read
         anew = whole()
         if anew != problem:

@@ -181,6 +181,15 @@ def test_an_episode_goes_into_the_scenes_own_graph_of_episodes() -> None:
     assert len(table) == 32
 
 
+def test_a_plan_made_in_a_part_of_a_scene_is_carried_out_in_the_whole_scene(tmp_path: Path) -> None:
+    """A later plan may need what the first one has no use for."""
+    scene = confab.generate("served", tmp_path / "table.ttl", objects=4, clutter=5, seed=1)
+    result = scene.plan()
+    run = result.execute()
+    assert run.reached
+    assert len(result.problem.initial) < len(run.episode.initial) == len(scene.problem.initial)
+
+
 def test_a_result_is_executed_as_it_was_planned() -> None:
     result = confab.load("beverage-serving").plan()
     execution = result.execute(interventions=FIGURE_8)

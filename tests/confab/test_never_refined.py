@@ -79,7 +79,9 @@ def test_a_behaviour_that_the_task_cannot_need_is_no_error(tmp_path: Path) -> No
 
 
 @MODES
-def test_a_task_is_planned_without_a_behaviour_that_can_be_in_no_plan(tmp_path: Path, options: dict[str, object]) -> None:
+def test_a_task_is_planned_without_a_behaviour_that_can_be_in_no_plan(
+    tmp_path: Path, options: dict[str, object]
+) -> None:
     """DYE could be refined by nothing where FADE is done; PAINT does what the goal wants."""
     stain = """
     w:STAIN a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:STAIN.x ; :postcondition w:STAIN.blue, w:STAIN.there .
