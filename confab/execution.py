@@ -380,7 +380,7 @@ def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> 
     from confab.planning import Result
 
     if isinstance(plan, Result):
-        return plan.problem if plan.part is None else with_goals(scene.reading.problem, plan.goals)
+        return plan.in_whole_scene().problem
     return with_goals(scene.reading.problem, goals)
 
 

@@ -382,7 +382,7 @@ class Result:
         seconds : float, optional
             Limit of the whole call.
         """
-        from confab.why import find_step, why_not
+        from confab.why import BY, find_step, why_not
 
         number("seconds", seconds, "seconds as a number, e.g. 5")
 
@@ -391,17 +391,26 @@ class Result:
 
         def replan(goals: Sequence[str]) -> tuple[Problem, Outcome, Labels]:
             other = plan(self.scene, goals)
+            other = other.in_whole_scene() if choice else other
             return other.problem, other.outcome, other.labels
 
         with within(seconds):
+            choice = BY.search(asked) is not None  # what may take part besides is looked for in the whole scene
+            if choice and self.part is not None:
+                return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
             told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
             own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors  # `replan` checks the others
             if not own or self.part is None or told.plan is None or not self.faults(told.plan):
                 return told
-            whole = replace(self, problem=with_goals(self.scene.problem, self.goals), part=None)
-            return whole.why_not(asked, instead)
+            return self.in_whole_scene().why_not(asked, instead)
+
+    def in_whole_scene(self) -> Result:
+        """Return the same result with the problem of the whole scene, not of the part that the task was thought to need."""
+        if self.part is None:
+            return self
+        return replace(self, problem=with_goals(self.scene.problem, self.goals), part=None)
 
     def explain(self) -> Account:
         """Return why each step of the plan is there; or, where there is no plan, why."""

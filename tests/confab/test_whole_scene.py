@@ -145,3 +145,13 @@ def test_another_order_is_checked_in_the_whole_scene(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("confab.planning.refused", lambda *_: [Fault((), "it breaks a bound")])
     with pytest.raises(KnowledgeError, match="it breaks a bound"):
         result.in_order(*(step.id for step in result.plan.steps))
+
+
+def test_what_may_take_part_is_looked_for_in_the_whole_scene(tmp_path: Path) -> None:
+    scene = confab.generate("served", tmp_path / "table.ttl", objects=4, clutter=5, seed=1)
+    result = scene.plan()
+    assert "thing1" in scene.problem.individuals - result.problem.individuals
+    assert "no behaviour that changes" in result.why_not("cup1 LOCATION location7 by thing1").answer
+    told = result.why_not("cup1 LOCATION location7 by hand2")
+    assert told.plan is not None
+    assert not validate(result.in_whole_scene().problem, told.plan)
