@@ -377,11 +377,8 @@ def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> 
 
     A plan that is made while acting may need an individual that the first plan didn't.
     """
-    from confab.planning import Result
-
-    if isinstance(plan, Result):
-        return plan.in_whole_scene().problem
-    return with_goals(scene.reading.problem, goals)
+    whole = getattr(plan, "in_whole_scene", None)
+    return with_goals(scene.reading.problem, goals) if whole is None else whole().problem
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
