@@ -284,12 +284,12 @@ def require_skills(scene: Known, behaviors: Iterable[str]) -> None:
     for behavior in behaviors:
         if behavior not in skills:
             raise KnowledgeError(
-                f"behaviour {behavior} names no skill, so physics can't execute it; give it one (docs/authoring.md), "
+                f"behaviour {behavior} names no skill, so physics can't execute it; give it one (docs/bodies.md), "
                 "or act in the symbolic world (confab execute)"
             )
     if not scene.embodiment.robots:
         raise KnowledgeError(
-            f"{scene.iri} has no robot with a body, so physics can't execute anything; describe one (docs/authoring.md)"
+            f"{scene.iri} has no robot with a body, so physics can't execute anything; describe one (docs/bodies.md)"
         )
 
 

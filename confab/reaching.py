@@ -78,7 +78,7 @@ def with_reach(scene: S) -> S:
     try:
         reached = reach(scene.embodiment)
     except ValueError as error:
-        raise KnowledgeError(f"{scene.iri}: {error}; physics needs bodies and skills (docs/authoring.md)") from error
+        raise KnowledgeError(f"{scene.iri}: {error}; physics needs bodies and skills (docs/bodies.md)") from error
     graph, names, target = scene.knowledge, scene.names, ox.NamedNode(BASE + "reach")
     relation = ox.NamedNode(reach_relation(graph))
     graph.store.clear_graph(target)

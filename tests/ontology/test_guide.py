@@ -1,4 +1,4 @@
-"""The authoring guide followed to the letter in an empty folder."""
+"""The two pages of the authoring guide, followed to the letter in an empty folder."""
 
 import re
 import shlex
@@ -8,22 +8,25 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab import ontology
 from confab.authoring import new_domain
+from confab.reaching import with_current_reach
 from confab.reasoner.graph.knowledge import load, text
 from confab.reasoner.names import local_name
 from confab.reasoner.validation.validate import validate
 from confab.sim.perception import BUILT_IN as PERCEIVERS
 from confab.sim.skills import BUILT_IN as SKILLS
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "authoring.md"
-BLOCK = re.compile(r'^```(turtle title=|console$)(?:"(add to )?([^"\n]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+AUTHORING, BODIES = (DOCS / f"{page}.md" for page in ("authoring", "bodies"))
+BLOCK = re.compile(r'^```(turtle title=|console$)(?:"(add to )?([^"\n]+\.ttl)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.slow
 def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
     said = []
-    for _, added, name, content in BLOCK.findall(GUIDE.read_text(encoding="utf-8")):
+    for _, added, name, content in BLOCK.findall(AUTHORING.read_text("utf-8") + BODIES.read_text("utf-8")):
         if name:
             file = tmp_path / name
             file.write_text((file.read_text() if added else "") + content)
@@ -46,9 +49,30 @@ def test_the_authoring_guide_works_as_it_stands(tmp_path: Path) -> None:
     assert "the plan is the same" in story
 
 
+def test_the_behavior_that_the_guide_writes_as_individuals_is_its_update(tmp_path: Path) -> None:
+    text = AUTHORING.read_text(encoding="utf-8")
+    files = {name: "" for _, _, name, _ in BLOCK.findall(text) if name}
+    for _, _, name, content in BLOCK.findall(text):
+        if name:
+            files[name] += content
+    (individuals,) = re.findall(
+        r'^```turtle title="T1_TIDY as individuals"\n(.*?)^```$', text, re.MULTILINE | re.DOTALL
+    )
+    domain = files["toys/toys.ttl"]
+    (update,) = re.findall(r"^:T1_TIDY a .*?^    \}\"\"\" \.\n", domain, re.MULTILINE | re.DOTALL)
+    plans = []
+    for folder, written in (("update", domain), ("individuals", domain.replace(update, individuals))):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "toys.ttl").write_text(written, encoding="utf-8")
+        scene = tmp_path / folder / "toys-scene.ttl"
+        scene.write_text(files["toys/toys-scene.ttl"], encoding="utf-8")
+        plans.append(with_current_reach(confab.load(scene), print).plan(mode="paper").json()["steps"])
+    assert individuals not in domain and plans[0] == plans[1] != []
+
+
 def test_the_guide_s_renaming_leaves_a_domain_without_faults(tmp_path: Path) -> None:
     files = new_domain("plants", tmp_path / "plants", bodies=True)
-    (script,) = re.findall(r"^```sh\n(.*?)^```$", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    (script,) = re.findall(r"^```sh\n(.*?)^```$", BODIES.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     subprocess.run(["sh", "-c", script], cwd=tmp_path, check=True)
     (scene,) = (file for file in files if file.stem.endswith("-scene"))
     assert [str(finding) for finding in validate([scene])] == []
@@ -66,7 +90,7 @@ def test_the_guide_names_every_skill_and_perceiver_with_what_it_asks_for() -> No
     for row in rows:
         asked.setdefault(local_name(text(row[0])), set()).add(local_name(text(row[1])))
     table = {}
-    for line in GUIDE.read_text(encoding="utf-8").splitlines():
+    for line in BODIES.read_text(encoding="utf-8").splitlines():
         if cells := re.match(r"\| `e:(\w+)` \| (.*?) \| (.*?) \|", line):
             said = cells[3] if cells[1].startswith("perceive") else cells[2]
             table[cells[1]] = {word.removeprefix("e:") for word in re.findall(r"[\w:]+", said)}
