@@ -98,6 +98,6 @@ def __dir__() -> list[str]:
 
 
 if "IPython" in _sys.modules:  # a notebook also shows the values of rooms that know no HTML
-    from confab.report.notebook import register as _register
+    from confab.page.notebook import register as _register
 
     _register()

@@ -308,21 +308,18 @@ class Execution:
 
     def report(self, path: str | Path) -> Path:
         """Write what happened as one HTML page, and return where."""
-        from confab.report.page import report_html, write_report
+        from confab.page.data import page_data
+        from confab.page.frozen import write_page
 
-        return write_report(path, report_html(self.scene, execution=self))
+        return write_page(path, page_data(self.scene, execution=self))
 
     def _repr_html_(self) -> str:
         from confab.labels import labels_of
-        from confab.report.course import of_episode
-        from confab.report.markup import styled, tag
-        from confab.report.pieces import timeline, tree
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import tree
 
-        problem = self.scene.problem
-        labels = labels_of(self.scene.knowledge, self.scene.names, problem)
-        course = of_episode(problem, self.episode)
-        shown = tree(course.plan, labels, self.notes(), None, course)
-        return styled(tag("p", self.summary()), timeline(course, labels), shown)
+        labels = labels_of(self.scene.knowledge, self.scene.names, self.scene.problem)
+        return styled(tag("p", self.summary()), tree(self.episode.done, labels, self.notes()))
 
 
 class Options(TypedDict, total=False):

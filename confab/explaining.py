@@ -9,6 +9,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from confab.lifted import Sayings
+from confab.page.markup import styled, tag
 from confab.planner.experience.advice import Memory as Advisor
 from confab.planner.experience.chaining import Candidate
 from confab.planner.experience.evidence import View
@@ -17,7 +18,6 @@ from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally
 from confab.reasoner.symbols import Problem
-from confab.report.markup import styled, tag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

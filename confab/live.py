@@ -80,8 +80,8 @@ class View:
         return Group(*parts)
 
     def _repr_html_(self) -> str:
-        from confab.report.markup import styled, tag
-        from confab.report.pieces import tree
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import tree
 
         expected = self.moment.expected if self.moment is not None else ()
         shall = [" → ", tag("i", "; ".join(map(str, expected)))] if expected else None

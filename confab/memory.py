@@ -369,8 +369,8 @@ class Memory:
         return Group(self.said(), self.advice(20).__rich__())
 
     def _repr_html_(self) -> str:
-        from confab.report.markup import styled, tag
-        from confab.report.pieces import table
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import table
 
         shown = [table(list(t.columns), list(t)) for t in (self.advice(20), self.table(20)) if len(t)]
         return styled(tag("p", self.said()), *shown)

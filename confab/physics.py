@@ -153,21 +153,16 @@ class Report:
     def _repr_html_(self) -> str:
         from base64 import b64encode
 
-        from confab.report.course import of_rollout
-        from confab.report.markup import styled, tag
-        from confab.report.pieces import timeline, tree
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import tree
 
         film = None
         if self.video is not None and self.video.is_file():
             data = b64encode(self.video.read_bytes()).decode()
             film = tag("video", src=f"data:video/mp4;base64,{data}", controls=True, width="640")
-        if self.scene is None:
-            return styled(tag("p", self.summary()), film, tree(self.plan, None, self.notes()))
-        problem = self.scene.problem
-        labels = labels_of(self.scene.knowledge, self.scene.names, problem)
-        course = of_rollout(problem, self.plan, self.shown)
-        shown = tree(self.plan, labels, self.notes(), None, course)
-        return styled(tag("p", self.summary()), film, timeline(course, labels), shown)
+        known = self.scene
+        labels = None if known is None else labels_of(known.knowledge, known.names, known.problem)
+        return styled(tag("p", self.summary()), film, tree(self.plan, labels, self.notes()))
 
 
 class Options(TypedDict, total=False):

@@ -472,20 +472,19 @@ class Result:
 
     def report(self, path: str | Path) -> Path:
         """Write the plan, with its reasons, as one HTML page, and return where."""
-        from confab.report.page import report_html, write_report
+        from confab.page.data import page_data
+        from confab.page.frozen import write_page
 
-        return write_report(path, report_html(self.scene, self))
+        return write_page(path, page_data(self.scene, self))
 
     def _repr_html_(self) -> str:
-        from confab.report.course import of_plan
-        from confab.report.markup import styled, tag
-        from confab.report.page import MOST_STEPS
-        from confab.report.pieces import timeline, tree
+        from confab.page.data import MOST_STEPS
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import tree
         from confab.show import summary
 
         headline = tag("p", summary(self.outcome))
         if self.outcome.plan is None:
             return styled(headline)
         needed = self.purposes if sum(1 for _ in self.plan.walk()) <= MOST_STEPS else None
-        course = of_plan(self.problem, self.plan)
-        return styled(headline, timeline(course, self.labels), tree(self.plan, self.labels, None, needed))
+        return styled(headline, tree(self.plan, self.labels, None, needed))

@@ -133,11 +133,10 @@ def verified(scene: Scene, result: Result, seed: int, video: Path | None, gui: b
 
 def reported(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> Path:
     """Write the report of a run, and return where it lies."""
-    from confab.report.page import report_html
+    from confab.page.data import page_data
+    from confab.page.frozen import write_page
 
-    path = out / "report.html"
-    write_whole(path, report_html(scene, result, report, learned=learned))
-    return path
+    return write_page(out / "report.html", page_data(scene, result, report, learned=learned))
 
 
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, out: Path) -> dict[str, Path]:

@@ -88,14 +88,14 @@ class Scene(Known):
             return image.copy()
 
     def board(self) -> anywidget.AnyWidget:
-        """Return a board for a notebook, on which one turns facts, goals and interventions by hand and sees the plan change.
+        """Return the page for a notebook: map, timeline, plan, queries; facts, goals and interventions are turned by hand.
 
         Raises
         ------
         KnowledgeError
-            anywidget isn't installed (the extra `notebook` brings it), or the scene is too large to be turned by hand.
+            anywidget isn't installed (the extra `notebook` brings it).
         """
-        from confab.board import board
+        from confab.page.widget import board
 
         self.settle()
         shown: anywidget.AnyWidget = board(self)
@@ -227,24 +227,16 @@ class Scene(Known):
 
     def _repr_html_(self) -> str:
         from confab.labels import labels_of
-        from confab.report.course import of_plan
-        from confab.report.maps import ground_of, place_map
-        from confab.report.markup import styled, tag
-        from confab.report.page import embodiment_of
-        from confab.report.pieces import table
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import table
 
         problem = self.problem
         labels = labels_of(self.knowledge, self.names, problem)
-        ground = ground_of(problem, embodiment_of(self))
         rows = [
             [labels.fact(Fact(symbol, value)), labels.name(problem.initial.get(symbol, FALSE))]
             for symbol, value in sorted(problem.goal.items())
         ]
-        return styled(
-            tag("p", repr(self)),
-            place_map(ground, of_plan(problem, Plan(())), labels) if ground is not None else None,
-            table(["wanted", "now"], rows) if rows else None,
-        )
+        return styled(tag("p", repr(self)), table(["wanted", "now"], rows) if rows else None)
 
 
 def load(source: str | Path | rdflib.Graph | Sequence[str | Path], scene: str | None = None) -> Scene:

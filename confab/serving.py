@@ -1,8 +1,10 @@
-"""A scene as a read-only SPARQL 1.1 endpoint on loopback, and a page that follows an execution.
+"""A scene as a page and a read-only SPARQL 1.1 endpoint on loopback (docs/serving.md, docs/page.md).
 
 ==============  ==========================================================================================================
 ``/sparql``     the SPARQL 1.1 protocol: GET, POST of a form, POST of a query; without a query, the service description
-``/``           a page that follows a running execution; ``/view`` is the part of it that changes
+``/``           the page (`confab.page`)
+``/page.json``  what the page shows: GET of the scene, or of a running execution (with ``after=VERSION`` 204 where nothing is
+                newer); POST of what was turned, answered with the plan that follows
 ==============  ==========================================================================================================
 
 uvicorn and starlette serve HTTP. Queries run in processes of their own (`confab.reasoner.graph.apart`), in lanes: the first one
@@ -14,7 +16,7 @@ queries never wait for long ones. A query ends when its client leaves. Requests 
 from __future__ import annotations
 
 import asyncio
-import html
+import json
 import logging
 import re
 import resource
@@ -43,7 +45,9 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from confab.live import View
+from confab.page.frozen import page_html
+from confab.page.live import Following
+from confab.page.sheet import Sheet, turned_from
 from confab.reasoner.graph.apart import QueryLimits, QueryWorker
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
@@ -68,7 +72,6 @@ LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
 """A request's target that names a host itself."""
-PAGE = Path(__file__).with_name("live.html")
 SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
@@ -119,7 +122,8 @@ class Service:
 
     def __init__(self, scene: Known, limits: QueryLimits) -> None:
         self.scene, self.limits, self.change = scene, limits, 0
-        self.view = View(known=dict(scene.problem.initial))
+        self.sheet, self.following = Sheet(scene), Following(scene)
+        self.planning = threading.Lock()
         self.lanes: list[LifoQueue[Worker]] = [LifoQueue() for _ in LANES]
         self.workers = [Worker(self, nice=5 * lane) for lane in range(len(LANES)) for _ in range(AT_ONCE)]
         self.threads = ThreadPoolExecutor(len(self.workers))
@@ -153,9 +157,9 @@ class Service:
         """Note an event of an execution: the page shows it, and queries see what was observed."""
         from confab.reasoner.reading.observed import assert_observed
 
-        self.view.take(moment)
-        if self.view.known:
-            assert_observed(self.scene.knowledge, self.view.known, self.scene.names)
+        self.following.take(moment)
+        if self.following.known:
+            assert_observed(self.scene.knowledge, self.following.known, self.scene.names)
             self.change += 1
 
     def close(self) -> None:
@@ -166,17 +170,20 @@ class Service:
         for worker in self.workers:  # some may have started meanwhile
             worker.process.close()
 
-    def view_html(self) -> str:
-        """Return the execution as HTML; before there is one, the scene's facts and goals."""
-        if self.view.moment is not None:
-            return self.view._repr_html_()
-        wanted = {goal.rsplit(" ", 1)[0]: goal.rsplit(" ", 1)[1] for goal in self.scene.goals}
-        rows = "".join(
-            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in (what, value, wanted.get(what, '')))}</tr>"
-            for what, value in (fact.rsplit(" ", 1) for fact in self.scene.facts[:2_000])
-        )
-        head = "<tr><th>what</th><th>is</th><th>shall be</th></tr>"
-        return f"<h1>{html.escape(self.scene.iri)}</h1><table>{head}{rows}</table>"
+    def page_json(self, after: int) -> bytes | None:
+        """Return what the page shows, or None if it is of no later version: an execution that has begun, else the scene."""
+        if not self.following.begun:
+            return json.dumps(self.sheet.scene_data).encode()
+        return None if self.following.version <= after else json.dumps(self.following.data()).encode()
+
+    def turned_json(self, content: bytes) -> bytes:
+        """Return what the page shows after something was turned; plans are made one after the other."""
+        try:
+            turned = turned_from(json.loads(content or b"{}"))
+        except (ValueError, RecursionError, KnowledgeError) as error:
+            raise HTTPException(400, f"wanted JSON of what was turned: {error}") from error
+        with self.planning:
+            return json.dumps(self.sheet.answer(turned)).encode()
 
 
 class Guard:
@@ -212,7 +219,7 @@ class Endpoint:
         self.app = Starlette(
             routes=[
                 Route("/", self.page),
-                Route("/view", self.view),
+                Route("/page.json", self.data, methods=["GET", "POST"]),
                 Route("/sparql", self.sparql, methods=["GET", "POST"]),
             ],
             middleware=[
@@ -224,13 +231,20 @@ class Endpoint:
         self.app.router.redirect_slashes = False
 
     async def page(self, request: Request) -> Response:
-        """Answer with the page that follows an execution."""
-        return HTMLResponse(PAGE.read_bytes(), headers={"Cache-Control": "no-store"})
+        """Answer with the page, which asks for its data."""
+        return HTMLResponse(page_html(None, "Confab"), headers={"Cache-Control": "no-store"})
 
-    async def view(self, request: Request) -> Response:
-        """Answer with the part of the page that changes."""
-        content = await asyncio.to_thread(self.service.view_html)
-        return HTMLResponse(content, headers={"Cache-Control": "no-store"})
+    async def data(self, request: Request) -> Response:
+        """Answer with what the page shows."""
+        headers = {"Content-Type": "application/json", "Cache-Control": "no-store"}
+        if request.method == "POST":
+            content = await asyncio.to_thread(self.service.turned_json, await body(request))
+            return Response(content, headers=headers)
+        after = request.query_params.get("after", "-1")
+        if not re.fullmatch(r"-?\d{1,18}", after):
+            raise HTTPException(400, f"after is {after[:80]!r}; wanted the version that the page has")
+        found = await asyncio.to_thread(self.service.page_json, int(after))
+        return Response(status_code=204) if found is None else Response(found, headers=headers)
 
     async def sparql(self, request: Request) -> Response:
         """Answer a query, or describe the service."""

@@ -1,4 +1,4 @@
-"""How plans look to people in a terminal; what notebooks and pages show is `confab.report`."""
+"""How plans look to people in a terminal; what notebooks and pages show is `confab.page`."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from confab.labels import Labels
+from confab.page.markup import Markup, styled, tag
 from confab.planner.causal_links import Change, Kind, Need, Purpose
 from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
 from confab.planner.levels import levels_left
@@ -18,7 +19,6 @@ from confab.reasoner.limits import check
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.goals import parse_fact
 from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
-from confab.report.markup import Markup, styled, tag
 
 MOST_TOLD = 12
 """Maximum number of facts of one kind that are told of a certificate."""

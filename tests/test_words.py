@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[1]
 PRONOUNS = re.compile(
     r"\b(somebody|anybody|nobody|whom|whoever|so many|so much|so often|as little as|of what|of whom)\b", re.IGNORECASE
 )
-WITHOUT = ("sim", "reasoner/embodiment", "reasoner/memory", "planner/paper", "confab/report")
+WITHOUT = ("sim", "reasoner/embodiment", "reasoner/memory", "planner/paper", "confab/page")
 PAGES = ("comparison", "execution", "how-to", "levels", "notebooks", "physics", "physics-faults", "theory", "tutorial")
 """Folders and pages that have none."""
 LEFT = 375

@@ -40,14 +40,14 @@ if TYPE_CHECKING:
 @QUERY_ROWS
 @QUIET
 def serve(scene: str, port: int, time_limit: float, rows: int) -> None:
-    """Serve a scene as a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
+    """Serve a scene as a page and a read-only SPARQL 1.1 endpoint, until Ctrl-C."""
     from threading import Event
 
     from confab.reasoner.graph.apart import QueryLimits
     from confab.serving import serving
 
     with serving(load_scene(scene), port, QueryLimits(seconds=time_limit, rows=rows)) as server:
-        show_result(f"{server.url}sparql answers SPARQL 1.1, {server.url} shows the scene; Ctrl-C ends it")
+        show_result(f"{server.url} is the page of the scene, {server.url}sparql answers SPARQL 1.1; Ctrl-C ends it")
         sys.stdout.flush()
         Event().wait()
 

@@ -59,7 +59,7 @@ class Patience:
 
 @dataclass(frozen=True)
 class Moment:
-    """What a spectator is told: something happened, and this is how things stand."""
+    """What a spectator is told: something happened, and this is how things stand; `seconds` is the time on the world's clock."""
 
     what: str  # plan, begin, end, intervention, repair, replan, over
     plan: Plan
@@ -68,6 +68,7 @@ class Moment:
     expected: tuple[Fact, ...] = ()
     surprises: tuple[Surprise, ...] = ()
     text: str = ""
+    seconds: float = 0.0
 
 
 def act(
@@ -248,7 +249,10 @@ class _Run:
             return
         surprises = self.events[-1].surprises if self.events and what == "end" else ()
         whole = Plan(_tree({**self.done, **{p.path: p for p in _chains(self.agenda)}}))
-        self.tell(Moment(what, whole, frozenset(self.done), step, tuple(expected), surprises, text))
+        clock = 0.0
+        with suppress(WorldError):
+            clock = self.world.seconds
+        self.tell(Moment(what, whole, frozenset(self.done), step, tuple(expected), surprises, text, clock))
 
     # --------------------------------------------------------------------------------------------------- acting
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import confab
-from confab.board import Sheet
+from confab.page.sheet import Sheet
 from confab.reasoner.possible import impossible
 from confab.reasoner.reading.observed import load_observed, save_observed
 from confab.reasoner.symbols import Fact, Symbol
@@ -53,7 +53,7 @@ def test_what_can_t_be_is_refused_at_every_door_in_the_same_words(
 ) -> None:
     about, situation, value = fact.split()
     assert message in refused(lambda: scene.with_fact(fact))
-    assert message in Sheet.of(scene).answer({"facts": {f"{about} {situation}": value}})["headline"]
+    assert message in Sheet(scene).answer({"facts": {f"{about} {situation}": value}})["problem"]
     assert message.split("location2")[0].split("location1")[0] in refused(
         lambda: scene.execute(interventions=f"at=0.5 {fact}")
     )

@@ -28,6 +28,7 @@ from confab.serving import AT_ONCE, Server, serving
 CUPS = "SELECT ?cup ?where WHERE { ?cup a k:Cup ; k:location ?where } ORDER BY ?cup"
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"
 ASSERTED = "urn:confab:graph:asserted"
+TURNED = {"facts": {"cup1 LOCATION": "location7"}}
 FORM = "application/x-www-form-urlencoded"
 
 
@@ -187,7 +188,7 @@ def test_pages_of_other_sites_are_refused(
     [
         ("GET http://[bad/sparql HTTP/1.1\r\nHost: localhost", 421),
         ("GET http://evil.example/sparql HTTP/1.1\r\nHost: localhost", 421),
-        ("GET http://localhost/view HTTP/1.1\r\nHost: evil.example", 200),
+        ("GET http://localhost/page.json HTTP/1.1\r\nHost: evil.example", 200),
         ("GET nowhere HTTP/1.1\r\nHost: localhost", 400),
         (f"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: {'9' * 5000}", 400),
         ("POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999", 413),
@@ -245,7 +246,7 @@ def test_short_queries_do_not_wait_for_long_ones_whose_clients_stay(
         patient = [sent(served, HEAVY) for _ in range(8)]
         url = f"{served.url}sparql?{urlencode({'query': 'ASK {}'})}"
         assert all(pool.request("GET", url, timeout=5.0).json()["boolean"] for _ in range(5))
-        assert pool.request("GET", served.url + "view", timeout=5.0).status == 200
+        assert pool.request("GET", served.url + "page.json", timeout=5.0).status == 200
         for client in patient:
             client.close()
 
@@ -376,7 +377,9 @@ def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
     seen: list[str] = []
     query = "SELECT ?value WHERE { ?fact a c:SituatedObjectInstance ; c:about :cup1 ; c:situationType k:LOCATION ; c:value ?value }"
     with serving(scene, 0) as server:
-        assert "cup1 LOCATION" in pool.request("GET", server.url + "view").data.decode()
+        assert "cup1 LOCATION" in pool.request("GET", server.url + "page.json").data.decode()
+        assert "3 / 8 / 26" in pool.request("POST", server.url + "page.json", json=TURNED).json()["headline"]
+        assert pool.request("POST", server.url + "page.json", body=b"[").status == 400
 
         def look(moment: object) -> None:
             server.service.take(moment)  # type: ignore[arg-type]
@@ -385,10 +388,12 @@ def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
                 seen.extend(
                     row["value"]["value"].split("#")[1] for row in json.loads(answer.data)["results"]["bindings"]
                 )
-                assert "primitives" in pool.request("GET", server.url + "view").data.decode()
+                now = pool.request("GET", server.url + "page.json").json()
+                assert (now["live"], now["now"]) == (True, getattr(moment, "seconds", None))
+                assert pool.request("GET", f"{server.url}page.json?after={now['version']}").status == 204
 
         assert scene.execute(tell=look).reached
-        assert "reached" in pool.request("GET", server.url + "view").data.decode()
+        assert pool.request("GET", server.url + "page.json").json()["status"] == "reached"
     assert seen[-1] == "location7"
 
 

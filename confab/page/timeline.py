@@ -24,7 +24,7 @@ MOST_HANDS = 8
 
 @dataclass(frozen=True)
 class Bar:
-    """A step in time; `ok` is None if it was not checked, `note` is a remark on its result."""
+    """A step in time; `ok` is None if it was not checked, `note` is a remark on its result, `planned`: it isn't begun yet."""
 
     step: Step
     begin: float
@@ -33,6 +33,7 @@ class Bar:
     note: str = ""
     measured: Mapping[str, float] = field(default_factory=dict)
     code: str | None = None
+    planned: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,9 @@ class Timeline:
         found: dict[tuple[int, ...], Bar] = {}
         for bar in self.bars:  # repeated attempts make one bar with the last result
             first = found.get(bar.step.path, bar)
-            found[bar.step.path] = Bar(bar.step, first.begin, bar.end, bar.ok, bar.note, bar.measured, bar.code)
+            found[bar.step.path] = Bar(
+                bar.step, first.begin, bar.end, bar.ok, bar.note, bar.measured, bar.code, bar.planned
+            )
 
         def above(step: Step) -> Bar | None:
             if not step.steps:
@@ -80,7 +83,13 @@ class Timeline:
             if parts:
                 judged = [bar.ok for bar in parts]
                 ok = None if None in judged else all(judged)
-                found[step.path] = Bar(step, min(b.begin for b in parts), max(b.end for b in parts), ok)
+                found[step.path] = Bar(
+                    step,
+                    min(b.begin for b in parts),
+                    max(b.end for b in parts),
+                    ok,
+                    planned=all(b.planned for b in parts),
+                )
             return found.get(step.path)
 
         for step in self.plan.steps:
@@ -99,12 +108,6 @@ class Timeline:
                 by_first.setdefault(next(iter(bar.step.arguments), ""), []).append(bar)
             found = by_first if len(by_first) <= MOST_HANDS else found
         return dict(sorted(found.items()))
-
-    def shown_symbols(self) -> list[Symbol]:
-        """Return the symbols that change or have a goal, those with a goal first."""
-        goal = self.problem.goal
-        symbols = {s for s, phases in self.phases.items() if len(phases) > 1} | set(goal)
-        return sorted(symbols & self.phases.keys(), key=lambda s: (s not in goal, s.arguments, s.situation))
 
     def met(self, symbol: Symbol) -> bool | None:
         """Return whether a symbol has its goal value in the end; None if it has no goal."""

@@ -44,6 +44,11 @@ def joined(*parts: object) -> Markup:
     return Markup("".join(found))
 
 
+def number(value: float) -> str:
+    """Return a number as text with about three significant digits."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
 @cache
 def asset(name: str) -> str:
     """Return the text of a file in this folder."""
@@ -52,4 +57,4 @@ def asset(name: str) -> str:
 
 def styled(*pieces: object) -> str:
     """Return pieces with their style for a notebook, without external files and without effect on the rest of the page."""
-    return str(tag("div", tag("style", Markup(asset("style.css"))), *pieces, class_="confab"))
+    return str(tag("div", tag("style", Markup(asset("page.css"))), *pieces, class_="confab"))

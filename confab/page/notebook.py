@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from confab.page import pieces
+from confab.page.markup import styled, tag
 from confab.planner.plan import Outcome, Plan, Step
-from confab.report import pieces
-from confab.report.markup import styled, tag
 from confab.show import summary
 
 

@@ -1,0 +1,28 @@
+"""The page as one file that needs nothing else: no server, no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from string import Template
+
+from confab.page.data import PageData
+from confab.page.markup import asset
+
+
+def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
+    """Return the page as HTML text: with its data in it, or, if they are None, one that asks the server it came from."""
+    content = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    return Template(asset("page.html")).substitute(
+        title=escape(title), style=asset("page.css"), data=content, script=asset("page.js").replace("</", "<\\/")
+    )
+
+
+def write_page(path: str | Path, data: PageData) -> Path:
+    """Write the page with its data into a file, whole or not at all, and return where."""
+    from confab.reasoner.files import write_whole
+
+    write_whole(Path(path), page_html(data, data["title"]))
+    return Path(path)

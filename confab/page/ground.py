@@ -1,0 +1,140 @@
+"""The map: areas, places and the robots' positions, seen from where the film is taken; or places that static relations connect."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import cos, hypot, sin
+
+import numpy as np
+
+from confab.reasoner.embodiment.values import Embodiment
+from confab.reasoner.symbols import Problem
+
+Point = tuple[float, float]
+MOST_SPOTS = 400
+"""Maximum number of places of a map."""
+STRETCH = 1.7
+"""Horizontal stretch of a layout of connected places, since pages and names are wide."""
+
+
+@dataclass(frozen=True)
+class Area:
+    """A polygon with a name: a table, a shelf, a room."""
+
+    name: str
+    corners: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Positions of places (x to the right, y down), areas, connections between places, positions of robots.
+
+    `metric` tells whether positions are metres; else they are a layout. `note` says where the positions come from.
+    """
+
+    spots: Mapping[str, Point]
+    areas: tuple[Area, ...] = ()
+    ways: tuple[tuple[str, str], ...] = ()
+    robots: tuple[tuple[str, Point], ...] = ()
+    metric: bool = True
+    note: str = ""
+
+
+def ground_of(problem: Problem, embodiment: Embodiment | None) -> Ground | None:
+    """Return the background of the map: by coordinates, else by connections, else in order; None if there are no places."""
+    if embodiment is not None and embodiment.places:
+        return _furnished(embodiment)
+    return _connected(problem) or _in_order(problem)
+
+
+def _furnished(embodiment: Embodiment) -> Ground | None:
+    """Return furniture and places as the film shows them: the camera stands opposite the robots (`sim.picture.view_of`)."""
+    if len(embodiment.places) > MOST_SPOTS:
+        return None
+    from confab.sim.linkage import with_open_mechanisms
+
+    places, solids = with_open_mechanisms(embodiment)
+    middle = np.array([place.position for place in places.values()]).mean(0)
+    robots = [robot.position for robot in embodiment.robots]
+    ahead, aside = (middle - np.mean(robots, axis=0))[:2] if robots else (1.0, 0.0)
+    length = hypot(ahead, aside)
+    ahead, aside = (float(ahead) / length, float(aside) / length) if length > 1e-9 else (1.0, 0.0)
+
+    def seen(x: float, y: float) -> Point:
+        return round(ahead * y - aside * x, 4), round(ahead * x + aside * y, 4)
+
+    areas = []
+    for fixture in embodiment.fixtures:
+        half = [(dx * fixture.size[0] / 2, dy * fixture.size[1] / 2) for dx, dy in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+        turned = [
+            (x * cos(fixture.yaw) - y * sin(fixture.yaw), x * sin(fixture.yaw) + y * cos(fixture.yaw)) for x, y in half
+        ]
+        corners = tuple(seen(fixture.position[0] + x, fixture.position[1] + y) for x, y in turned)
+        areas.append(Area(fixture.name, corners))
+    of: dict[str, list[Point]] = {}
+    for solid in solids:
+        reach = abs(solid.rotation) @ np.array(solid.half)
+        for sign in (-1, 1):
+            of.setdefault(solid.name, []).append(seen(*(solid.center + sign * reach)[:2]))
+    for name, points in of.items():  # the area of mechanisms with every joint open
+        (left, right), (back, front) = ((min(side), max(side)) for side in zip(*points, strict=True))
+        areas.append(Area(name, ((left, back), (right, back), (right, front), (left, front))))
+    return Ground(
+        {place.name: seen(*place.position[:2]) for place in places.values()},
+        tuple(areas),
+        robots=tuple((robot.name, seen(*robot.position[:2])) for robot in embodiment.robots),
+        note="to scale, seen from the side of the camera that films",
+    )
+
+
+def _connected(problem: Problem) -> Ground | None:
+    """Return values of a situation type that static relations connect, laid out so that connected ones are near."""
+    import networkx
+
+    values = _values(problem)
+    graph: networkx.Graph[str] = networkx.Graph()
+    for _, rows in sorted(problem.relations.items()):
+        graph.add_edges_from(sorted(row for row in rows if len(row) == 2 and row[0] != row[1] and values >= {*row}))
+    shown = max(networkx.connected_components(graph), key=lambda part: (len(part), min(part)), default=set())
+    if len(shown) < 3 or len(shown) > MOST_SPOTS:
+        return None
+    graph = networkx.Graph(sorted((min(pair), max(pair)) for pair in graph.subgraph(shown).edges))
+    places = networkx.kamada_kawai_layout(graph)
+    spots = {name: (round(STRETCH * float(x), 4), round(float(y), 4)) for name, (x, y) in places.items()}
+    ways = tuple(sorted((min(pair), max(pair)) for pair in graph.edges))
+    return Ground(spots, ways=ways, metric=False, note="places have no coordinates: lines are what connects them")
+
+
+def _in_order(problem: Problem) -> Ground | None:
+    """Return the places of objects in rows, by name, where they have neither coordinates nor connections."""
+    kinds = {
+        problem.domain.situations[symbol.situation].range
+        for symbol in problem.initial
+        if len(symbol.arguments) == 1 and problem.domain.situations[symbol.situation].rest is None
+    }
+    held = {symbol.arguments[0] for symbol in problem.initial if symbol.arguments}
+    lists = [problem.classes.get(kind, ()) for kind in sorted(kinds)]
+    places = max((those for those in lists if not held & {*those}), key=len, default=())
+    if len(places) < 3 or len(places) > MOST_SPOTS:
+        return None
+    wide = max(3, round((2.2 * len(places)) ** 0.5))
+    names = sorted(places, key=natural)
+    spots = {name: (float(number % wide), float(number // wide)) for number, name in enumerate(names)}
+    return Ground(spots, metric=False, note="places have neither coordinates nor connections: they stand in order")
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return the key by which names sort as people count: ``cup2`` before ``cup10``.
+
+    >>> sorted(["cup10", "cup2"], key=natural)
+    ['cup2', 'cup10']
+    """
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _values(problem: Problem) -> set[str]:
+    """Return all values of the situation types that are stated."""
+    situations = {symbol.situation for symbol in problem.initial}
+    return {v for name in situations for v in problem.classes.get(problem.domain.situations[name].range, ())}

@@ -1,0 +1,110 @@
+"""An execution while it happens, as the page shows it: what was done by the world's clock, and what is still planned."""
+
+from __future__ import annotations
+
+import threading
+from functools import cached_property
+
+from confab.known import Known
+from confab.labels import Labels, labels_of
+from confab.page.data import PageData, timeline_data
+from confab.page.timeline import Bar, Period, Timeline
+from confab.planner.acting.executive import Moment
+from confab.planner.plan import Step
+from confab.reasoner.symbols import Symbol
+
+
+class Following:
+    """What a spectator was told of an execution so far; `version` grows with each moment. Threads may share it."""
+
+    def __init__(self, scene: Known) -> None:
+        self.scene, self.version = scene, 0
+        self.problem = scene.problem
+        self.known: dict[Symbol, str] = dict(self.problem.initial)
+        self._periods = {symbol: [(0.0, value)] for symbol, value in self.known.items()}
+        self._bars: list[Bar] = []
+        self._marks: list[tuple[float, str]] = []
+        self._moment: Moment | None = None
+        self._begun: tuple[Step, float] | None = None
+        self._lock = threading.Lock()
+
+    @cached_property
+    def labels(self) -> Labels:
+        """Displayed names of all that the problem names."""
+        return labels_of(self.scene.knowledge, self.scene.names, self.problem)
+
+    @property
+    def begun(self) -> bool:
+        """Whether an execution has begun."""
+        return self._moment is not None
+
+    def take(self, moment: Moment) -> None:
+        """Take note of a moment."""
+        with self._lock:
+            self._moment, self.version = moment, self.version + 1
+            if moment.what == "begin" and moment.step is not None:
+                self._begun = moment.step, moment.seconds
+            elif moment.what == "end" and moment.step is not None:
+                step, begin = self._begun or (moment.step, moment.seconds)
+                done = moment.step.path in moment.done
+                note = "; ".join(f"{s.symbol}: expected {s.expected}, seen {s.observed}" for s in moment.surprises)
+                self._bars.append(Bar(step, begin, moment.seconds, done, note))
+                self._begun = None
+                seen = {fact.symbol: fact.value for fact in moment.expected} if done else {}
+                seen |= {s.symbol: s.observed for s in moment.surprises if s.observed is not None}
+                for symbol, value in seen.items():
+                    self.known[symbol] = value
+                    periods = self._periods.setdefault(symbol, [])
+                    if not periods or periods[-1][1] != value:
+                        periods.append((moment.seconds, value))
+            elif moment.what in ("intervention", "repair", "replan"):
+                text = moment.text if moment.what == "intervention" else f"{moment.what}: {moment.text}"
+                self._marks.append((moment.seconds, text))
+
+    def data(self) -> PageData:
+        """Return what the page shows now."""
+        with self._lock:
+            moment, now = self._moment, self._moment.seconds if self._moment is not None else 0.0
+            bars, marks = list(self._bars), tuple(self._marks)
+            seen = {symbol: list(periods) for symbol, periods in self._periods.items()}
+            begun, version = self._begun, self.version
+        assert moment is not None
+        begun_path = None if begun is None else begun[0].path
+        left = [s for s in moment.plan.primitives if s.path not in moment.done]
+        length = sum(bar.end - bar.begin for bar in bars) / len(bars) if bars else 1.0
+        at = now
+        for step in left if moment.what != "over" else []:
+            running = step.path == begun_path
+            start = begun[1] if running and begun is not None else at
+            at = max(now, start + length)
+            bars.append(Bar(step, start, at, planned=not running))
+        phases = {
+            symbol: tuple(
+                Period(since, periods[i + 1][0] if i + 1 < len(periods) else now, value)
+                for i, (since, value) in enumerate(periods)
+            )
+            for symbol, periods in seen.items()
+        }
+        final = {symbol: periods[-1][1] for symbol, periods in seen.items()}
+        unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
+        timeline = Timeline(self.problem, moment.plan, tuple(bars), phases, at, unit, final, marks)
+        notes = {begun[0].path: "◀ being done"} if begun is not None else {}
+        data = timeline_data(self.scene, timeline, self.labels, notes, reasons=False)
+        done = sum(step.path in moment.done for step in moment.plan.primitives)
+        over = moment.what == "over"
+        data |= {
+            "live": True,
+            "version": version,
+            "now": now,
+            "good": moment.text == "reached" if over else None,
+            "status": moment.text if over else "acting",
+            "headline": moment.text,
+            "tiles": [
+                {"name": "primitives done", "text": f"{done} of {len(moment.plan.primitives)}"},
+                {"name": "interventions and changes of plan", "text": str(len(marks))},
+            ],
+            "goals": [],
+            "notes": [],
+            "again": "",
+        }
+        return data

@@ -1,0 +1,242 @@
+"""What can be turned by hand on the page, and what comes of it: facts, goals and interventions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, TypedDict
+
+from confab import ontology
+from confab.accepting import check_goal, possible
+from confab.known import Known
+from confab.labels import Labels, labels_of
+from confab.page.data import PageData, ReadyQuery, Turnable, TurnableRow, page_data
+from confab.planner.plan import Limits
+from confab.planner.solve import DEFAULT_MODE, Request, solve
+from confab.planning import Result
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
+from confab.reasoner.names import nearest
+from confab.reasoner.possible import refuse_impossible
+from confab.reasoner.symbols import FALSE, TRUE, Problem, Symbol
+
+if TYPE_CHECKING:
+    from confab.execution import Execution
+
+MOST_SYMBOLS = 20_000
+"""Maximum number of rows that can be turned; the page tells the number of the others, which `with_fact` turns."""
+SECONDS = 10.0
+"""Limit of planning for the page."""
+
+
+class TurnedIntervention(TypedDict):
+    """An intervention as it is chosen on the page: after which step, world or goal, which symbol, which value."""
+
+    after: str | int
+    what: str
+    key: str
+    value: str
+
+
+class Turned(TypedDict, total=False):
+    """What was turned: values of facts and goals by the symbol's words; None drops a goal."""
+
+    facts: dict[str, str]
+    goals: dict[str, str | None]
+    interventions: list[TurnedIntervention]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What of a scene can be turned, and what comes of it.
+
+    Examples
+    --------
+    >>> import confab
+    >>> sheet = Sheet(confab.load("beverage-serving"))
+    >>> sheet.answer({"facts": {"cup1 LOCATION": "location7"}})["headline"].split(",")[0]
+    'solved: 3 / 8 / 26 steps per level'
+    """
+
+    scene: Known
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The whole scene's problem."""
+        return self.scene.problem
+
+    @cached_property
+    def labels(self) -> Labels:
+        """Displayed names of all that the problem names."""
+        return labels_of(self.scene.knowledge, self.scene.names, self.problem)
+
+    @cached_property
+    def symbols(self) -> dict[str, Symbol]:
+        """The symbols by their words without a value, ``cup1 LOCATION``; those with a goal come first."""
+        goal = self.problem.goal
+        those = sorted({*self.problem.initial, *goal}, key=lambda s: (s not in goal, s.arguments, s.situation))
+        return {" ".join((*s.arguments[:1], s.situation, *s.arguments[1:])): s for s in those}
+
+    def turnable(self) -> Turnable:
+        """Return the rows that can be turned, and their lists of values."""
+        rows: list[TurnableRow] = []
+        lists: dict[str, list[str]] = {}
+        for key, symbol in list(self.symbols.items())[:MOST_SYMBOLS]:
+            values, kind = self._values(symbol), self.problem.domain.situations[symbol.situation].range
+            name = kind if lists.setdefault(kind, values) == values else key  # a list of its own for a value of its own
+            lists.setdefault(name, values)
+            rows.append(
+                {
+                    "key": key,
+                    "label": self.labels.about(symbol),
+                    "values": name,
+                    "now": self.problem.initial.get(symbol, FALSE),
+                    "wanted": self.problem.goal.get(symbol),
+                }
+            )
+        named = {name: [(value, self.labels.name(value)) for value in values] for name, values in lists.items()}
+        return {"rows": rows, "values": named, "hidden": max(0, len(self.symbols) - MOST_SYMBOLS)}
+
+    def _values(self, symbol: Symbol) -> list[str]:
+        situation = self.problem.domain.situations[symbol.situation]
+        values = [TRUE, FALSE] if situation.boolean else list(self.problem.classes.get(situation.range, ()))
+        there = (self.problem.initial.get(symbol), self.problem.goal.get(symbol), situation.rest)
+        return [*values, *dict.fromkeys(v for v in there if v is not None and v not in values)]
+
+    def turned(self, by: Turned) -> Problem:
+        """Return the problem with other facts and goals, each by its symbol; a goal that is None isn't wanted.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no such symbol, a goal wants what is no value of it, or the facts can't hold together.
+        """
+        symbols = self.symbols
+        for key in (*by.get("facts", {}), *by.get("goals", {})):
+            if key not in symbols:
+                raise KnowledgeError(f"there is no {key}{nearest(key, symbols)}")
+        initial, goal = dict(self.problem.initial), dict(self.problem.goal)
+        for key, value in by.get("facts", {}).items():
+            initial[symbols[key]] = self._checked(key, value)
+        for key, wanted in by.get("goals", {}).items():
+            goal.pop(symbols[key], None)
+            if wanted is not None:
+                goal[symbols[key]] = wanted
+        with possible():
+            refuse_impossible(self.problem, self.problem.initial, initial)
+        turned = replace(self.problem, initial=initial, goal=goal)
+        if goal or not by.get("goals"):
+            check_goal(self.scene.iri, turned)
+        return turned
+
+    def _checked(self, key: str, value: object) -> str:
+        """Return a value that a symbol can have; amounts are checked where they are compared."""
+        symbol = self.symbols[key]
+        situation = self.problem.domain.situations[symbol.situation]
+        known = self._values(symbol)
+        if not isinstance(value, str) or (situation.quantity is None and value not in known):
+            raise KnowledgeError(f"{key} can't be {value}{nearest(str(value), known)}")
+        return value
+
+    def plan(self, by: Turned) -> Result:
+        """Return what planning gives in what was turned."""
+        problem = self.turned(by)
+        return Result(self.scene, problem, solve(Request(problem, DEFAULT_MODE, Limits(seconds=SECONDS))), {})
+
+    def act(self, by: Turned, result: Result) -> Execution | None:
+        """Return the execution of the plan with the interventions that were chosen, or None if there are none."""
+        from confab.execution import execute
+
+        if not by.get("interventions") or not result.solved:
+            return None
+        texts = [self.intervention(each) for each in by["interventions"]]
+        return execute(self.scene, result.problem, result.plan, texts)
+
+    @staticmethod
+    def intervention(turned: TurnedIntervention) -> str:
+        """Return an intervention as the command line takes it.
+
+        Examples
+        --------
+        >>> Sheet.intervention({"after": 28, "key": "cup2 LOCATION", "value": "location8", "what": "goal"})
+        'after=28 goal cup2 LOCATION location8'
+        """
+        goal = "goal " if turned["what"] == "goal" else ""
+        return f"after={turned['after']} {goal}{turned['key']} {turned['value']}"
+
+    @cached_property
+    def scene_data(self) -> PageData:
+        """What the page shows of the scene before anything is planned, with what can be turned and asked."""
+        data = page_data(self.scene)
+        data["turnable"], data["queries"] = self.turnable(), ready_queries()
+        return data
+
+    def answer(self, by: Turned) -> PageData:
+        """Return what the page shows after something was turned; `problem` says why nothing could be planned."""
+        try:
+            result = self.plan(by)
+            execution = self.act(by, result)
+        except (KnowledgeError, LimitError) as error:
+            return {"problem": str(error)}
+        return page_data(self.scene, result, execution=execution, again=self._again(by))
+
+    def _again(self, by: Turned) -> str:
+        """Return the command, or the lines of Python, that do the same."""
+        path = self.scene.knowledge.path
+        shipped = path is not None and path.is_relative_to(ontology.ROOT)
+        name = self.scene.iri if path is None else path.stem if shipped else str(path)
+        facts = [f"{key} {value}" for key, value in by.get("facts", {}).items()]
+        goals = [f"{key} {value}" for key, value in by.get("goals", {}).items() if value is not None]
+        dropped = [key for key, value in by.get("goals", {}).items() if value is None]
+        people = [self.intervention(each) for each in by.get("interventions", [])]
+        if not (facts or goals or dropped or people):
+            return f"confab plan {name}"
+        lines = [f"scene = confab.load({name!r})" + _called("with_fact", facts) + _called("with_goal", goals)]
+        if dropped:
+            lines.append(f"# without the goals of {', '.join(dropped)}")
+        lines.append(f"scene.execute(interventions={people!r})" if people else "scene.plan()")
+        return "\n".join(lines)
+
+
+def _called(method: str, facts: Sequence[str]) -> str:
+    return f".{method}({', '.join(map(repr, facts))})" if facts else ""
+
+
+def ready_queries() -> list[ReadyQuery]:
+    """Return the queries that ship with Confab and ask the scene itself, by name."""
+    found: list[ReadyQuery] = []
+    for path in sorted((ontology.ROOT / "questions").glob("*.rq")):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        question = next((line.partition(":")[2].strip() for line in lines if line.startswith("# Question:")), path.stem)
+        text = "\n".join(line for line in lines if not line.startswith("#"))
+        found.append({"name": path.stem, "question": question, "text": text.strip()})
+    return found
+
+
+def turned_from(data: object) -> Turned:
+    """Return what was turned, from the JSON that the page sends.
+
+    Raises
+    ------
+    KnowledgeError
+        The data aren't of that form.
+    """
+    wanted = "wanted an object with facts, goals and interventions"
+    if not isinstance(data, Mapping):
+        raise KnowledgeError(f"got {type(data).__name__}; {wanted}")
+    facts, goals, people = data.get("facts", {}), data.get("goals", {}), data.get("interventions", [])
+    if not isinstance(facts, Mapping) or not isinstance(goals, Mapping) or not isinstance(people, list):
+        raise KnowledgeError(f"facts or goals are no object, or interventions no list; {wanted}")
+    if not all(isinstance(value, str) for value in facts.values()):
+        raise KnowledgeError("the value of a fact is no text")
+    if not all(value is None or isinstance(value, str) for value in goals.values()):
+        raise KnowledgeError("the value of a goal is neither text nor null")
+    fields = ("after", "what", "key", "value")
+    if not all(isinstance(one, Mapping) and all(isinstance(one.get(f), str | int) for f in fields) for one in people):
+        raise KnowledgeError(f"an intervention has no text for one of {', '.join(fields)}")
+    interventions: list[TurnedIntervention] = [
+        {"after": one["after"], "what": str(one["what"]), "key": str(one["key"]), "value": str(one["value"])}
+        for one in people
+    ]
+    return {"facts": dict(facts), "goals": dict(goals), "interventions": interventions}

@@ -1,0 +1,77 @@
+"""The page in a notebook, with anywidget: the same script, data and style; Python plans and answers queries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from confab.known import Known
+from confab.page.data import PageData
+from confab.page.sheet import Sheet, turned_from
+from confab.planning import Result
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import LimitError
+
+if TYPE_CHECKING:
+    import anywidget
+
+MISSING = (
+    "the board needs anywidget, which isn't installed; pip install 'confab-planner[notebook]', and restart the kernel"
+)
+
+
+def board(scene: Known) -> anywidget.AnyWidget:
+    """Return the page of a scene, which a notebook shows; its `result` is what was planned last.
+
+    Raises
+    ------
+    KnowledgeError
+        anywidget isn't installed.
+    """
+    try:
+        import anywidget
+        import traitlets
+    except ImportError as error:
+        raise KnowledgeError(MISSING) from error
+
+    class Board(anywidget.AnyWidget):
+        """What the page shows and what was turned or asked on it: `turned` and `asked` are written by the page."""
+
+        _esm = Path(__file__).with_name("page.js")
+        _css = Path(__file__).with_name("page.css")
+        data: Any = traitlets.Dict().tag(sync=True)
+        turned: Any = traitlets.Dict().tag(sync=True)
+        asked: Any = traitlets.Dict().tag(sync=True)
+        rows: Any = traitlets.Dict().tag(sync=True)
+
+        def __init__(self, sheet: Sheet) -> None:
+            self.sheet = sheet
+            super().__init__(data={**sheet.scene_data, **sheet.answer({})})
+            self.observe(self._turn, "turned")
+            self.observe(self._ask, "asked")
+
+        def _turn(self, change: dict[str, Any]) -> None:
+            answer: PageData = self._answer(change["new"])
+            self.data = {**self.data, "problem": "", **answer}
+
+        def _answer(self, turned: object) -> PageData:
+            try:
+                return self.sheet.answer(turned_from(turned))
+            except KnowledgeError as error:
+                return {"problem": str(error)}
+
+        def _ask(self, change: dict[str, Any]) -> None:
+            asked = change["new"]
+            try:
+                table = self.sheet.scene.query(str(asked.get("query", "")))
+                rows = [[cell or "" for cell in row] for row in table]
+                self.rows = {"of": asked.get("of"), "columns": list(table.columns), "rows": rows}
+            except (KnowledgeError, LimitError) as error:
+                self.rows = {"of": asked.get("of"), "problem": str(error)}
+
+        @property
+        def result(self) -> Result:
+            """What planning gives as the board stands."""
+            return self.sheet.plan(turned_from(self.turned))
+
+    return Board(Sheet(scene))

@@ -1,0 +1,378 @@
+"""The page: one JSON object, shown by one script, as a file, by a server and in a notebook; driven here by a browser."""
+
+import json
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import confab
+from confab.cli import app
+from confab.memory import Memory
+from confab.page.data import PageData, page_data
+from confab.page.frozen import page_html, write_page
+from confab.page.ground import ground_of
+from confab.page.notebook import SHOWN
+from confab.page.sheet import Sheet, Turned, turned_from
+from confab.page.timeline import of_episode, of_plan, of_rollout
+from confab.planner.plan import Plan
+from confab.serving import Server, serving
+from confab.sim.picture import view_of
+from confab.sim.verdict import Verdict
+from confab.sim.verify import Rollout, StepReport
+from confab.table import Table
+from tests.browser import Browser, needs_browser
+
+FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
+FACTS: Turned = {"facts": {"cup1 LOCATION": "location7"}}
+
+
+@pytest.fixture(scope="module")
+def scene() -> confab.Scene:
+    return confab.load("beverage-serving")
+
+
+@pytest.fixture(scope="module")
+def serving_plan(scene: confab.Scene) -> confab.Result:
+    return scene.plan()
+
+
+@pytest.fixture(scope="module")
+def failed(serving_plan: confab.Result) -> confab.Report:
+    """A run that lost the cup at its tenth primitive, as physics tells it."""
+    steps = serving_plan.plan.primitives[:10]
+    reports = [StepReport(step, Verdict(True, measured={"joint_lag_rad": 0.01}), 1.0) for step in steps]
+    lost = Verdict(False, "slip or drop", ("cup2",), {"joint_lag_rad": 0.0863}, "it was lost </script><b>on the way")
+    reports[-1] = StepReport(steps[-1], lost, 0.5)
+    rollout = Rollout(0, False, tuple(reports), (), 2.0, 9.75, {})
+    return confab.Report(serving_plan.plan, serving_plan.problem.goal, (rollout,), None, {}, serving_plan.scene)
+
+
+@pytest.fixture(scope="module")
+def pages(scene: confab.Scene, serving_plan: confab.Result, failed: confab.Report) -> dict[str, PageData]:
+    memory = Memory.of(scene)
+    memory.learn(scene, serving_plan.plan)
+    made = {
+        "plan": page_data(scene, serving_plan),
+        "failed": page_data(scene, serving_plan, failed),
+        "learned": page_data(scene, serving_plan, None, None, memory),
+        "episode": page_data(scene, execution=scene.execute(interventions=FIGURE_8)),
+        "none": page_data(scene, scene.plan(["cup1 LOCATION location7", "cup2 LOCATION location7"])),
+    }
+    for name in ("towers-small", "house-small"):
+        result = confab.load(name).plan()
+        made[name] = page_data(result.scene, result)
+    return made
+
+
+# ------------------------------------------------------------------------------------------------------------ the data
+
+
+def test_a_page_loads_nothing_and_its_text_is_data(pages: dict[str, PageData]) -> None:
+    for name, data in pages.items():
+        page = page_html(data, data["title"])
+        assert not re.findall(r"""(?:src|href)="(?!data:)[^"]""", page.split("<script")[0]), name
+        assert "@import" not in page, name
+        assert page.count("</script>") == 2, name
+        (content,) = re.findall(r'id="confab-data">(.*?)</script>', page, re.S)
+        assert json.loads(content) == json.loads(json.dumps(data)), name
+
+
+def test_steps_are_told_in_labels_with_their_reasons_and_names(pages: dict[str, PageData]) -> None:
+    first = pages["plan"]["steps"][0]
+    assert (first["what"], first["number"], first["name"]) == ("move cup 1 to location 7", "L1#0", "B1_MOVE #22")
+    assert first["needs"] == ["it is wanted that cup 1 is at location 7"]
+    assert "left hand holds cup 1 (before: nothing)" in pages["plan"]["steps"][1]["gives"]
+
+
+def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, PageData]) -> None:
+    data = pages["failed"]
+    assert (data["good"], data["status"]) == (False, "failed in physics")
+    assert data["alarm"]["measured"] == [("joint lag rad", "0.0863")]
+    assert data["alarm"]["lines"][1].startswith("slip or drop")
+    assert [bar["tone"] for row in data["rows"] if row["group"] == "actors" for bar in row["bars"]].count("failed") == 1
+
+
+def test_every_kind_of_run_says_how_it_ended(pages: dict[str, PageData]) -> None:
+    assert (pages["towers-small"]["good"], pages["towers-small"]["status"]) == (True, "a plan, checked")
+    assert (pages["episode"]["good"], pages["episode"]["status"]) == (True, "reached")
+    assert [mark["text"] for mark in pages["episode"]["marks"]][:2] == list(FIGURE_8)
+    assert (pages["none"]["good"], pages["none"]["status"]) == (False, "unsolvable")
+    assert any("An independent checker" in line for line in pages["none"]["alarm"]["lines"])
+    assert pages["learned"]["learned"]["rules"]
+    assert all(data["again"].startswith(("confab run", "confab execute")) for data in pages.values())
+
+
+def test_a_colour_means_one_thing(serving_plan: confab.Result, pages: dict[str, PageData]) -> None:
+    problem, rows = serving_plan.problem, {row["label"]: row["bars"] for row in pages["plan"]["rows"]}
+    assert [bar["tone"] for bar in rows["cup 1 is at"]] == ["start", "between", "wanted"]
+    assert {bar["tone"] for bar in rows["left hand holds"]} == {"start", "between"}
+    assert sum(row["group"] == "wanted" for row in pages["plan"]["rows"]) == 0
+    assert sum("met" in row for row in pages["plan"]["rows"]) == len(problem.goal)
+
+
+def test_the_map_has_furniture_connections_or_order(pages: dict[str, PageData], tmp_path: Path) -> None:
+    house = pages["house-small"]["map"]
+    assert "lines are what connects them" in house["note"]
+    assert ("hall", "kitchen") in [tuple(way) for way in house["ways"]]
+    assert "map" not in pages["towers-small"]
+    assert pages["plan"]["map"]["areas"][0]["label"] == "table"
+    (cup,) = (thing for thing in pages["plan"]["map"]["things"] if thing["id"] == "cup1")
+    assert [place for _, place, _, _ in cup["at"]] == ["location2", "", "location7"]
+    made = confab.generate("served", tmp_path / "served.ttl", objects=6)
+    assert "they stand in order" in page_data(made)["map"]["note"]
+
+
+@pytest.mark.parametrize("name", ["beverage-serving", "two-tables", "kitchen-corner"])
+def test_the_map_is_seen_from_where_the_film_is_taken(name: str) -> None:
+    scene = confab.load(name)
+    ground = ground_of(scene.problem, scene.embodiment)
+    assert ground is not None
+    camera = view_of(scene.embodiment)
+    of = [
+        (np.array(place.position), ground.spots[name])
+        for name, place in scene.embodiment.places.items()
+        if not place.carrier
+    ]
+    for (one, seen), (other, also) in pairwise(of):
+        if abs(seen[0] - also[0]) > abs(seen[1] - also[1]):
+            across = camera.pixel(other)[0] - camera.pixel(one)[0]
+            assert (across > 0) == (also[0] > seen[0])
+
+
+def test_a_place_in_a_drawer_is_on_the_map_where_the_drawer_is() -> None:
+    scene = confab.load("kitchen-corner")
+    ground = ground_of(scene.problem, scene.embodiment)
+    assert ground is not None
+    spots = list(ground.spots.values())
+    assert min(abs(complex(*a) - complex(*b)) for i, a in enumerate(spots) for b in spots[:i]) > 0.05
+
+
+def test_time_is_told_once_and_whole(serving_plan: confab.Result, failed: confab.Report) -> None:
+    problem, plan = serving_plan.problem, serving_plan.plan
+    for timeline in (of_plan(problem, plan), of_rollout(problem, plan, failed.rollouts[0])):
+        for periods in timeline.phases.values():
+            assert (periods[0].begin, periods[-1].end) == (0, timeline.end)
+            assert all(a.end == b.begin and a.value != b.value for a, b in pairwise(periods))
+    assert timeline.failed is not None
+    assert all(of_plan(problem, plan).met(symbol) for symbol in problem.goal)
+
+
+def test_an_episode_is_told_as_it_was_seen(scene: confab.Scene) -> None:
+    episode = scene.execute(interventions=FIGURE_8).episode
+    timeline = of_episode(scene.problem, episode)
+    assert all(periods[-1].value == episode.observed[symbol] for symbol, periods in timeline.phases.items())
+
+
+def test_nothing_to_do_makes_a_page(serving_plan: confab.Result) -> None:
+    nothing = replace(serving_plan, outcome=replace(serving_plan.outcome, plan=Plan(())))
+    assert page_data(serving_plan.scene, nothing)["status"] == "nothing to do: all goals hold"
+
+
+# ------------------------------------------------------------------------------------------------------------ turning
+
+
+def test_a_fact_that_is_turned_changes_the_plan(scene: confab.Scene) -> None:
+    sheet = Sheet(scene)
+    assert sheet.answer({})["headline"].startswith("solved: 4 / 10 / 32")
+    answer = sheet.answer(FACTS)
+    assert answer["headline"].startswith("solved: 3 / 8 / 26")
+    assert (
+        answer["again"] == "scene = confab.load('beverage-serving').with_fact('cup1 LOCATION location7')\nscene.plan()"
+    )
+
+
+def test_goals_are_turned_and_dropped_and_what_cannot_be_says_why(scene: confab.Scene) -> None:
+    sheet = Sheet(scene)
+    dropped: Turned = {"goals": {key: None for key, symbol in sheet.symbols.items() if symbol in sheet.problem.goal}}
+    assert sheet.plan(dropped).plan.steps == ()
+    assert sheet.answer({"goals": {"cup1 LOCATION": "location5"}})["headline"].startswith("unsolvable")
+    assert "location5" in sheet.answer({"facts": {"cup1 LOCATION": "locaton5"}})["problem"]
+    assert "there is no cup9" in sheet.answer({"facts": {"cup9 LOCATION": "location5"}})["problem"]
+
+
+def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene: confab.Scene) -> None:
+    turned: Turned = {"interventions": [{"after": "28", "key": "cup2 LOCATION", "value": "location8", "what": "world"}]}
+    assert "1 intervention, 1 change of plan" in Sheet(scene).answer(turned)["headline"]
+    turned["interventions"][0]["value"] = "no_place"
+    assert "no_place" in Sheet(scene).answer(turned)["problem"]
+
+
+@pytest.mark.parametrize("name", ["towers-small", "house-small", "canal-small"])
+def test_any_world_can_be_turned(name: str) -> None:
+    sheet = Sheet(confab.load(name))
+    turnable = sheet.turnable()
+    for row in turnable["rows"]:
+        values = [value for value, _ in turnable["values"][row["values"]]]
+        assert row["now"] in values
+        assert row["wanted"] is None or row["wanted"] in values
+    assert sheet.answer({})["steps"]
+
+
+@pytest.mark.parametrize(
+    "data", [[], "x", {"facts": []}, {"facts": {"a": 1}}, {"goals": {"a": 1}}, {"interventions": [{}]}]
+)
+def test_what_is_no_turning_is_refused_in_a_sentence(data: object) -> None:
+    with pytest.raises(confab.KnowledgeError):
+        turned_from(data)
+
+
+# ------------------------------------------------------------------------------------------------------------ notebooks
+
+
+def test_notebooks_show_values_without_a_script(
+    scene: confab.Scene, serving_plan: confab.Result, failed: confab.Report
+) -> None:
+    shown = [
+        scene, serving_plan, failed, scene.execute(), Memory.of(scene), serving_plan.why(0),
+        serving_plan.why_not("B1_MOVE cup2 location1"), serving_plan.explain(),
+    ]  # fmt: skip
+    for value in shown:
+        html = value._repr_html_()  # type: ignore[attr-defined]
+        assert html.startswith('<div class="confab">'), value
+        assert "<script" not in html
+    plan = serving_plan.plan
+    values = [serving_plan.outcome, plan, plan.steps[0], failed.rollouts[0].steps[0].verdict]
+    for (_, name), show in SHOWN.items():
+        assert "confab" in show(next(value for value in values if type(value).__name__ == name))
+    assert isinstance(Memory.of(scene).advice(), Table)
+
+
+def test_without_anywidget_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    with pytest.raises(confab.KnowledgeError, match=r"needs anywidget.*pip install 'confab-planner\[notebook\]'"):
+        confab.load("two-cups").board()
+
+
+@pytest.mark.skipif(find_spec("anywidget") is None, reason="needs anywidget (the extra notebook)")
+def test_the_widget_answers_what_the_page_turns_and_asks(scene: confab.Scene) -> None:
+    board: Any = scene.board()
+    board.turned = FACTS
+    assert board.data["headline"].startswith("solved: 3 / 8 / 26")
+    assert board.result.plan.length == {1: 3, 2: 8, 3: 26}
+    board.asked = {"of": 1, "query": "SELECT ?where WHERE { :cup1 k:location ?where }"}
+    assert board.rows == {"of": 1, "columns": ["where"], "rows": [["location2"]]}
+    board.asked = {"of": 2, "query": "SELEKT"}
+    assert board.rows["problem"]
+
+
+# ------------------------------------------------------------------------------------------------------------ in a browser
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Server]:
+    with serving(confab.load("beverage-serving"), 0) as server:
+        yield server
+
+
+SAID = "(document.querySelector('.clock output') || {}).textContent"
+WIDE = """[...document.querySelectorAll("body *")].filter((e) => !e.closest(".scroll, .lanes, svg")
+  && e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.className || e.tagName)"""
+
+
+@needs_browser
+@pytest.mark.parametrize(("name", "width"), [("failed", 1280), ("failed", 420), ("house-small", 420), ("none", 420)])
+def test_a_frozen_page_shows_itself_without_fault_at_any_width(
+    browser: Browser, pages: dict[str, PageData], name: str, width: int, tmp_path: Path
+) -> None:
+    browser.open(write_page(tmp_path / "page.html", pages[name]).as_uri(), width, dark=width == 420)
+    browser.wait("document.querySelector('h1') !== null")
+    assert browser.run(WIDE) == []
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.faults == []
+    if name == "failed":
+        assert browser.run(SAID).startswith("9.3 s: move cup 2 to location 5")
+        assert browser.run("document.querySelector('.plan .chosen .bad') !== null")
+
+
+@needs_browser
+def test_a_click_on_a_lane_moves_the_clock_the_map_and_the_plan(
+    browser: Browser, pages: dict[str, PageData], tmp_path: Path
+) -> None:
+    browser.open(write_page(tmp_path / "page.html", pages["plan"]).as_uri())
+    place = "document.querySelector('.map svg')?.getAttribute('aria-label')"
+    assert "cup 1 is at location 2" in browser.wait(place)
+    browser.click(".row.levels .bar[data-step='1']")
+    assert browser.run(SAID).endswith("lift left hand from cup 2") or "move cup 2 to location 5" in browser.run(SAID)
+    assert "cup 1 is at location 7" in browser.run(place)
+    assert browser.run("document.querySelector('li.chosen').dataset.step") == "1"
+    browser.run("document.querySelector('.lanes').focus()")
+    before = browser.run("Number(document.querySelector('.clock input').value)")
+    browser.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
+    assert browser.run("Number(document.querySelector('.clock input').value)") > before
+    assert browser.faults == []
+
+
+@needs_browser
+def test_a_fact_is_turned_and_a_query_asked_on_the_served_page(browser: Browser, served: Server) -> None:
+    browser.open(served.url)
+    lengths = "[...document.querySelectorAll('.tile')].map((e) => e.textContent).join(' ')"
+    browser.wait(f"{lengths}.includes('4 / 10 / 32')")
+    browser.choose("cup 1 is at: is", "location7")
+    browser.wait(f"{lengths}.includes('3 / 8 / 26')")
+    assert browser.run("document.querySelector('.changes del').textContent") == "move cup 1 to location 7"
+    browser.choose("cup 1 is at: is", "location1")
+    assert "the same LOCATION" in browser.wait("document.querySelector('.turning .bad')?.textContent")
+    browser.type(".asking textarea", "SELECT ?where WHERE { :cup1 k:location ?where }")
+    browser.click(".asking button")
+    assert browser.wait("document.querySelector('.answer td')?.textContent") == "location2"
+    browser.choose("ready questions", "1")
+    browser.wait("document.querySelector('.answer td')?.textContent === 'bottle1'")
+    assert browser.faults == []
+
+
+@needs_browser
+def test_the_page_follows_a_robot_that_acts(browser: Browser) -> None:
+    scene = confab.load("beverage-serving")
+    with serving(scene, 0) as server:
+        said: list[str] = []
+
+        def look(moment: Any) -> None:
+            server.service.take(moment)
+            if moment.what == "begin" and moment.seconds == 3:
+                browser.open(server.url)
+                said.append(browser.wait(SAID))
+            if moment.what == "begin" and moment.seconds == 20:
+                said.append(browser.wait(f"{SAID}.startsWith('20 steps') && {SAID}"))
+
+        assert scene.execute(tell=look).reached
+        browser.wait("document.querySelector('.tile')?.textContent.includes('✓ reached')")
+    assert [words.split(":")[0] for words in said] == ["3 steps", "20 steps"]
+    assert browser.faults == []
+
+
+# ------------------------------------------------------------------------------------------------------------ commands
+
+
+def test_a_result_and_an_execution_write_their_page(
+    scene: confab.Scene, serving_plan: confab.Result, tmp_path: Path
+) -> None:
+    assert serving_plan.report(tmp_path / "plan.html").read_text().startswith("<!doctype html>")
+    assert scene.execute().report(tmp_path / "run.html").read_text().rstrip().endswith("</html>")
+
+
+def test_plan_and_execute_write_a_page_and_learning_a_curve(tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    page, curve = tmp_path / "page.html", tmp_path / "curve.svg"
+    assert run(app, ["plan", "beverage-serving", "--report", str(page)]).exit_code == 0
+    assert page.read_text().startswith("<!doctype html>")
+    assert run(app, ["execute", "beverage-serving", "--report", str(page)]).exit_code == 0
+    assert '"status":"reached"' in page.read_text()
+    learn = ["learn", "beverage-serving", "--memory", str(tmp_path / "m.ttl")]
+    assert run(app, [*learn, "--plot", str(curve), "--rounds", "2"]).exit_code == 0
+    assert "</svg>" in curve.read_text()
+    assert run(app, [*learn, "--plot", str(tmp_path / "curve.txt")]).exit_code != 0
